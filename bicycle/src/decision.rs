@@ -1,0 +1,42 @@
+//! What a controller returns each cycle: a command or a reason not to give one.
+
+use crate::Command;
+
+/// The outcome of one control cycle. Degraded operation is a value, never a stale command.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Decision {
+    /// Follow the command.
+    Drive(Command),
+    /// Stand still for now; driving may go on next cycle.
+    Hold(HoldReason),
+    /// Come to a controlled stop.
+    Stop(StopReason),
+}
+
+/// Why the vehicle waits.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum HoldReason {
+    /// Nothing of the ground is known yet.
+    NoMap,
+    /// The goal is reached.
+    AtGoal,
+}
+
+/// Why the vehicle must stop.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum StopReason {
+    /// Odometry is older than its age limit or does not change while the wheels turn.
+    StaleOdometry,
+    /// The last scan is older than its age limit.
+    StaleScan,
+    /// A measurement is not a finite number.
+    NonFiniteInput,
+    /// Every sampled future breaks a limit.
+    NoFeasibleRollout,
+    /// The computation itself gave a number that is not finite.
+    NonFiniteResult,
+    /// The pose lies outside the map.
+    OutsideMap,
+}

@@ -1,0 +1,12 @@
+//! The vehicle as a planner sees it: its description, its commands, the kinematic bicycle with composable effects,
+//! and the drive log.
+
+mod decision;
+mod motion;
+mod vehicle;
+
+pub use decision::{Decision, HoldReason, StopReason};
+pub use motion::{Command, ImuSample, Odometry, State};
+pub use vehicle::{
+    Axle, Body, Drivetrain, Geometry, Limits, Servo, Suspension, Tyre, Vehicle, VehicleError, Wheel,
+};

@@ -1,0 +1,247 @@
+//! Description of a machine. Geometry and limits serve planner and plant alike; the rest describes the machine
+//! to whoever simulates it.
+
+use serde::{Deserialize, Serialize};
+
+/// A four-wheeled vehicle with front steering.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Vehicle {
+    /// Name, for reports.
+    pub name: String,
+    /// Lengths that planner and plant share.
+    pub geometry: Geometry,
+    /// What the vehicle can or may do.
+    pub limits: Limits,
+    /// Sprung body.
+    pub body: Body,
+    /// One wheel; all four are alike.
+    pub wheel: Wheel,
+    /// Front suspension.
+    pub front: Axle,
+    /// Rear suspension.
+    pub rear: Axle,
+    /// Motor, transmission and brakes.
+    pub drivetrain: Drivetrain,
+    /// Steering servo.
+    pub servo: Servo,
+    /// Tyre properties that do not depend on the ground.
+    pub tyre: Tyre,
+}
+
+/// Lengths. The body frame sits at the rear axle's centre.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Geometry {
+    /// Between the axles [m].
+    pub wheelbase_m: f64,
+    /// Between the wheels' middle planes on an axle [m].
+    pub track_m: f64,
+    /// Overall length [m].
+    pub length_m: f64,
+    /// Overall width [m].
+    pub width_m: f64,
+    /// From the rear axle to the rearmost point [m].
+    pub rear_overhang_m: f64,
+    /// From the ground to the belly at rest [m].
+    pub ground_clearance_m: f64,
+    /// Radius of an unloaded wheel [m].
+    pub wheel_radius_m: f64,
+}
+
+/// Limits of commands and of attitude.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Limits {
+    /// Fastest forward command [m/s].
+    pub speed_max_mps: f64,
+    /// Fastest reverse command, as a positive number [m/s]; 0 = no reverse gear.
+    pub reverse_speed_max_mps: f64,
+    /// Largest steering angle [rad].
+    pub steering_max_rad: f64,
+    /// Fastest change of the steering angle [rad/s].
+    pub steering_rate_max_radps: f64,
+    /// Largest acceleration and deceleration [m/s2].
+    pub acceleration_max_mps2: f64,
+    /// Largest lateral acceleration, against rolling over at speed [m/s2].
+    pub lateral_acceleration_max_mps2: f64,
+    /// Largest |roll| that counts as safe [rad].
+    pub roll_max_rad: f64,
+    /// Largest |pitch| that counts as safe [rad].
+    pub pitch_max_rad: f64,
+}
+
+/// The sprung body.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Body {
+    /// Mass without wheels [kg].
+    pub mass_kg: f64,
+    /// Principal moments of inertia about x, y, z through the centre of gravity [kg m2].
+    pub inertia_kgm2: [f64; 3],
+    /// Centre of gravity ahead of the rear axle [m].
+    pub cog_ahead_m: f64,
+    /// Centre of gravity above the ground at rest [m].
+    pub cog_height_m: f64,
+}
+
+/// A wheel.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Wheel {
+    /// Mass [kg].
+    pub mass_kg: f64,
+    /// Moment of inertia about the axle [kg m2].
+    pub spin_inertia_kgm2: f64,
+    /// Width of the tread [m].
+    pub width_m: f64,
+}
+
+/// Suspension of one axle.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Axle {
+    /// Spring and damper of each wheel.
+    pub suspension: Suspension,
+    /// Extra roll stiffness of the anti-roll bar [N m/rad].
+    pub anti_roll_nm_per_rad: f64,
+}
+
+/// Spring and damper of one wheel.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Suspension {
+    /// Spring rate at the wheel [N/m].
+    pub stiffness_n_per_m: f64,
+    /// Damping at the wheel [N s/m].
+    pub damping_ns_per_m: f64,
+    /// Travel up and down from the static position [m].
+    pub travel_m: f64,
+}
+
+/// Motor, transmission and brakes.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Drivetrain {
+    /// Largest total drive torque at the wheels [N m].
+    pub drive_torque_max_nm: f64,
+    /// Largest total brake torque at the wheels [N m].
+    pub brake_torque_max_nm: f64,
+    /// Largest drive power [W].
+    pub power_max_w: f64,
+    /// Share of the drive torque on the rear axle; 1 = rear drive, 0.5 = four-wheel drive.
+    pub rear_share: f64,
+    /// First-order response time of the torque [s].
+    pub response_s: f64,
+}
+
+/// Steering servo.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Servo {
+    /// First-order response time [s].
+    pub response_s: f64,
+    /// Transport delay of commands [s].
+    pub delay_s: f64,
+}
+
+/// Tyre properties that do not depend on the ground.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Tyre {
+    /// Rolling resistance over load on hard ground [-].
+    pub rolling_resistance: f64,
+    /// Relaxation length of the lateral force [m].
+    pub relaxation_length_m: f64,
+    /// Relative loss of friction for a load twice the static one [-].
+    pub load_sensitivity: f64,
+    /// Radial stiffness [N/m].
+    pub radial_stiffness_n_per_m: f64,
+}
+
+/// A vehicle description that cannot be.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("{field}: expected {expected}, found {found}")]
+pub struct VehicleError {
+    /// Dotted path of the field, e.g. `geometry.wheelbase_m`.
+    pub field: &'static str,
+    /// The range that would do.
+    pub expected: &'static str,
+    /// The value that was given.
+    pub found: f64,
+}
+
+impl Vehicle {
+    /// Refuses values that no vehicle can have.
+    pub fn validate(&self) -> Result<(), VehicleError> {
+        let positive = [
+            ("geometry.wheelbase_m", self.geometry.wheelbase_m),
+            ("geometry.track_m", self.geometry.track_m),
+            ("geometry.length_m", self.geometry.length_m),
+            ("geometry.width_m", self.geometry.width_m),
+            ("geometry.wheel_radius_m", self.geometry.wheel_radius_m),
+            ("limits.speed_max_mps", self.limits.speed_max_mps),
+            ("limits.steering_max_rad", self.limits.steering_max_rad),
+            ("limits.steering_rate_max_radps", self.limits.steering_rate_max_radps),
+            ("limits.acceleration_max_mps2", self.limits.acceleration_max_mps2),
+            ("limits.lateral_acceleration_max_mps2", self.limits.lateral_acceleration_max_mps2),
+            ("limits.roll_max_rad", self.limits.roll_max_rad),
+            ("limits.pitch_max_rad", self.limits.pitch_max_rad),
+            ("body.mass_kg", self.body.mass_kg),
+            ("body.inertia_kgm2[0]", self.body.inertia_kgm2[0]),
+            ("body.inertia_kgm2[1]", self.body.inertia_kgm2[1]),
+            ("body.inertia_kgm2[2]", self.body.inertia_kgm2[2]),
+            ("body.cog_height_m", self.body.cog_height_m),
+            ("wheel.mass_kg", self.wheel.mass_kg),
+            ("wheel.spin_inertia_kgm2", self.wheel.spin_inertia_kgm2),
+            ("wheel.width_m", self.wheel.width_m),
+            ("front.suspension.stiffness_n_per_m", self.front.suspension.stiffness_n_per_m),
+            ("rear.suspension.stiffness_n_per_m", self.rear.suspension.stiffness_n_per_m),
+            ("front.suspension.travel_m", self.front.suspension.travel_m),
+            ("rear.suspension.travel_m", self.rear.suspension.travel_m),
+            ("drivetrain.drive_torque_max_nm", self.drivetrain.drive_torque_max_nm),
+            ("drivetrain.brake_torque_max_nm", self.drivetrain.brake_torque_max_nm),
+            ("drivetrain.power_max_w", self.drivetrain.power_max_w),
+            ("tyre.relaxation_length_m", self.tyre.relaxation_length_m),
+            ("tyre.radial_stiffness_n_per_m", self.tyre.radial_stiffness_n_per_m),
+        ];
+        let not_negative = [
+            ("geometry.rear_overhang_m", self.geometry.rear_overhang_m),
+            ("geometry.ground_clearance_m", self.geometry.ground_clearance_m),
+            ("limits.reverse_speed_max_mps", self.limits.reverse_speed_max_mps),
+            ("body.cog_ahead_m", self.body.cog_ahead_m),
+            ("front.suspension.damping_ns_per_m", self.front.suspension.damping_ns_per_m),
+            ("rear.suspension.damping_ns_per_m", self.rear.suspension.damping_ns_per_m),
+            ("front.anti_roll_nm_per_rad", self.front.anti_roll_nm_per_rad),
+            ("rear.anti_roll_nm_per_rad", self.rear.anti_roll_nm_per_rad),
+            ("drivetrain.response_s", self.drivetrain.response_s),
+            ("servo.response_s", self.servo.response_s),
+            ("servo.delay_s", self.servo.delay_s),
+            ("tyre.rolling_resistance", self.tyre.rolling_resistance),
+        ];
+        check(&positive, "a finite number > 0", |v| v > 0.0)?;
+        check(&not_negative, "a finite number >= 0", |v| v >= 0.0)?;
+        let shares = [
+            ("drivetrain.rear_share", self.drivetrain.rear_share),
+            ("tyre.load_sensitivity", self.tyre.load_sensitivity),
+        ];
+        check(&shares, "a number from 0 to 1", |v| (0.0..=1.0).contains(&v))?;
+        let angles = [
+            ("limits.steering_max_rad", self.limits.steering_max_rad),
+            ("limits.roll_max_rad", self.limits.roll_max_rad),
+            ("limits.pitch_max_rad", self.limits.pitch_max_rad),
+        ];
+        check(&angles, "an angle in radians below pi/2", |v| v < std::f64::consts::FRAC_PI_2)
+    }
+}
+
+fn check(
+    fields: &[(&'static str, f64)],
+    expected: &'static str,
+    allowed: impl Fn(f64) -> bool,
+) -> Result<(), VehicleError> {
+    match fields.iter().find(|(_, value)| !(value.is_finite() && allowed(*value))) {
+        Some(&(field, found)) => Err(VehicleError { field, expected, found }),
+        None => Ok(()),
+    }
+}

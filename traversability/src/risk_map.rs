@@ -1,0 +1,172 @@
+//! The risk map: worst expected traversability for every cell and yaw, and the ground under it.
+
+use terrain::{Cell, GridGeometry, TerrainClass};
+
+/// Worst expected traversability of one pose: left-tail CVaR of traction, right-tail CVaR of attitude
+/// (PIETRA, equation 6). Laid out as four adjacent f32, so that one lookup is one 16-byte load.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(C)]
+pub struct Risk {
+    /// Achieved over commanded speed, in [0, 1].
+    pub linear_traction: f32,
+    /// Achieved over commanded yaw rate, in [0, 1].
+    pub angular_traction: f32,
+    /// |roll| [rad].
+    pub roll_rad: f32,
+    /// |pitch| [rad].
+    pub pitch_rad: f32,
+}
+
+impl Risk {
+    /// Level ground with full traction.
+    pub const NONE: Self =
+        Self { linear_traction: 1.0, angular_traction: 1.0, roll_rad: 0.0, pitch_rad: 0.0 };
+    /// Beyond the map: nothing moves here, so a rollout that leaves is trapped without a branch.
+    pub const OUTSIDE: Self =
+        Self { linear_traction: 0.0, angular_traction: 0.0, roll_rad: 0.0, pitch_rad: 0.0 };
+    /// A pose whose footprint touches an obstacle: an attitude beyond every limit, so that the attitude
+    /// constraint forbids it; traction stays, so that a vehicle that finds itself here can leave.
+    pub fn blocked(self) -> Self {
+        let beyond_rad = std::f32::consts::PI;
+        Self { roll_rad: beyond_rad, pitch_rad: beyond_rad, ..self }
+    }
+}
+
+/// Bits that say what a cell is.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[repr(transparent)]
+pub struct GroundFlags(pub u8);
+
+impl GroundFlags {
+    /// Must not be touched.
+    pub const OBSTACLE: Self = Self(1);
+    /// Never measured, neither interpolated.
+    pub const UNKNOWN: Self = Self(2);
+    /// Unlike anything the learned model has seen.
+    pub const OUT_OF_DISTRIBUTION: Self = Self(4);
+
+    /// Whether all bits of `other` are set.
+    pub fn contains(self, other: Self) -> bool {
+        self.0 & other.0 == other.0
+    }
+
+    /// With the bits of `other` set too.
+    pub fn with(self, other: Self) -> Self {
+        Self(self.0 | other.0)
+    }
+}
+
+/// The ground of one cell, whatever the yaw.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(C)]
+pub struct Ground {
+    /// Height change per metre east and north, signed [-].
+    pub gradient: [f32; 2],
+    /// What covers it, as the number of a [`TerrainClass`].
+    pub class: u8,
+    /// Obstacle, unknown, out of distribution.
+    pub flags: GroundFlags,
+}
+
+impl Default for Ground {
+    fn default() -> Self {
+        Self { gradient: [0.0; 2], class: TerrainClass::Open as u8, flags: GroundFlags::default() }
+    }
+}
+
+/// A risk map that owns its arrays. The pose that a cell and a yaw bin stand for is that of the body frame:
+/// the rear axle's centre in the cell's centre, the yaw in the bin's centre.
+///
+/// The outermost ring of cells is [`Risk::OUTSIDE`] by construction.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RiskMap {
+    geometry: GridGeometry,
+    n_yaws: usize,
+    risks: Vec<Risk>,
+    ground: Vec<Ground>,
+}
+
+/// A borrowed risk map: what the controller reads, wherever the arrays lie.
+#[derive(Clone, Copy, Debug)]
+pub struct RiskMapView<'a> {
+    /// Where the cells lie; row-major, row 0 = south.
+    pub geometry: GridGeometry,
+    /// Number of yaw bins; bin k is centred at (k + 1/2) 2 pi / n_yaws.
+    pub n_yaws: usize,
+    /// Shape [row, col, yaw].
+    pub risks: &'a [Risk],
+    /// Shape [row, col].
+    pub ground: &'a [Ground],
+}
+
+impl RiskMap {
+    /// A map of the same risk everywhere inside its border, on flat open ground.
+    pub fn constant(geometry: GridGeometry, n_yaws: usize, risk: Risk) -> Self {
+        let mut map = Self {
+            geometry,
+            n_yaws,
+            risks: vec![risk; geometry.n_cells() * n_yaws],
+            ground: vec![Ground::default(); geometry.n_cells()],
+        };
+        map.close_border();
+        map
+    }
+
+    /// Sets the outermost ring to [`Risk::OUTSIDE`]; to be called after the map was filled.
+    pub fn close_border(&mut self) {
+        let (n_rows, n_cols, n_yaws) = (self.geometry.n_rows, self.geometry.n_cols, self.n_yaws);
+        for row in 0..n_rows {
+            let whole_row = row == 0 || row + 1 == n_rows;
+            for col in 0..n_cols {
+                if whole_row || col == 0 || col + 1 == n_cols {
+                    let start = (row * n_cols + col) * n_yaws;
+                    self.risks[start..start + n_yaws].fill(Risk::OUTSIDE);
+                }
+            }
+        }
+    }
+
+    /// Where the cells lie.
+    pub fn geometry(&self) -> &GridGeometry {
+        &self.geometry
+    }
+
+    /// Risks [row, col, yaw] and ground [row, col], to be filled in place.
+    pub fn arrays_mut(&mut self) -> (&mut [Risk], &mut [Ground]) {
+        (&mut self.risks, &mut self.ground)
+    }
+
+    /// Moves the window without touching the values; the caller refills them.
+    pub fn place_at(&mut self, origin: [i64; 2]) {
+        self.geometry.origin = origin;
+    }
+
+    /// The map as the controller reads it.
+    pub fn view(&self) -> RiskMapView<'_> {
+        RiskMapView { geometry: self.geometry, n_yaws: self.n_yaws, risks: &self.risks, ground: &self.ground }
+    }
+}
+
+impl RiskMapView<'_> {
+    /// The yaw bin that holds an angle.
+    pub fn yaw_bin(&self, yaw_rad: f64) -> usize {
+        let turns = (yaw_rad / std::f64::consts::TAU).rem_euclid(1.0);
+        ((turns * self.n_yaws as f64) as usize).min(self.n_yaws - 1)
+    }
+
+    /// The centre of a yaw bin [rad].
+    pub fn yaw_rad(&self, bin: usize) -> f64 {
+        (bin as f64 + 0.5) * std::f64::consts::TAU / self.n_yaws as f64
+    }
+
+    /// Risk of one cell and yaw bin.
+    pub fn risk(&self, cell: Cell, yaw_bin: usize) -> Risk {
+        self.risks[self.geometry.index(cell) * self.n_yaws + yaw_bin]
+    }
+
+    /// Risk of a pose; [`Risk::OUTSIDE`] beyond the map.
+    pub fn risk_at(&self, x_m: f64, y_m: f64, yaw_rad: f64) -> Risk {
+        let risk = |cell| self.risk(cell, self.yaw_bin(yaw_rad));
+        self.geometry.cell_at(x_m, y_m).map_or(Risk::OUTSIDE, risk)
+    }
+}
