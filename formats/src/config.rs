@@ -1,0 +1,261 @@
+//! Configuration in TOML: what is refused is named by file, line and field, with what was expected and what was found.
+
+use std::fmt::Display;
+use std::ops::Range;
+use std::path::Path;
+
+use serde::de::DeserializeOwned;
+use toml::de::{DeTable, DeValue};
+
+/// A configuration file that cannot be used. Every message is one line.
+#[derive(Debug, thiserror::Error)]
+pub enum ConfigError {
+    /// The file could not be read.
+    #[error("{file}: expected a readable text file, found: {source}")]
+    Unreadable {
+        /// Path as given.
+        file: String,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// The text is no TOML.
+    #[error("{file}:{line}: expected TOML, found: {problem}")]
+    Syntax {
+        /// Path as given.
+        file: String,
+        /// Line, from 1.
+        line: usize,
+        /// What the parser said.
+        problem: String,
+    },
+    /// A key or its value is wrong.
+    #[error("{file}:{line}: {field}: expected {expected}, found {found}")]
+    Field {
+        /// Path as given.
+        file: String,
+        /// Line, from 1.
+        line: usize,
+        /// Dotted path of the key.
+        field: String,
+        /// What would do.
+        expected: String,
+        /// What stands there.
+        found: String,
+    },
+}
+
+/// The text of a configuration file with its name, so that refusals can point into it.
+#[derive(Clone, Debug)]
+pub struct ConfigText {
+    file: String,
+    text: String,
+}
+
+impl ConfigText {
+    /// Reads a file. Errors: [`ConfigError::Unreadable`].
+    pub fn read(path: &Path) -> Result<Self, ConfigError> {
+        let file = path.display().to_string();
+        match std::fs::read_to_string(path) {
+            Ok(text) => Ok(Self { file, text }),
+            Err(source) => Err(ConfigError::Unreadable { file, source }),
+        }
+    }
+
+    /// Wraps a text that came from elsewhere; `file` is the name used in messages.
+    pub fn new(file: impl Into<String>, text: impl Into<String>) -> Self {
+        Self { file: file.into(), text: text.into() }
+    }
+
+    /// The values of the file. `T` should deny unknown fields. Errors: [`ConfigError::Syntax`] and
+    /// [`ConfigError::Field`] for an unknown or missing key or a value of the wrong type.
+    pub fn parse<T: DeserializeOwned>(&self) -> Result<T, ConfigError> {
+        let document = DeTable::parse(&self.text).map_err(|error| ConfigError::Syntax {
+            file: self.file.clone(),
+            line: self.line(&error.span().unwrap_or_default()),
+            problem: one_line(error.message()),
+        })?;
+        toml::from_str(&self.text).map_err(|error| {
+            let span = error.span().unwrap_or_default();
+            let refusal = Refusal::from_message(error.message());
+            let mut path = path_of(document.get_ref(), &span);
+            if let Some(key) = &refusal.key
+                && path.last() != Some(key)
+            {
+                path.push(key.clone());
+            }
+            self.field_error(&span, path.join("."), refusal.expected, refusal.found)
+        })
+    }
+
+    /// The error for a value that parsed but cannot be, at the line of `field` (a dotted path).
+    pub fn refuse(&self, field: &str, expected: impl Display, found: impl Display) -> ConfigError {
+        let document = DeTable::parse(&self.text).ok();
+        let span = document.map(|d| span_of(d.get_ref(), field)).unwrap_or_default();
+        self.field_error(&span, field.to_owned(), expected.to_string(), found.to_string())
+    }
+
+    fn field_error(
+        &self,
+        span: &Range<usize>,
+        field: String,
+        expected: String,
+        found: String,
+    ) -> ConfigError {
+        ConfigError::Field { file: self.file.clone(), line: self.line(span), field, expected, found }
+    }
+
+    fn line(&self, span: &Range<usize>) -> usize {
+        let before = &self.text.as_bytes()[..span.start.min(self.text.len())];
+        1 + before.iter().filter(|byte| **byte == b'\n').count()
+    }
+}
+
+/// What serde's message says, taken apart.
+struct Refusal {
+    /// The key, when the message names it.
+    key: Option<String>,
+    expected: String,
+    found: String,
+}
+
+impl Refusal {
+    fn from_message(message: &str) -> Self {
+        let quoted = |text: &str| text.split('`').nth(1).map(str::to_owned);
+        let expected = message.split_once(", expected ").map(|(_, expected)| expected.replace('`', ""));
+        if message.starts_with("unknown field") {
+            let expected = expected.unwrap_or_else(|| "no key".into());
+            return Self { key: quoted(message), expected, found: "an unknown key".into() };
+        }
+        if message.starts_with("missing field") {
+            return Self { key: quoted(message), expected: "a value".into(), found: "no such key".into() };
+        }
+        let found = message.split(", expected ").next().unwrap_or(message);
+        let found = found.trim_start_matches("invalid type: ").trim_start_matches("invalid value: ");
+        let expected = expected.unwrap_or_else(|| "a valid value".into());
+        Self { key: None, expected: one_line(&expected), found: one_line(found) }
+    }
+}
+
+/// Path of the deepest key whose key or value covers a place; empty for the document itself.
+fn path_of(table: &DeTable<'_>, place: &Range<usize>) -> Vec<String> {
+    let covers = |span: Range<usize>| !place.is_empty() && span.start <= place.start && place.end <= span.end;
+    let mut best = Vec::new();
+    for (key, value) in table {
+        let mut path = value.get_ref().as_table().map(|inner| path_of(inner, place)).unwrap_or_default();
+        let here = !path.is_empty() || covers(key.span()) || covers(value.span());
+        if here && path.len() + 1 > best.len() {
+            path.insert(0, key.get_ref().to_string());
+            best = path;
+        }
+    }
+    best
+}
+
+/// Where the deepest existing part of a dotted path stands; an index in brackets is left out.
+fn span_of(table: &DeTable<'_>, field: &str) -> Range<usize> {
+    let (first, rest) = field.split_once('.').unwrap_or((field, ""));
+    let name = first.split('[').next().unwrap_or(first);
+    let Some((key, value)) = table.iter().find(|(key, _)| key.get_ref() == name) else {
+        return 0..0;
+    };
+    match value.get_ref() {
+        DeValue::Table(inner) if !rest.is_empty() => {
+            let span = span_of(inner, rest);
+            if span == (0..0) { key.span() } else { span }
+        }
+        _ => key.span(),
+    }
+}
+
+fn one_line(text: &str) -> String {
+    text.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[derive(Debug, serde::Deserialize)]
+    #[serde(deny_unknown_fields)]
+    #[expect(dead_code, reason = "only its parsing is of interest")]
+    struct Outer {
+        name: String,
+        inner: Inner,
+    }
+
+    #[derive(Debug, serde::Deserialize)]
+    #[serde(deny_unknown_fields)]
+    #[expect(dead_code, reason = "only its parsing is of interest")]
+    struct Inner {
+        length_m: f64,
+        mode: Mode,
+    }
+
+    #[derive(Debug, serde::Deserialize)]
+    #[serde(rename_all = "snake_case")]
+    enum Mode {
+        Slow,
+        Fast,
+    }
+
+    fn refusal(text: &str) -> String {
+        ConfigText::new("a.toml", text).parse::<Outer>().unwrap_err().to_string()
+    }
+
+    #[test]
+    fn every_refusal_names_file_line_field_expected_and_found_in_one_line() {
+        let cases = [
+            (
+                "name = \"a\"\n[inner]\nlength_m = \"x\"\nmode = \"slow\"",
+                "a.toml:3: inner.length_m: expected f64, found string \"x\"",
+            ),
+            (
+                "name = \"a\"\n\n[inner]\nlength_m = 1\nmode = \"slow\"\nwidth_m = 2",
+                "a.toml:6: inner.width_m: expected length_m or mode, found an unknown key",
+            ),
+            (
+                "name = \"a\"\n[inner]\nmode = \"slow\"",
+                "a.toml:2: inner.length_m: expected a value, found no such key",
+            ),
+            ("[inner]\nlength_m = 1\nmode = \"slow\"", "a.toml:1: name: expected a value, found no such key"),
+            (
+                "name = \"a\"\n[inner]\nlength_m = 1\nmode = \"walk\"",
+                "a.toml:4: inner.mode: expected slow or fast, found unknown variant `walk`",
+            ),
+            (
+                "name = \"a\"\ninner = { length_m = [1], mode = \"slow\" }",
+                "a.toml:2: inner.length_m: expected f64, found sequence",
+            ),
+            (
+                "name = \"a\"\ninner.length_m = true\ninner.mode = \"slow\"",
+                "a.toml:2: inner.length_m: expected f64, found boolean `true`",
+            ),
+        ];
+        for (text, message) in cases {
+            assert_eq!(refusal(text), message, "{text}");
+        }
+    }
+
+    #[test]
+    fn broken_toml_is_a_syntax_error_with_its_line() {
+        let message = refusal("name = \"a\"\n[inner\nlength_m = 1");
+        assert!(message.starts_with("a.toml:2: expected TOML, found: "), "{message}");
+        assert_eq!(message.lines().count(), 1);
+        assert!(refusal("name = \"a\"\nname = \"b\"").starts_with("a.toml:2: "));
+    }
+
+    #[test]
+    fn a_refused_value_points_to_its_line() {
+        let text = ConfigText::new("a.toml", "name = \"a\"\n[inner]\n# note\nlength_m = -1\nlist = [1, 2]");
+        let message = text.refuse("inner.length_m", "a number > 0", -1.0).to_string();
+        assert_eq!(message, "a.toml:4: inner.length_m: expected a number > 0, found -1");
+        assert!(text.refuse("inner.list[1]", "x", "y").to_string().starts_with("a.toml:5: inner.list[1]:"));
+        assert!(text.refuse("inner.absent", "x", "y").to_string().starts_with("a.toml:2: inner.absent:"));
+    }
+
+    #[test]
+    fn a_missing_file_is_named() {
+        let message = ConfigText::read(Path::new("/nowhere/v.toml")).unwrap_err().to_string();
+        assert!(message.starts_with("/nowhere/v.toml: expected a readable text file, found: "), "{message}");
+    }
+}
