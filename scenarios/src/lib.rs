@@ -2,6 +2,15 @@
 //!
 //! Of `bicycle` this crate uses descriptions and the drive log, never the dynamics: the model never grades itself.
 
+mod arena;
+mod friction;
+mod random;
+mod rock_field;
 mod world;
 
-pub use world::{Patch, Stribeck, World};
+pub use arena::{ARENA_GOAL_M, ARENA_START, ArenaConfig, ArenaError, arena};
+pub use friction::Stribeck;
+pub use rock_field::{
+    MAPS_PER_SPLIT, RockFieldConfig, RockFieldError, RockMap, RockPopulation, Split, rock_field,
+};
+pub use world::{Bounds, Patch, World, WorldError};

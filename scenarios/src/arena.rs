@@ -1,0 +1,115 @@
+//! PIETRA's hall (section VI): 9.6 x 8 m of concrete and turf with a skateboard ramp and rows of bushes.
+//!
+//! South-west corner at the origin, the vehicle drives east. Across the straight way to the goal stand the bushes;
+//! north of them lies the ramp, beyond it crates up to the wall; south of them crates leave a gap at the wall.
+//! So there are three ways: straight through the bushes (7.2 m), over the ramp (about 8.2 m) or around on the
+//! floor (about 10 m).
+
+use terrain::GridGeometry;
+
+use crate::{Patch, Stribeck, World, WorldError};
+
+/// Where the vehicle starts: x [m], y [m], yaw [rad].
+pub const ARENA_START: [f64; 3] = [1.2, 4.0, 0.0];
+/// Where it is to go [m].
+pub const ARENA_GOAL_M: [f64; 2] = [8.4, 4.0];
+
+/// Size of the hall, east and north [m].
+const HALL_M: [f64; 2] = [9.6, 8.0];
+/// Wheels of the RC car are 15 cm across: 2 cm resolve the ramp's lip and sides.
+const RESOLUTION_M: f64 = 0.02;
+const TURF_PILE_M: f32 = 0.01;
+const CRATE_HEIGHT_M: f32 = 0.6;
+
+/// Rectangles [west, south, east, north] in metres.
+const TURF: [f64; 4] = [3.6, 2.6, 6.2, 5.0];
+const BUSH_ROWS: [[f64; 4]; 3] = [[4.3, 2.6, 4.6, 5.0], [4.7, 2.6, 5.0, 5.0], [5.1, 2.6, 5.4, 5.0]];
+const CRATES: [[f64; 4]; 2] = [[4.6, 6.25, 5.1, 8.0], [4.6, 1.15, 5.1, 2.6]];
+const RAMP: [f64; 4] = [3.55, 5.05, 6.15, 6.2];
+
+/// What can be set of the hall.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ArenaConfig {
+    /// Height of the bushes [m].
+    pub bush_height_m: f64,
+    /// Height of the ramp's flat top [m].
+    pub ramp_height_m: f64,
+    /// Length of the ramp's slopes, up and down alike [m].
+    pub ramp_slope_length_m: f64,
+}
+
+impl Default for ArenaConfig {
+    fn default() -> Self {
+        Self { bush_height_m: 0.05, ramp_height_m: 0.26, ramp_slope_length_m: 0.95 }
+    }
+}
+
+/// Why the hall cannot be built.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum ArenaError {
+    /// A setting is out of range.
+    #[error("arena {field}: expected {expected}, found {found}")]
+    Setting {
+        /// Name of the setting.
+        field: &'static str,
+        /// The range that would do.
+        expected: &'static str,
+        /// The value that was given.
+        found: f64,
+    },
+    /// The cells make no world.
+    #[error(transparent)]
+    World(#[from] WorldError),
+}
+
+impl ArenaConfig {
+    /// Refuses settings that do not fit the hall.
+    pub fn validate(&self) -> Result<(), ArenaError> {
+        let settings = [
+            ("bush_height_m", self.bush_height_m, 0.0..=2.0, "from 0 to 2 m"),
+            ("ramp_height_m", self.ramp_height_m, 0.0..=1.0, "from 0 to 1 m"),
+            ("ramp_slope_length_m", self.ramp_slope_length_m, 0.1..=1.3, "from 0.1 to 1.3 m"),
+        ];
+        match settings.into_iter().find(|(_, found, allowed, _)| !allowed.contains(found)) {
+            Some((field, found, _, expected)) => Err(ArenaError::Setting { field, expected, found }),
+            None => Ok(()),
+        }
+    }
+
+    fn height_m(&self, x_m: f64, y_m: f64) -> f64 {
+        if !within(&RAMP, x_m, y_m) {
+            return 0.0;
+        }
+        let from_end_m = (x_m - RAMP[0]).min(RAMP[2] - x_m);
+        self.ramp_height_m * (from_end_m / self.ramp_slope_length_m).min(1.0)
+    }
+
+    fn patch(&self, x_m: f64, y_m: f64) -> Patch {
+        let floor = Patch::open(Stribeck::ASPHALT);
+        if CRATES.iter().any(|crate_| within(crate_, x_m, y_m)) {
+            return floor.obstructed(CRATE_HEIGHT_M);
+        }
+        if self.bush_height_m > 0.0 && BUSH_ROWS.iter().any(|row| within(row, x_m, y_m)) {
+            return Patch::open(Stribeck::GRASS).overgrown(self.bush_height_m as f32);
+        }
+        if within(&TURF, x_m, y_m) {
+            let turf = Patch { rolling_resistance: 0.02, ..Patch::open(Stribeck::GRASS) };
+            return turf.overgrown(TURF_PILE_M);
+        }
+        floor
+    }
+}
+
+fn within([west, south, east, north]: &[f64; 4], x_m: f64, y_m: f64) -> bool {
+    (west..east).contains(&&x_m) && (south..north).contains(&&y_m)
+}
+
+/// Builds the hall.
+pub fn arena(config: &ArenaConfig) -> Result<World, ArenaError> {
+    config.validate()?;
+    let [n_cols, n_rows] = HALL_M.map(|side_m| (side_m / RESOLUTION_M).round() as usize);
+    let geometry = GridGeometry { resolution_m: RESOLUTION_M, origin: [0, 0], n_rows, n_cols };
+    let name = format!("arena with bushes of {} m", config.bush_height_m);
+    Ok(World::from_fn(name, geometry, |x, y| config.height_m(x, y), |x, y| config.patch(x, y))?)
+}
