@@ -30,6 +30,11 @@ impl Risk {
         let beyond_rad = std::f32::consts::PI;
         Self { roll_rad: beyond_rad, pitch_rad: beyond_rad, ..self }
     }
+
+    /// Whether this is the risk of a pose that touches an obstacle.
+    pub fn is_blocked(self) -> bool {
+        self.roll_rad >= std::f32::consts::PI
+    }
 }
 
 /// Bits that say what a cell is.
@@ -168,5 +173,119 @@ impl RiskMapView<'_> {
     pub fn risk_at(&self, x_m: f64, y_m: f64, yaw_rad: f64) -> Risk {
         let risk = |cell| self.risk(cell, self.yaw_bin(yaw_rad));
         self.geometry.cell_at(x_m, y_m).map_or(Risk::OUTSIDE, risk)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::{PI, TAU};
+
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn geometry() -> GridGeometry {
+        GridGeometry { resolution_m: 0.5, origin: [-4, 2], n_rows: 5, n_cols: 8 }
+    }
+
+    /// A risk that names its place.
+    fn marked(row: usize, col: usize, yaw: usize) -> Risk {
+        Risk {
+            linear_traction: row as f32,
+            angular_traction: col as f32,
+            roll_rad: yaw as f32,
+            pitch_rad: 0.5,
+        }
+    }
+
+    fn marked_map(n_yaws: usize) -> RiskMap {
+        let mut map = RiskMap::constant(geometry(), n_yaws, Risk::NONE);
+        let (risks, _) = map.arrays_mut();
+        for (i, risk) in risks.iter_mut().enumerate() {
+            let cell = geometry().cell(i / n_yaws);
+            *risk = marked(cell.row, cell.col, i % n_yaws);
+        }
+        map.close_border();
+        map
+    }
+
+    #[test]
+    fn one_risk_is_one_sixteen_byte_load() {
+        assert_eq!(size_of::<Risk>(), 16);
+        assert_eq!(std::mem::offset_of!(Risk, pitch_rad), 12);
+    }
+
+    #[test]
+    fn the_border_traps_and_nothing_else_does() {
+        let map = marked_map(3);
+        for row in 0..5 {
+            for col in 0..8 {
+                for yaw in 0..3 {
+                    let border = row == 0 || row == 4 || col == 0 || col == 7;
+                    let expected = if border { Risk::OUTSIDE } else { marked(row, col, yaw) };
+                    assert_eq!(map.view().risk(Cell { row, col }, yaw), expected);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn maps_too_small_for_an_inside_are_all_border() {
+        for (n_rows, n_cols) in [(1, 1), (2, 9), (9, 2)] {
+            let geometry = GridGeometry { n_rows, n_cols, ..geometry() };
+            let map = RiskMap::constant(geometry, 4, Risk::NONE);
+            assert!(map.view().risks.iter().all(|&risk| risk == Risk::OUTSIDE));
+        }
+    }
+
+    #[test]
+    fn a_pose_finds_the_cell_and_the_yaw_that_hold_it() {
+        let map = marked_map(4);
+        // Column 3 spans x in [-0.5, 0), row 2 spans y in [2, 2.5); yaw bin 1 of 4 spans [pi/2, pi).
+        assert_eq!(map.view().risk_at(-0.25, 2.25, 0.75 * PI), marked(2, 3, 1));
+        assert_eq!(map.view().risk_at(-0.5, 2.0, PI / 2.0 + 1e-9), marked(2, 3, 1));
+        for (x_m, y_m) in [(-2.1, 2.25), (2.1, 2.25), (0.0, 0.9), (0.0, 3.6), (f64::NAN, 2.0)] {
+            assert_eq!(map.view().risk_at(x_m, y_m, 0.0), Risk::OUTSIDE);
+        }
+    }
+
+    #[test]
+    fn moving_the_window_moves_the_values() {
+        let mut map = marked_map(4);
+        map.place_at([96, 2]);
+        // 100 cells of 0.5 m east.
+        assert_eq!(map.view().risk_at(49.75, 2.25, 0.75 * PI), marked(2, 3, 1));
+        assert_eq!(map.view().risk_at(-0.25, 2.25, 0.75 * PI), Risk::OUTSIDE);
+    }
+
+    #[test]
+    fn blocked_forbids_the_attitude_and_keeps_the_traction() {
+        let risk = Risk { linear_traction: 0.7, ..Risk::NONE };
+        assert!(!risk.is_blocked() && !Risk::OUTSIDE.is_blocked());
+        assert!(risk.blocked().is_blocked());
+        assert_eq!(risk.blocked().linear_traction, 0.7);
+        assert!(risk.blocked().pitch_rad > std::f32::consts::FRAC_PI_2);
+    }
+
+    #[test]
+    fn flags_add_up() {
+        let both = GroundFlags::OBSTACLE.with(GroundFlags::UNKNOWN);
+        assert!(both.contains(GroundFlags::OBSTACLE) && both.contains(GroundFlags::UNKNOWN));
+        assert!(!both.contains(GroundFlags::OUT_OF_DISTRIBUTION));
+        assert!(!GroundFlags::OBSTACLE.contains(both));
+        assert!(both.contains(GroundFlags::default()));
+    }
+
+    proptest! {
+        #[test]
+        fn a_yaw_lies_within_half_a_bin_of_its_centre(yaw_rad in -20.0..20.0f64, n_yaws in 1..32usize) {
+            let map = RiskMap::constant(geometry(), n_yaws, Risk::NONE);
+            let view = map.view();
+            let bin = view.yaw_bin(yaw_rad);
+            prop_assert!(bin < n_yaws);
+            let off_rad = (yaw_rad - view.yaw_rad(bin) + PI).rem_euclid(TAU) - PI;
+            prop_assert!(off_rad.abs() <= PI / n_yaws as f64 + 1e-9);
+            prop_assert_eq!(view.yaw_bin(view.yaw_rad(bin)), bin);
+        }
     }
 }
