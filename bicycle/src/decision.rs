@@ -24,7 +24,7 @@ pub enum HoldReason {
 }
 
 /// Why the vehicle must stop.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum StopReason {
     /// Odometry is older than its age limit or does not change while the wheels turn.

@@ -1,1 +1,59 @@
-//! See Cargo.toml.
+//! The one binary, `surefoot`: arguments, progress, pictures and reports around the crates that do the work.
+//!
+//! [`run`] reads the arguments, calls the command's handler and turns its result into an exit code: 0 success,
+//! 1 the work failed, 2 bad usage or input. Errors are printed here and nowhere else, one line each.
+
+pub mod arguments;
+mod bench;
+mod drive;
+mod failure;
+pub mod interrupt;
+pub mod output;
+pub mod picture;
+pub mod progress;
+pub mod summary;
+
+use std::io::Write;
+use std::process::ExitCode;
+
+use clap::Parser;
+use clap::error::ErrorKind;
+
+use arguments::{Arguments, BenchCommand, Command};
+pub use failure::{UsageError, WorkFailed};
+
+/// Runs the command line of this process.
+pub fn run() -> ExitCode {
+    let result = match Arguments::try_parse() {
+        Ok(arguments) => dispatch(arguments.command),
+        Err(error) => answer(&error),
+    };
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            report(&format!("surefoot: {}", failure::one_line(&error)));
+            failure::exit_code(&error)
+        }
+    }
+}
+
+fn dispatch(command: Command) -> anyhow::Result<()> {
+    match command {
+        Command::Drive(drive) => drive::run(&drive),
+        Command::Bench { command: BenchCommand::Control(control) } => bench::control(&control),
+        Command::Bench { command: BenchCommand::PriorMap(prior_map) } => bench::prior_map(&prior_map),
+    }
+}
+
+/// Help and version are answers, not errors; everything else that stops the parser is bad usage.
+fn answer(error: &clap::Error) -> anyhow::Result<()> {
+    match error.kind() {
+        ErrorKind::DisplayHelp | ErrorKind::DisplayVersion => Ok(error.print()?),
+        _ => Err(UsageError::from_parser(error).into()),
+    }
+}
+
+/// A closed standard error must not turn a failure into a panic: the exit code still tells.
+fn report(line: &str) {
+    drop(writeln!(std::io::stderr(), "{line}"));
+}

@@ -1,0 +1,73 @@
+//! The command line: what can be asked, in which units, and what each word must look like.
+
+mod bench;
+mod drive;
+mod values;
+
+use clap::{Parser, Subcommand};
+
+pub use bench::{BenchCommand, BenchControlArguments, BenchPriorMapArguments, BenchWork};
+pub use drive::{DriveArguments, InstructionSet, MapSource, Method, Pace};
+pub use values::{Goal, StartPose, VehicleSource, WorldSource};
+
+/// Everything after `surefoot`.
+#[derive(Debug, Parser)]
+#[command(
+    name = "surefoot",
+    version = concat!(env!("CARGO_PKG_VERSION"), " (revision ", env!("SUREFOOT_REVISION"), ")"),
+    about = "Drives a ground vehicle where there is no road",
+    long_about = LONG_ABOUT,
+    after_long_help = AFTER_HELP,
+    arg_required_else_help = false,
+    subcommand_required = true
+)]
+pub struct Arguments {
+    /// What to do.
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+/// The commands.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Drive a simulated vehicle over rough ground to a goal
+    Drive(Box<DriveArguments>),
+    /// Measure how fast the controller and the risk map are
+    Bench {
+        /// What to measure.
+        #[command(subcommand)]
+        command: BenchCommand,
+    },
+}
+
+const LONG_ABOUT: &str = "\
+Drives a ground vehicle where there is no road.
+
+Surefoot maps the ground from range scans, asks physics how well the vehicle would move and how far it would tilt \
+on every cell and heading, keeps the worst outcome that is likely enough to matter (CVaR), and steers by sampling \
+a thousand futures ten times a second.";
+
+const AFTER_HELP: &str = "\
+Examples:
+  surefoot drive                        40 m over a generated rock field, nothing else needed
+  surefoot drive --world arena          an RC car in a hall with a ramp and bushes
+  surefoot drive --help                 every option, with its unit and default
+  surefoot bench control --threads 2    milliseconds of one control update
+
+Units are SI: metres, seconds, radians. x points east, y north; yaw is counter-clockwise from east.
+
+Exit codes:
+  0  success
+  1  the work failed; one line on standard error says why
+  2  bad usage or input; one line says what was expected and what was found";
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    #[test]
+    fn command_definition_is_consistent() {
+        Arguments::command().debug_assert();
+    }
+}

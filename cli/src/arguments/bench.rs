@@ -1,0 +1,100 @@
+//! `surefoot bench control` and `surefoot bench prior-map`.
+
+use std::path::PathBuf;
+
+use clap::{Args, Subcommand, ValueEnum};
+
+use super::values;
+
+/// What can be measured.
+#[derive(Clone, Debug, Subcommand)]
+pub enum BenchCommand {
+    /// One update of the shipped controller
+    Control(BenchControlArguments),
+    /// The risk map of the physics prior, whole and after a part of the ground has changed
+    PriorMap(BenchPriorMapArguments),
+}
+
+/// How to measure the controller.
+#[derive(Args, Clone, Debug)]
+#[command(
+    long_about = "Measures one update of the controller that `surefoot drive` uses: 1024 rollouts of 50 steps over a \
+                  risk map of 81 x 96 cells and 13 yaws, with fresh noise every update.",
+    after_long_help = CONTROL_AFTER_HELP
+)]
+pub struct BenchControlArguments {
+    /// Threads of the controller, 1 to 256 [default: the machine's]
+    #[arg(long, value_name = "N", value_parser = values::thread_count, allow_hyphen_values = true)]
+    pub threads: Option<usize>,
+
+    /// Updates to measure, after a warm-up
+    #[arg(long, value_name = "N", value_parser = values::update_count, default_value = "2000",
+          allow_hyphen_values = true)]
+    pub updates: usize,
+
+    /// How much the controller has to do
+    #[arg(long = "config", value_enum, default_value_t = BenchWork::Bound)]
+    pub work: BenchWork,
+
+    /// Instruction set of the controller; auto takes the best the machine has
+    #[arg(long, value_enum, default_value_t = super::InstructionSet::Auto)]
+    pub isa: super::InstructionSet,
+
+    /// Write the result to this file too
+    #[arg(long, value_name = "FILE")]
+    pub json: Option<PathBuf>,
+}
+
+impl BenchControlArguments {
+    /// Threads of the controller: as asked, else as many as the machine runs at once.
+    pub fn n_threads(&self) -> usize {
+        self.threads.unwrap_or_else(values::machine_threads)
+    }
+}
+
+/// How much the controller has to do.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum BenchWork {
+    /// The work of the hand-written bound: time to goal with latch, attitude limits, white noise on the controls
+    Bound,
+    /// The bound's work with two effects in the model
+    Effects,
+    /// The default configuration of `surefoot drive`, everything on
+    Drive,
+}
+
+/// How to measure the risk map.
+#[derive(Args, Clone, Debug)]
+#[command(
+    long_about = "Measures the risk map of the physics prior over 81 x 96 cells and 13 yaws: built whole, and brought \
+                  up to date after one contiguous block of 2 % of the cells has changed."
+)]
+pub struct BenchPriorMapArguments {
+    /// Threads, 1 to 256 [default: the machine's]
+    #[arg(long, value_name = "N", value_parser = values::thread_count, allow_hyphen_values = true)]
+    pub threads: Option<usize>,
+
+    /// Maps to build
+    #[arg(long, value_name = "N", value_parser = values::update_count, default_value = "50",
+          allow_hyphen_values = true)]
+    pub updates: usize,
+
+    /// Write the result to this file too
+    #[arg(long, value_name = "FILE")]
+    pub json: Option<PathBuf>,
+}
+
+impl BenchPriorMapArguments {
+    /// Threads: as asked, else as many as the machine runs at once.
+    pub fn n_threads(&self) -> usize {
+        self.threads.unwrap_or_else(values::machine_threads)
+    }
+}
+
+const CONTROL_AFTER_HELP: &str = "\
+Prints, and with --json writes:
+  {\"threads\", \"updates\", \"ms\": {\"min\", \"median\", \"p99\"}, \"split_ms\": {\"noise\", \"rollout\", \"update\"}}
+
+Examples:
+  surefoot bench control --threads 1
+  surefoot bench control --threads 2 --updates 10000 --config drive --json control.json";

@@ -1,0 +1,269 @@
+//! `surefoot drive`.
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+use serde::{Deserialize, Serialize};
+
+use super::values::{self, Goal, StartPose, VehicleSource, WorldSource};
+use crate::UsageError;
+
+/// Height of the arena's bushes unless told otherwise [m].
+const ARENA_BUSH_HEIGHT_M: f64 = 0.2;
+
+/// What to drive, where, and what to believe.
+#[derive(Args, Clone, Debug)]
+#[command(long_about = LONG_ABOUT, after_long_help = AFTER_HELP)]
+pub struct DriveArguments {
+    /// Ground to drive on: rocks, arena, or an elevation file (.npz, GeoTIFF, 16-bit PNG)
+    ///
+    /// `rocks` is a generated field of 50 x 50 m, another one for every seed. `arena` is a hall of 9.6 x 8 m with a
+    /// ramp and bushes. A file holds heights in metres; see "Elevation files" below.
+    #[arg(long, value_name = "rocks|arena|FILE", default_value = "rocks", help_heading = "World")]
+    pub world: WorldSource,
+
+    /// Height of the arena's bushes [m]; only with --world arena [default: 0.2]
+    #[arg(long, value_name = "METRES", value_parser = values::height_m, allow_hyphen_values = true,
+          help_heading = "World")]
+    pub bush_height: Option<f64>,
+
+    /// Where the vehicle starts: x [m], y [m], yaw [rad]; left out: a feasible place by the seed
+    ///
+    /// The place of the rear axle's centre, x east, y north, yaw counter-clockwise from east in radians
+    /// (1.5708 faces north).
+    #[arg(long, value_name = "X,Y,YAW", allow_hyphen_values = true, help_heading = "World")]
+    pub start: Option<StartPose>,
+
+    /// Where to go: x [m], y [m]; left out: a feasible place by the seed
+    #[arg(long, value_name = "X,Y", allow_hyphen_values = true, help_heading = "World")]
+    pub goal: Option<Goal>,
+
+    /// The machine that is simulated: a name or a TOML file [default: full-size; rc-car in the arena]
+    ///
+    /// Names: full-size (3.4 x 1.8 m), rc-car (0.33 x 0.25 m), buggy (1/5 scale), sedan.
+    #[arg(long, value_name = "NAME|FILE", help_heading = "Vehicle and controller")]
+    pub vehicle: Option<VehicleSource>,
+
+    /// What the controller believes of the machine, a TOML file [default: the vehicle's geometry, no effects]
+    #[arg(long, value_name = "FILE", help_heading = "Vehicle and controller")]
+    pub model: Option<PathBuf>,
+
+    /// What the controller knows of the ground
+    #[arg(long, value_enum, default_value_t = Method::Physics, help_heading = "Vehicle and controller")]
+    pub method: Method,
+
+    /// Risk tolerance in (0, 1]: the share of worst outcomes to plan for; 1 plans for the mean
+    #[arg(long, value_name = "LEVEL", value_parser = values::cvar_level, default_value = "0.6",
+          allow_hyphen_values = true, help_heading = "Vehicle and controller")]
+    pub alpha: f64,
+
+    /// Controller settings, a TOML file; what it leaves out keeps its default
+    #[arg(long, value_name = "FILE", help_heading = "Vehicle and controller")]
+    pub config: Option<PathBuf>,
+
+    /// Plan on the true map instead of the one built from simulated scans, for comparison
+    #[arg(long, help_heading = "Vehicle and controller")]
+    oracle_map: bool,
+
+    /// Number that decides everything random: the world, the sensors' noise, the samples
+    #[arg(long, value_name = "NUMBER", value_parser = values::seed, default_value = "1",
+          allow_hyphen_values = true, help_heading = "Run")]
+    pub seed: u64,
+
+    /// Give up after this much simulated time [s]
+    #[arg(long, value_name = "SECONDS", value_parser = values::duration_s, default_value = "120",
+          allow_hyphen_values = true, help_heading = "Run")]
+    pub time_limit: f64,
+
+    /// As fast as the machine allows, or wall-clock time
+    #[arg(long, value_enum, default_value_t = Pace::Fast, help_heading = "Run")]
+    pub pace: Pace,
+
+    /// Threads of the controller, 1 to 256 [default: the machine's]; the result does not depend on it
+    #[arg(long, value_name = "N", value_parser = values::thread_count, allow_hyphen_values = true,
+          help_heading = "Run")]
+    pub threads: Option<usize>,
+
+    /// Instruction set of the controller; auto takes the best the machine has
+    #[arg(long, value_enum, default_value_t = InstructionSet::Auto, help_heading = "Run")]
+    pub isa: InstructionSet,
+
+    /// Folder for drive.png, drive.mcap and summary.json; made if missing, earlier files are replaced
+    #[arg(long, value_name = "DIR", default_value = "surefoot-out", help_heading = "Output")]
+    pub out: PathBuf,
+
+    /// Write the summary to this file too
+    #[arg(long, value_name = "FILE", help_heading = "Output")]
+    pub json: Option<PathBuf>,
+}
+
+impl DriveArguments {
+    /// Height of the arena's bushes [m].
+    ///
+    /// # Errors
+    /// A height was given for a world that has no bushes to set.
+    pub fn bush_height_m(&self) -> Result<f64, UsageError> {
+        match (self.bush_height, &self.world) {
+            (Some(_), WorldSource::Rocks | WorldSource::File(_)) => Err(UsageError(
+                "--bush-height: expected together with --world arena, found without it".into(),
+            )),
+            (height, _) => Ok(height.unwrap_or(ARENA_BUSH_HEIGHT_M)),
+        }
+    }
+
+    /// The machine to simulate: the one asked for, else the one that fits the world.
+    pub fn vehicle_source(&self) -> VehicleSource {
+        let fitting = match self.world {
+            WorldSource::Arena => "rc-car",
+            WorldSource::Rocks | WorldSource::File(_) => "full-size",
+        };
+        self.vehicle.clone().unwrap_or_else(|| VehicleSource::Named(fitting.to_owned()))
+    }
+
+    /// Where the controller's map comes from.
+    pub fn map_source(&self) -> MapSource {
+        if self.oracle_map { MapSource::Oracle } else { MapSource::Sensed }
+    }
+
+    /// Threads of the controller: as asked, else as many as the machine runs at once.
+    pub fn n_threads(&self) -> usize {
+        self.threads.unwrap_or_else(super::values::machine_threads)
+    }
+}
+
+/// Where the controller's map comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum MapSource {
+    /// Fused online from simulated range scans.
+    Sensed,
+    /// The world itself.
+    Oracle,
+}
+
+/// What the controller knows of the ground.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Method {
+    /// Traction and attitude from the physics prior on the map
+    Physics,
+    /// No slip and full traction everywhere: what ignoring the ground costs
+    Nominal,
+    /// The plant's true traction and attitude: the best any prediction could do
+    Truth,
+}
+
+/// How simulated time passes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Pace {
+    /// As fast as the machine allows
+    Fast,
+    /// One simulated second takes one second
+    Real,
+}
+
+/// Instruction set of the controller's kernels.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum InstructionSet {
+    /// The best the machine has
+    Auto,
+    /// AVX-512, 16 lanes
+    Avx512,
+    /// AVX2 and FMA, 8 lanes
+    Avx2,
+    /// Plain x86-64 or any other processor
+    Portable,
+}
+
+const LONG_ABOUT: &str = "\
+Drives a simulated vehicle over rough ground to a goal, in closed loop.
+
+Ten times a second a simulated range sensor sees the ground around the vehicle, the map grows, the risk map follows, \
+and the controller picks the next command. The plant that carries it out is a rigid body on four sprung wheels with \
+tyres that slip; the controller knows it only by what it measures.";
+
+const AFTER_HELP: &str = "\
+Examples:
+  surefoot drive
+      40 m over a generated rock field.
+  surefoot drive --seed 7 --alpha 0.2 --out careful
+      Another field, planned for the worst fifth of outcomes.
+  surefoot drive --seed 7 --method nominal
+      The same field for a controller that believes in full traction everywhere.
+  surefoot drive --world arena --bush-height 0.05
+      Low bushes: over them. Try 0.3: the ramp.
+  surefoot drive --world hills.npz --start 12,-3,1.57 --goal 60,20
+      Real elevation; negative coordinates are fine.
+
+Files written to --out:
+  drive.png     terrain with hill shading, risk map, vegetation and obstacles, the path driven coloured by speed,
+                start and goal; below it speed, roll and pitch over time
+  drive.mcap    poses, commands, elevation and risk grids, best rollouts, controller diagnostics; opens in Foxglove
+  summary.json  outcome, time to goal, path length, largest roll and pitch, control and map milliseconds,
+                stops by reason, and all that is needed to repeat the drive
+
+Outcomes:
+  goal             the goal was reached
+  rolled_over      the vehicle lies on its side
+  attitude_limit   roll or pitch went beyond the vehicle's limit
+  stuck            it moved less than 0.1 m in 5 s
+  out_of_bounds    it left the world
+  timeout          --time-limit passed
+  stopped          the controller stopped for good, or Ctrl-C
+
+Elevation files:
+  .npz             `elevation` [row, col] in metres, row 0 = south, column 0 = west; `cell` in metres; optional layers
+                   of the same shape: canopy_height [m], low_veg_fraction [0 to 1], water
+  .tif, .tiff      GeoTIFF with one band of heights in metres
+  .png             16-bit greyscale heights
+
+Exit codes:
+  0  the goal was reached
+  1  it was not, or a result could not be written; one line on standard error says why
+  2  bad usage or input; one line says what was expected and what was found";
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::Parser;
+
+    #[derive(Parser)]
+    struct Only {
+        #[command(flatten)]
+        drive: DriveArguments,
+    }
+
+    fn parse(words: &[&str]) -> DriveArguments {
+        Only::try_parse_from(std::iter::once(&"surefoot").chain(words)).unwrap().drive
+    }
+
+    #[test]
+    fn defaults_are_those_of_the_help() {
+        let drive = parse(&[]);
+        assert_eq!(drive.world, WorldSource::Rocks);
+        assert_eq!((drive.alpha, drive.seed, drive.time_limit), (0.6, 1, 120.0));
+        assert_eq!((drive.method, drive.map_source()), (Method::Physics, MapSource::Sensed));
+        assert_eq!(drive.vehicle_source(), VehicleSource::Named("full-size".into()));
+        assert!(drive.n_threads() >= 1);
+    }
+
+    #[test]
+    fn arena_brings_the_small_car_and_its_bushes() {
+        let drive = parse(&["--world", "arena"]);
+        assert_eq!(drive.vehicle_source(), VehicleSource::Named("rc-car".into()));
+        assert_eq!(drive.bush_height_m(), Ok(0.2));
+        assert_eq!(parse(&["--world", "arena", "--bush-height", "0.05"]).bush_height_m(), Ok(0.05));
+    }
+
+    #[test]
+    fn bushes_elsewhere_are_refused() {
+        assert!(parse(&["--bush-height", "0.1"]).bush_height_m().is_err());
+    }
+
+    #[test]
+    fn negative_coordinates_need_no_quoting() {
+        let drive = parse(&["--start", "-1,-2,-0.5", "--goal", "-3,4", "--oracle-map"]);
+        assert_eq!(drive.start, Some(StartPose { x_m: -1.0, y_m: -2.0, yaw_rad: -0.5 }));
+        assert_eq!(drive.goal, Some(Goal { x_m: -3.0, y_m: 4.0 }));
+        assert_eq!(drive.map_source(), MapSource::Oracle);
+    }
+}

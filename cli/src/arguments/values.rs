@@ -1,0 +1,191 @@
+//! Values with a shape of their own: how a word of the command line becomes one, and what to say if it does not.
+
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
+
+/// Where the ground comes from.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum WorldSource {
+    /// Generated rock field.
+    Rocks,
+    /// PIETRA's hall of 9.6 x 8 m with a ramp and bushes.
+    Arena,
+    /// Elevation file: `.npz`, GeoTIFF or 16-bit PNG.
+    File(PathBuf),
+}
+
+impl FromStr for WorldSource {
+    type Err = String;
+
+    fn from_str(word: &str) -> Result<Self, String> {
+        match word {
+            "rocks" => return Ok(Self::Rocks),
+            "arena" => return Ok(Self::Arena),
+            _ => {}
+        }
+        let extension = Path::new(word).extension().and_then(|extension| extension.to_str());
+        match extension.map(str::to_ascii_lowercase).as_deref() {
+            Some("npz" | "tif" | "tiff" | "png") => Ok(Self::File(PathBuf::from(word))),
+            _ => Err(format!("expected rocks, arena or a file ending in .npz, .tif or .png, found {word:?}")),
+        }
+    }
+}
+
+/// Which machine is meant.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum VehicleSource {
+    /// One that ships with Surefoot, by name.
+    Named(String),
+    /// Vehicle file (TOML).
+    File(PathBuf),
+}
+
+impl FromStr for VehicleSource {
+    type Err = String;
+
+    fn from_str(word: &str) -> Result<Self, String> {
+        if word.trim().is_empty() {
+            return Err("expected a vehicle's name or a .toml file, found nothing".to_owned());
+        }
+        let is_file = word.ends_with(".toml") || word.contains(std::path::MAIN_SEPARATOR);
+        Ok(if is_file { Self::File(PathBuf::from(word)) } else { Self::Named(word.to_owned()) })
+    }
+}
+
+/// Where the vehicle starts: its rear axle's centre in the map frame.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct StartPose {
+    /// East [m].
+    pub x_m: f64,
+    /// North [m].
+    pub y_m: f64,
+    /// Counter-clockwise from east [rad].
+    pub yaw_rad: f64,
+}
+
+impl FromStr for StartPose {
+    type Err = String;
+
+    fn from_str(word: &str) -> Result<Self, String> {
+        let [x_m, y_m, yaw_rad] = numbers(word, "X,Y,YAW: metres, metres, radians")?;
+        Ok(Self { x_m, y_m, yaw_rad })
+    }
+}
+
+/// Where the vehicle shall go, in the map frame.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct Goal {
+    /// East [m].
+    pub x_m: f64,
+    /// North [m].
+    pub y_m: f64,
+}
+
+impl FromStr for Goal {
+    type Err = String;
+
+    fn from_str(word: &str) -> Result<Self, String> {
+        let [x_m, y_m] = numbers(word, "X,Y: metres, metres")?;
+        Ok(Self { x_m, y_m })
+    }
+}
+
+fn numbers<const N: usize>(word: &str, shape: &str) -> Result<[f64; N], String> {
+    let refuse = || format!("expected {N} finite numbers {shape}, found {word:?}");
+    let parsed: Vec<f64> = word
+        .split(',')
+        .map(|part| part.trim().parse().ok().filter(|value: &f64| value.is_finite()))
+        .collect::<Option<_>>()
+        .ok_or_else(refuse)?;
+    parsed.try_into().map_err(|_| refuse())
+}
+
+/// A CVaR level in (0, 1].
+pub(super) fn cvar_level(word: &str) -> Result<f64, String> {
+    number_where(word, "a number above 0 and at most 1", |value| value > 0.0 && value <= 1.0)
+}
+
+/// A duration [s].
+pub(super) fn duration_s(word: &str) -> Result<f64, String> {
+    number_where(word, "a finite number of seconds above 0", |value| value > 0.0 && value.is_finite())
+}
+
+/// A height above the ground [m].
+pub(super) fn height_m(word: &str) -> Result<f64, String> {
+    number_where(word, "a height from 0 to 5 metres", |value| (0.0..=5.0).contains(&value))
+}
+
+fn number_where(word: &str, expected: &str, allowed: impl Fn(f64) -> bool) -> Result<f64, String> {
+    word.trim()
+        .parse()
+        .ok()
+        .filter(|&value| allowed(value))
+        .ok_or_else(|| format!("expected {expected}, found {word:?}"))
+}
+
+/// A number of threads.
+pub(super) fn thread_count(word: &str) -> Result<usize, String> {
+    count(word, 256, "threads")
+}
+
+/// A number of repetitions.
+pub(super) fn update_count(word: &str) -> Result<usize, String> {
+    count(word, 10_000_000, "updates")
+}
+
+fn count(word: &str, most: usize, of: &str) -> Result<usize, String> {
+    word.trim()
+        .parse()
+        .ok()
+        .filter(|count| (1..=most).contains(count))
+        .ok_or_else(|| format!("expected a number of {of} from 1 to {most}, found {word:?}"))
+}
+
+/// As many threads as the machine runs at once; one if it will not say.
+pub(super) fn machine_threads() -> usize {
+    std::thread::available_parallelism().map_or(1, usize::from)
+}
+
+/// Anything random, repeatably.
+pub(super) fn seed(word: &str) -> Result<u64, String> {
+    word.trim().parse().map_err(|_| format!("expected a whole number from 0 to {}, found {word:?}", u64::MAX))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn start_takes_three_finite_numbers() {
+        let start: StartPose = "-3, 4.5,0.7".parse().unwrap();
+        assert_eq!(start, StartPose { x_m: -3.0, y_m: 4.5, yaw_rad: 0.7 });
+        for bad in ["", "1,2", "1,2,3,4", "1,2,nan", "1,inf,0", "1;2;3", "1,,3"] {
+            let message = bad.parse::<StartPose>().unwrap_err();
+            assert!(message.contains("X,Y,YAW") && message.contains(bad), "{message}");
+        }
+    }
+
+    #[test]
+    fn cvar_level_is_above_zero_and_at_most_one() {
+        assert_eq!(cvar_level("1"), Ok(1.0));
+        assert_eq!(cvar_level("1e-3"), Ok(0.001));
+        for bad in ["0", "-0.1", "1.0001", "2", "NaN", "inf", "half", ""] {
+            assert!(cvar_level(bad).is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn world_is_a_name_or_an_elevation_file() {
+        assert_eq!("arena".parse(), Ok(WorldSource::Arena));
+        assert_eq!("a/b.TIF".parse(), Ok(WorldSource::File("a/b.TIF".into())));
+        assert!("Rocks".parse::<WorldSource>().is_err());
+        assert!("world.csv".parse::<WorldSource>().unwrap_err().contains(".npz"));
+    }
+
+    #[test]
+    fn vehicle_with_an_ending_or_a_folder_is_a_file() {
+        assert_eq!("sedan".parse(), Ok(VehicleSource::Named("sedan".into())));
+        assert_eq!("mine.toml".parse(), Ok(VehicleSource::File("mine.toml".into())));
+        assert_eq!("./mine".parse(), Ok(VehicleSource::File("./mine".into())));
+    }
+}

@@ -1,0 +1,92 @@
+//! The two ways a command fails, and the line and exit code that tell them apart.
+
+use std::process::ExitCode;
+
+/// The user asked for something that cannot be: bad arguments, a bad file, a place that cannot be written.
+/// Ends in exit code 2. The message says what was expected and what was found, in one line.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{0}")]
+pub struct UsageError(pub String);
+
+/// The request was sound and the work did not succeed. Ends in exit code 1. The message says why, in one line.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{0}")]
+pub struct WorkFailed(pub String);
+
+impl UsageError {
+    /// Bad input as another crate's error tells it, with its causes.
+    pub fn from_input(error: impl std::error::Error + Send + Sync + 'static) -> Self {
+        Self(one_line(&anyhow::Error::from(error)))
+    }
+
+    /// What the argument parser has to say, without its usage lines.
+    pub(crate) fn from_parser(error: &clap::Error) -> Self {
+        use clap::error::ErrorKind::{DisplayHelpOnMissingArgumentOrSubcommand, MissingSubcommand};
+        if matches!(error.kind(), DisplayHelpOnMissingArgumentOrSubcommand | MissingSubcommand) {
+            return Self("expected a command, found none; --help lists the commands".to_owned());
+        }
+        let text = error.to_string();
+        let told = text
+            .lines()
+            .take_while(|line| !line.starts_with("Usage:") && !line.starts_with("For more information"))
+            .map(str::trim)
+            .filter(|line| !line.is_empty())
+            .collect::<Vec<_>>()
+            .join(" ");
+        Self(told.strip_prefix("error: ").unwrap_or(&told).to_owned())
+    }
+}
+
+/// An error and its causes in one line.
+pub(crate) fn one_line(error: &anyhow::Error) -> String {
+    let mut told = error.to_string();
+    for cause in error.chain().skip(1) {
+        let cause = cause.to_string();
+        // Some errors repeat their cause in their own message.
+        if !told.contains(&cause) {
+            told = format!("{told}: {cause}");
+        }
+    }
+    told.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+/// 2 for bad usage or input anywhere in the chain, else 1.
+pub(crate) fn exit_code(error: &anyhow::Error) -> ExitCode {
+    if error.chain().any(|cause| cause.is::<UsageError>()) || error.is::<UsageError>() {
+        ExitCode::from(2)
+    } else {
+        ExitCode::from(1)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use anyhow::Context;
+
+    #[test]
+    fn usage_error_below_context_still_exits_with_two() {
+        let refused: anyhow::Result<()> = Err(UsageError("alpha: expected".into()).into());
+        let error = refused.context("world.npz").unwrap_err();
+        assert_eq!(exit_code(&error), ExitCode::from(2));
+        assert_eq!(one_line(&error), "world.npz: alpha: expected");
+    }
+
+    #[test]
+    fn failed_work_exits_with_one() {
+        let error = anyhow::Error::from(WorkFailed("stuck\nat (1, 2)".into()));
+        assert_eq!(exit_code(&error), ExitCode::from(1));
+        assert_eq!(one_line(&error), "stuck at (1, 2)");
+    }
+
+    #[test]
+    fn cause_already_told_is_not_repeated() {
+        #[derive(Debug, thiserror::Error)]
+        #[error("file.toml: {source}")]
+        struct Outer {
+            source: UsageError,
+        }
+        let error = UsageError::from_input(Outer { source: UsageError("line 3".into()) });
+        assert_eq!(error.to_string(), "file.toml: line 3");
+    }
+}

@@ -1,0 +1,299 @@
+//! What is left of a drive in numbers: `summary.json`, and the same for a person to read.
+
+use std::collections::BTreeMap;
+use std::fmt;
+
+use bicycle::StopReason;
+use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
+
+use crate::WorkFailed;
+use crate::arguments::{Goal, Method, StartPose};
+
+/// How a drive ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Outcome {
+    /// The goal was reached.
+    Goal,
+    /// The vehicle lies on its side.
+    RolledOver,
+    /// Roll or pitch went beyond the vehicle's limit.
+    AttitudeLimit,
+    /// The vehicle stopped getting anywhere.
+    Stuck,
+    /// The vehicle left the world.
+    OutOfBounds,
+    /// The time limit passed.
+    Timeout,
+    /// The controller stopped for good, or the user did.
+    Stopped,
+}
+
+impl fmt::Display for Outcome {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.pad(match self {
+            Self::Goal => "goal reached",
+            Self::RolledOver => "rolled over",
+            Self::AttitudeLimit => "attitude limit exceeded",
+            Self::Stuck => "stuck",
+            Self::OutOfBounds => "out of bounds",
+            Self::Timeout => "time limit passed",
+            Self::Stopped => "stopped",
+        })
+    }
+}
+
+/// Distribution of a duration over the cycles of a drive.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Milliseconds {
+    /// Half of the cycles took at most this [ms].
+    pub p50: f64,
+    /// 99 of 100 cycles took at most this [ms].
+    pub p99: f64,
+    /// The longest [ms].
+    pub max: f64,
+}
+
+impl Milliseconds {
+    /// Nearest-rank percentiles of durations in milliseconds, in any order; `None` without samples.
+    pub fn from_samples(samples_ms: &[f64]) -> Option<Self> {
+        let mut sorted = samples_ms.to_vec();
+        sorted.sort_by(f64::total_cmp);
+        let rank = |share: f64| (share * sorted.len() as f64).ceil().max(1.0) as usize - 1;
+        let at = |share: f64| sorted.get(rank(share)).copied();
+        Some(Self { p50: at(0.5)?, p99: at(0.99)?, max: at(1.0)? })
+    }
+}
+
+/// One drive in numbers; the content of `summary.json`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Summary {
+    /// How it ended.
+    pub outcome: Outcome,
+    /// Why it ended so, for a person; empty at the goal.
+    pub reason: String,
+    /// Simulated time until the goal was reached [s]; null when it was not.
+    pub time_to_goal_s: Option<f64>,
+    /// Simulated time until the end [s].
+    pub duration_s: f64,
+    /// Length of the path of the rear axle's centre [m].
+    pub path_length_m: f64,
+    /// Straight line left to the goal at the end [m].
+    pub distance_to_goal_m: f64,
+    /// Largest |roll| of the plant [deg].
+    pub largest_roll_deg: f64,
+    /// Largest |pitch| of the plant [deg].
+    pub largest_pitch_deg: f64,
+    /// Control cycles.
+    pub cycles: u64,
+    /// Time of the controller per cycle; null without a cycle.
+    pub control_ms: Option<Milliseconds>,
+    /// Time of mapping and risk map per update; null without an update.
+    pub map_ms: Option<Milliseconds>,
+    /// Cycles whose command came too late.
+    pub deadline_misses: u64,
+    /// Cycles in which the controller asked for a stop, by reason.
+    pub stops: BTreeMap<StopReason, u64>,
+    /// Decides everything random.
+    pub seed: u64,
+    /// Name of the machine.
+    pub vehicle: String,
+    /// Name of the world.
+    pub world: String,
+    /// Where the drive started.
+    pub start: StartPose,
+    /// Where it should have ended.
+    pub goal: Goal,
+    /// What the controller knew of the ground.
+    pub method: Method,
+    /// Risk tolerance (CVaR level).
+    pub alpha: f64,
+    /// Instruction set that the controller used.
+    pub isa: String,
+    /// Threads of the controller.
+    pub threads: usize,
+    /// [`config_hash`] of the resolved configuration.
+    pub config_hash: String,
+    /// [`revision`] of the program.
+    pub revision: String,
+}
+
+/// Git revision that this program was built from, `unknown` outside a repository. Uncommitted changes do not show.
+pub fn revision() -> &'static str {
+    env!("SUREFOOT_REVISION")
+}
+
+/// First 16 hexadecimal digits of the SHA-256 of a configuration's text.
+pub fn config_hash(text: &str) -> String {
+    Sha256::digest(text.as_bytes()).iter().take(8).map(|byte| format!("{byte:02x}")).collect()
+}
+
+impl Summary {
+    /// The content of `summary.json`.
+    ///
+    /// # Errors
+    /// Never in practice; the serialiser's own.
+    pub fn to_json(&self) -> Result<String, serde_json::Error> {
+        serde_json::to_string_pretty(self).map(|json| json + "\n")
+    }
+
+    /// Whether the drive did what it should.
+    ///
+    /// # Errors
+    /// The goal was not reached; the message says what happened instead.
+    pub fn verdict(&self) -> Result<(), WorkFailed> {
+        match self.outcome {
+            Outcome::Goal => Ok(()),
+            _ => Err(WorkFailed(format!(
+                "goal not reached, {:.1} m left: {}",
+                self.distance_to_goal_m,
+                self.told_outcome()
+            ))),
+        }
+    }
+
+    fn told_outcome(&self) -> String {
+        match self.reason.as_str() {
+            "" => self.outcome.to_string(),
+            reason => format!("{}: {reason}", self.outcome),
+        }
+    }
+
+    fn told_stops(&self) -> String {
+        let told: Vec<String> = self
+            .stops
+            .iter()
+            .filter(|(_, count)| **count > 0)
+            .map(|(reason, count)| format!("{} {count}x", name_of(*reason)))
+            .collect();
+        if told.is_empty() { "none".to_owned() } else { told.join(", ") }
+    }
+}
+
+/// A reason as it stands in the JSON, with spaces.
+fn name_of(reason: StopReason) -> String {
+    let name = serde_json::to_string(&reason).unwrap_or_default();
+    name.trim_matches('"').replace('_', " ")
+}
+
+impl fmt::Display for Summary {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let mut row = |name: &str, told: String| writeln!(formatter, "  {name:<16}{told}");
+        row("outcome", self.told_outcome())?;
+        row("time", format!("{:.1} s simulated", self.duration_s))?;
+        row(
+            "path",
+            format!("{:.1} m driven, {:.1} m from the goal", self.path_length_m, self.distance_to_goal_m),
+        )?;
+        row(
+            "largest tilt",
+            format!("roll {:.1} deg, pitch {:.1} deg", self.largest_roll_deg, self.largest_pitch_deg),
+        )?;
+        row("control", told_milliseconds(self.control_ms))?;
+        row("map", told_milliseconds(self.map_ms))?;
+        row("cycles", format!("{}, {} too late", self.cycles, self.deadline_misses))?;
+        row("stops", self.told_stops())?;
+        row("world", format!("{}, seed {}", self.world, self.seed))?;
+        row("start", format!("{:.2},{:.2},{:.3}", self.start.x_m, self.start.y_m, self.start.yaw_rad))?;
+        row("goal", format!("{:.2},{:.2}", self.goal.x_m, self.goal.y_m))?;
+        row("vehicle", self.vehicle.clone())?;
+        row("method", format!("{}, alpha {}", told_method(self.method), self.alpha))?;
+        row("ran on", format!("{}, threads {}", self.isa, self.threads))?;
+        row("made by", format!("revision {}, config {}", self.revision, self.config_hash))
+    }
+}
+
+fn told_method(method: Method) -> &'static str {
+    match method {
+        Method::Physics => "physics",
+        Method::Nominal => "nominal",
+        Method::Truth => "truth",
+    }
+}
+
+fn told_milliseconds(distribution: Option<Milliseconds>) -> String {
+    match distribution {
+        Some(ms) => format!("{:.2} ms median, {:.2} ms p99, {:.2} ms max", ms.p50, ms.p99, ms.max),
+        None => "never ran".to_owned(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    pub(crate) fn example(outcome: Outcome) -> Summary {
+        Summary {
+            outcome,
+            reason: String::new(),
+            time_to_goal_s: Some(47.2),
+            duration_s: 47.2,
+            path_length_m: 43.9,
+            distance_to_goal_m: 0.4,
+            largest_roll_deg: 12.5,
+            largest_pitch_deg: 17.0,
+            cycles: 472,
+            control_ms: Some(Milliseconds { p50: 0.2, p99: 0.3, max: 0.5 }),
+            map_ms: None,
+            deadline_misses: 0,
+            stops: BTreeMap::from([(StopReason::NoFeasibleRollout, 3), (StopReason::StaleScan, 0)]),
+            seed: 1,
+            vehicle: "full-size".to_owned(),
+            world: "rocks".to_owned(),
+            start: StartPose { x_m: 5.0, y_m: 25.0, yaw_rad: 0.0 },
+            goal: Goal { x_m: 45.0, y_m: 25.0 },
+            method: Method::Physics,
+            alpha: 0.6,
+            isa: "avx512".to_owned(),
+            threads: 2,
+            config_hash: config_hash(""),
+            revision: revision().to_owned(),
+        }
+    }
+
+    #[test]
+    fn percentiles_are_nearest_rank() {
+        // 1, 2, ..., 200: rank ceil(0.5 * 200) = 100, ceil(0.99 * 200) = 198.
+        let samples: Vec<f64> = (1..=200).rev().map(f64::from).collect();
+        let ms = Milliseconds::from_samples(&samples);
+        assert_eq!(ms, Some(Milliseconds { p50: 100.0, p99: 198.0, max: 200.0 }));
+        assert_eq!(Milliseconds::from_samples(&[7.0]), Some(Milliseconds { p50: 7.0, p99: 7.0, max: 7.0 }));
+        assert_eq!(Milliseconds::from_samples(&[]), None);
+    }
+
+    #[test]
+    fn json_reads_back_and_names_are_snake_case() {
+        let summary = example(Outcome::AttitudeLimit);
+        let json = summary.to_json().unwrap();
+        assert_eq!(serde_json::from_str::<Summary>(&json).unwrap(), summary);
+        for part in ["\"attitude_limit\"", "\"no_feasible_rollout\": 3", "\"map_ms\": null", "\"physics\""] {
+            assert!(json.contains(part), "{part} in {json}");
+        }
+    }
+
+    #[test]
+    fn only_the_goal_is_a_success() {
+        assert_eq!(example(Outcome::Goal).verdict(), Ok(()));
+        let mut summary = example(Outcome::Stuck);
+        summary.reason = "under 0.1 m in 5 s".to_owned();
+        let told = summary.verdict().unwrap_err().0;
+        assert_eq!(told, "goal not reached, 0.4 m left: stuck: under 0.1 m in 5 s");
+    }
+
+    #[test]
+    fn a_person_can_read_it() {
+        let told = example(Outcome::Goal).to_string();
+        for part in ["goal reached", "43.9 m driven", "roll 12.5 deg", "no feasible rollout 3x", "never ran"]
+        {
+            assert!(told.contains(part), "{part} in {told}");
+        }
+        assert!(!told.contains("stale scan"), "reasons that never came are left out: {told}");
+    }
+
+    #[test]
+    fn config_hash_is_the_start_of_sha_256() {
+        // SHA-256 of the empty text is e3b0c442 98fc1c14 ...
+        assert_eq!(config_hash(""), "e3b0c44298fc1c14");
+    }
+}
