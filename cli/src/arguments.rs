@@ -31,6 +31,7 @@ pub struct Arguments {
 #[derive(Debug, Subcommand)]
 pub enum Command {
     /// Drive a simulated vehicle over rough ground to a goal
+    #[command(long_about = drive::LONG_ABOUT)]
     Drive(Box<DriveArguments>),
     /// Measure how fast the controller and the risk map are
     Bench {

@@ -2,6 +2,8 @@
 
 use std::process::ExitCode;
 
+use clap::error::{ContextKind, ContextValue, ErrorKind};
+
 /// The user asked for something that cannot be: bad arguments, a bad file, a place that cannot be written.
 /// Ends in exit code 2. The message says what was expected and what was found, in one line.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -19,22 +21,52 @@ impl UsageError {
         Self(one_line(&anyhow::Error::from(error)))
     }
 
-    /// What the argument parser has to say, without its usage lines.
+    /// What the argument parser has to say, as option, expected and found where it knows them.
     pub(crate) fn from_parser(error: &clap::Error) -> Self {
-        use clap::error::ErrorKind::{DisplayHelpOnMissingArgumentOrSubcommand, MissingSubcommand};
-        if matches!(error.kind(), DisplayHelpOnMissingArgumentOrSubcommand | MissingSubcommand) {
-            return Self("expected a command, found none; --help lists the commands".to_owned());
-        }
-        let text = error.to_string();
-        let told = text
-            .lines()
-            .take_while(|line| !line.starts_with("Usage:") && !line.starts_with("For more information"))
-            .map(str::trim)
-            .filter(|line| !line.is_empty())
-            .collect::<Vec<_>>()
-            .join(" ");
-        Self(told.strip_prefix("error: ").unwrap_or(&told).to_owned())
+        Self(match error.kind() {
+            ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand | ErrorKind::MissingSubcommand => {
+                "expected a command, found none; --help lists the commands".to_owned()
+            }
+            ErrorKind::ValueValidation => told_validation(error).unwrap_or_else(|| told_text(error)),
+            ErrorKind::InvalidValue => told_choice(error).unwrap_or_else(|| told_text(error)),
+            _ => told_text(error),
+        })
     }
+}
+
+fn told_validation(error: &clap::Error) -> Option<String> {
+    Some(format!("{}: {}", option_of(error)?, std::error::Error::source(error)?))
+}
+
+fn told_choice(error: &clap::Error) -> Option<String> {
+    let ContextValue::Strings(choices) = error.get(ContextKind::ValidValue)? else { return None };
+    let found = match error.get(ContextKind::InvalidValue)? {
+        ContextValue::String(found) if !found.is_empty() => format!("{found:?}"),
+        _ => "none".to_owned(),
+    };
+    let choices = if choices.is_empty() { "a value".to_owned() } else { choices.join(", ") };
+    Some(format!("{}: expected {choices}, found {found}", option_of(error)?))
+}
+
+/// `--alpha` of `--alpha <LEVEL>`.
+fn option_of(error: &clap::Error) -> Option<&str> {
+    match error.get(ContextKind::InvalidArg)? {
+        ContextValue::String(argument) => argument.split_whitespace().next(),
+        _ => None,
+    }
+}
+
+/// The parser's own words without its usage lines.
+fn told_text(error: &clap::Error) -> String {
+    let text = error.to_string();
+    let told = text
+        .lines()
+        .take_while(|line| !line.starts_with("Usage:") && !line.starts_with("For more information"))
+        .map(str::trim)
+        .filter(|line| !line.is_empty())
+        .collect::<Vec<_>>()
+        .join("; ");
+    told.strip_prefix("error: ").unwrap_or(&told).to_owned()
 }
 
 /// An error and its causes in one line.

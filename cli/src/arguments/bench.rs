@@ -10,18 +10,16 @@ use super::values;
 #[derive(Clone, Debug, Subcommand)]
 pub enum BenchCommand {
     /// One update of the shipped controller
+    #[command(long_about = CONTROL_ABOUT)]
     Control(BenchControlArguments),
     /// The risk map of the physics prior, whole and after a part of the ground has changed
+    #[command(long_about = PRIOR_MAP_ABOUT)]
     PriorMap(BenchPriorMapArguments),
 }
 
 /// How to measure the controller.
 #[derive(Args, Clone, Debug)]
-#[command(
-    long_about = "Measures one update of the controller that `surefoot drive` uses: 1024 rollouts of 50 steps over a \
-                  risk map of 81 x 96 cells and 13 yaws, with fresh noise every update.",
-    after_long_help = CONTROL_AFTER_HELP
-)]
+#[command(after_long_help = CONTROL_AFTER_HELP)]
 pub struct BenchControlArguments {
     /// Threads of the controller, 1 to 256 [default: the machine's]
     #[arg(long, value_name = "N", value_parser = values::thread_count, allow_hyphen_values = true)]
@@ -65,10 +63,6 @@ pub enum BenchWork {
 
 /// How to measure the risk map.
 #[derive(Args, Clone, Debug)]
-#[command(
-    long_about = "Measures the risk map of the physics prior over 81 x 96 cells and 13 yaws: built whole, and brought \
-                  up to date after one contiguous block of 2 % of the cells has changed."
-)]
 pub struct BenchPriorMapArguments {
     /// Threads, 1 to 256 [default: the machine's]
     #[arg(long, value_name = "N", value_parser = values::thread_count, allow_hyphen_values = true)]
@@ -90,6 +84,14 @@ impl BenchPriorMapArguments {
         self.threads.unwrap_or_else(values::machine_threads)
     }
 }
+
+const CONTROL_ABOUT: &str = "\
+Measures one update of the controller that `surefoot drive` uses: 1024 rollouts of 50 steps over a risk map of \
+81 x 96 cells and 13 yaws, with fresh noise every update.";
+
+const PRIOR_MAP_ABOUT: &str = "\
+Measures the risk map of the physics prior over 81 x 96 cells and 13 yaws: built whole, and brought up to date \
+after one contiguous block of 2 % of the cells has changed.";
 
 const CONTROL_AFTER_HELP: &str = "\
 Prints, and with --json writes:

@@ -13,7 +13,7 @@ const ARENA_BUSH_HEIGHT_M: f64 = 0.2;
 
 /// What to drive, where, and what to believe.
 #[derive(Args, Clone, Debug)]
-#[command(long_about = LONG_ABOUT, after_long_help = AFTER_HELP)]
+#[command(after_long_help = AFTER_HELP)]
 pub struct DriveArguments {
     /// Ground to drive on: rocks, arena, or an elevation file (.npz, GeoTIFF, 16-bit PNG)
     ///
@@ -174,7 +174,7 @@ pub enum InstructionSet {
     Portable,
 }
 
-const LONG_ABOUT: &str = "\
+pub(super) const LONG_ABOUT: &str = "\
 Drives a simulated vehicle over rough ground to a goal, in closed loop.
 
 Ten times a second a simulated range sensor sees the ground around the vehicle, the map grows, the risk map follows, \
@@ -195,26 +195,30 @@ Examples:
       Real elevation; negative coordinates are fine.
 
 Files written to --out:
-  drive.png     terrain with hill shading, risk map, vegetation and obstacles, the path driven coloured by speed,
-                start and goal; below it speed, roll and pitch over time
-  drive.mcap    poses, commands, elevation and risk grids, best rollouts, controller diagnostics; opens in Foxglove
-  summary.json  outcome, time to goal, path length, largest roll and pitch, control and map milliseconds,
-                stops by reason, and all that is needed to repeat the drive
+  drive.png     terrain with hill shading, risk map, vegetation and obstacles,
+                the path driven coloured by speed, start and goal; below it
+                speed, roll and pitch over time
+  drive.mcap    poses, commands, elevation and risk grids, best rollouts and
+                controller diagnostics; opens in Foxglove
+  summary.json  outcome, time to goal, path length, largest roll and pitch,
+                control and map milliseconds, stops by reason, and all that is
+                needed to repeat the drive
 
 Outcomes:
-  goal             the goal was reached
-  rolled_over      the vehicle lies on its side
-  attitude_limit   roll or pitch went beyond the vehicle's limit
-  stuck            it moved less than 0.1 m in 5 s
-  out_of_bounds    it left the world
-  timeout          --time-limit passed
-  stopped          the controller stopped for good, or Ctrl-C
+  goal            the goal was reached
+  rolled_over     the vehicle lies on its side
+  attitude_limit  roll or pitch went beyond the vehicle's limit
+  stuck           it moved less than 0.1 m in 5 s
+  out_of_bounds   it left the world
+  timeout         --time-limit passed
+  stopped         the controller stopped for good, or Ctrl-C
 
 Elevation files:
-  .npz             `elevation` [row, col] in metres, row 0 = south, column 0 = west; `cell` in metres; optional layers
-                   of the same shape: canopy_height [m], low_veg_fraction [0 to 1], water
-  .tif, .tiff      GeoTIFF with one band of heights in metres
-  .png             16-bit greyscale heights
+  .npz        elevation [row, col] in metres, row 0 = south, column 0 = west;
+              cell in metres; optional layers of the same shape:
+              canopy_height [m], low_veg_fraction [0 to 1], water [0 or 1]
+  .tif        GeoTIFF, one band of heights in metres
+  .png        16-bit greyscale heights
 
 Exit codes:
   0  the goal was reached
