@@ -84,19 +84,25 @@ impl<T: Clone> GridMap<T> {
         Self { geometry, values: vec![value; geometry.n_cells()] }
     }
 
-    /// Moves the window to a new origin by whole cells; cells that enter hold `value`.
+    /// Moves the window to a new origin by whole cells; cells that enter hold `value`. Nothing is allocated.
     pub fn roll_to(&mut self, origin: [i64; 2], value: T) {
-        let shift = [origin[0] - self.geometry.origin[0], origin[1] - self.geometry.origin[1]];
-        if shift == [0, 0] {
-            return;
+        let GridGeometry { n_rows, n_cols, origin: old, .. } = self.geometry;
+        let shift = [origin[0] - old[0], origin[1] - old[1]];
+        self.geometry.origin = origin;
+        if shift[0].unsigned_abs() >= n_cols as u64 || shift[1].unsigned_abs() >= n_rows as u64 {
+            return self.values.fill(value);
         }
-        let old = std::mem::replace(self, Self::filled(GridGeometry { origin, ..self.geometry }, value));
-        let inside = |i: usize, by: i64, n: usize| usize::try_from(i as i64 + by).ok().filter(|&j| j < n);
-        for row in 0..old.geometry.n_rows {
-            let Some(old_row) = inside(row, shift[1], old.geometry.n_rows) else { continue };
-            for col in 0..old.geometry.n_cols {
-                let Some(old_col) = inside(col, shift[0], old.geometry.n_cols) else { continue };
-                self[Cell { row, col }] = old[Cell { row: old_row, col: old_col }].clone();
+        // A cell that stays moves by the same distance in the row-major array, whatever its place.
+        let distance = (shift[1] * n_cols as i64 + shift[0]).rem_euclid(self.values.len() as i64);
+        self.values.rotate_left(distance as usize);
+        let stays = |i: usize, by: i64, n: usize| (0..n as i64).contains(&(i as i64 + by));
+        for (row, values) in self.values.chunks_exact_mut(n_cols).enumerate() {
+            if !stays(row, shift[1], n_rows) {
+                values.fill(value.clone());
+            } else if shift[0] > 0 {
+                values[n_cols - shift[0] as usize..].fill(value.clone());
+            } else {
+                values[..shift[0].unsigned_abs() as usize].fill(value.clone());
             }
         }
     }

@@ -1,0 +1,123 @@
+//! Settings of the elevation map.
+
+use serde::{Deserialize, Serialize};
+
+/// How points become ground. Every length is in metres, every default is meant for a vehicle of 1 to 4 m
+/// with a spinning range sensor of 64 beams.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct ElevationConfig {
+    /// Edge of a cell [m], > 0.
+    pub resolution_m: f64,
+    /// Rows of the window, > 0.
+    pub n_rows: usize,
+    /// Columns of the window, > 0.
+    pub n_cols: usize,
+    /// The window follows the vehicle once it is this far from the centre along x or y [m]; infinite = never.
+    pub recentre_m: f64,
+    /// Standard deviation of a point's height close to the sensor, independent between points [m], > 0.
+    pub noise_floor_m: f64,
+    /// Growth of that standard deviation with range [m/m].
+    pub noise_per_range: f64,
+    /// Standard deviation of the height error that all points of a scan share (pose error) [m].
+    pub scan_noise_m: f64,
+    /// Growth of a height's variance while nothing is seen of it [m2/s].
+    pub fading_m2ps: f64,
+    /// Points a class's evidence is remembered for: older ones fade beyond it, > 0.
+    pub evidence_cap: f32,
+    /// Points that hang higher than this above the ground do not touch the vehicle [m], > 0.
+    pub clearance_m: f32,
+    /// Rigid points of one cell that span more than this are a wall or a trunk [m], > 0. On a cell that is
+    /// `d` across its diagonal, ground of slope s spans d tan(s).
+    pub wall_span_m: f32,
+    /// Standard deviation of the ground below vegetation when only plants were seen far and wide [m], > 0.
+    pub hidden_ground_std_m: f32,
+    /// Gaps are filled only when something was seen within this distance along x and y in all four
+    /// quadrants around the cell [m]; ground below plants and obstacles is inferred from twice as far. 0 = never.
+    pub gap_radius_m: f64,
+    /// A ray must pass this far below a height to contradict it [m], > 0, on top of three standard deviations.
+    pub visibility_margin_m: f32,
+    /// Scans that must contradict a height, none confirming it, before it is forgotten, > 0.
+    pub ghost_scans: u8,
+    /// A change of a height below this is not published [m]; 0 = every change is.
+    pub publish_step_m: f32,
+}
+
+impl Default for ElevationConfig {
+    fn default() -> Self {
+        Self {
+            resolution_m: 0.2,
+            n_rows: 200,
+            n_cols: 200,
+            recentre_m: 1.0,
+            noise_floor_m: 0.02,
+            noise_per_range: 0.002,
+            scan_noise_m: 0.005,
+            fading_m2ps: 1e-5,
+            evidence_cap: 30.0,
+            clearance_m: 2.5,
+            wall_span_m: 0.8,
+            hidden_ground_std_m: 0.15,
+            gap_radius_m: 0.5,
+            visibility_margin_m: 0.1,
+            ghost_scans: 2,
+            publish_step_m: 0.003,
+        }
+    }
+}
+
+/// A setting that cannot be.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("elevation map: {field}: expected {expected}, found {found}")]
+pub struct ElevationConfigError {
+    /// Name of the field.
+    pub field: &'static str,
+    /// The range that would do.
+    pub expected: &'static str,
+    /// The value that was given.
+    pub found: f64,
+}
+
+impl ElevationConfig {
+    /// Refuses settings no map can be built from.
+    pub fn validate(&self) -> Result<(), ElevationConfigError> {
+        let positive = [
+            ("resolution_m", self.resolution_m),
+            ("n_rows", self.n_rows as f64),
+            ("n_cols", self.n_cols as f64),
+            ("noise_floor_m", self.noise_floor_m),
+            ("evidence_cap", f64::from(self.evidence_cap)),
+            ("clearance_m", f64::from(self.clearance_m)),
+            ("wall_span_m", f64::from(self.wall_span_m)),
+            ("hidden_ground_std_m", f64::from(self.hidden_ground_std_m)),
+            ("visibility_margin_m", f64::from(self.visibility_margin_m)),
+            ("ghost_scans", f64::from(self.ghost_scans)),
+        ];
+        let not_negative = [
+            ("noise_per_range", self.noise_per_range),
+            ("scan_noise_m", self.scan_noise_m),
+            ("fading_m2ps", self.fading_m2ps),
+            ("gap_radius_m", self.gap_radius_m),
+            ("publish_step_m", f64::from(self.publish_step_m)),
+        ];
+        check(&positive, "a finite number > 0", |v| v.is_finite() && v > 0.0)?;
+        check(&not_negative, "a finite number >= 0", |v| v.is_finite() && v >= 0.0)?;
+        check(&[("recentre_m", self.recentre_m)], "a number > 0, infinity allowed", |v| v > 0.0)
+    }
+
+    /// Gap radius in whole cells.
+    pub(super) fn gap_radius_cells(&self) -> usize {
+        (self.gap_radius_m / self.resolution_m) as usize
+    }
+}
+
+fn check(
+    fields: &[(&'static str, f64)],
+    expected: &'static str,
+    allowed: impl Fn(f64) -> bool,
+) -> Result<(), ElevationConfigError> {
+    match fields.iter().find(|(_, value)| !allowed(*value)) {
+        Some(&(field, found)) => Err(ElevationConfigError { field, expected, found }),
+        None => Ok(()),
+    }
+}
