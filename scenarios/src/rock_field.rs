@@ -96,14 +96,14 @@ impl Default for RockFieldConfig {
         Self {
             side_m: 50.0,
             resolution_m: 0.1,
-            small: population(0.25, [0.03, 0.1], [0.25, 0.6], [1.0, 1.6]),
-            medium: population(0.03, [0.1, 0.25], [0.3, 0.7], [1.0, 1.8]),
-            boulders: population(0.006, [0.35, 0.9], [0.45, 0.9], [1.0, 1.8]),
-            ridges: population(0.0014, [0.45, 0.9], [0.5, 0.9], [3.0, 6.0]),
-            rolling_std_m: 0.12,
+            small: population(0.25, [0.02, 0.07], [0.2, 0.45], [1.0, 1.6]),
+            medium: population(0.03, [0.07, 0.18], [0.22, 0.5], [1.0, 1.8]),
+            boulders: population(0.006, [0.25, 0.65], [0.33, 0.65], [1.0, 1.8]),
+            ridges: population(0.0014, [0.33, 0.65], [0.36, 0.65], [3.0, 6.0]),
+            rolling_std_m: 0.09,
             rolling_wavelength_m: [5.0, 25.0],
             friction_variation: 0.08,
-            test_height_scale: 1.6,
+            test_height_scale: 2.2,
             pad_radius_m: 3.5,
         }
     }
