@@ -2,10 +2,15 @@
 //! and the drive log.
 
 mod decision;
+pub mod effect;
+pub mod lanes;
+mod model;
 mod motion;
 mod vehicle;
 
 pub use decision::{Decision, HoldReason, StopReason};
+pub use effect::Effect;
+pub use model::{GroundSample, LaneState, Model, ModelError, Rates, Stepper};
 pub use motion::{Command, ImuSample, Odometry, State};
 pub use vehicle::{
     Axle, Body, Drivetrain, Geometry, Limits, Servo, Suspension, Tyre, Vehicle, VehicleError, Wheel,

@@ -1,0 +1,43 @@
+//! Transport delay of the speed command.
+
+use super::{Acts, Commanding, Constants, Definition, Description, Parameter, delay_line};
+use crate::Command;
+use crate::lanes::Lanes;
+
+/// Transport delay of the speed command.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SpeedDelay {
+    /// Delay D [s].
+    pub delay_s: f64,
+}
+
+impl Definition for SpeedDelay {
+    const DESCRIPTION: Description = Description {
+        id: "speed_delay",
+        meaning: "transport delay of the speed command: x(t) = command(t - D)",
+        parameters: &[Parameter { name: "delay_s", unit: "s", low: 0.0, high: 1.0, neutral: 0.0 }],
+    };
+    const ACTS: Acts = Acts::OnCommand;
+
+    fn values(&self) -> [f64; 4] {
+        [self.delay_s, 0.0, 0.0, 0.0]
+    }
+
+    fn constants(&self, step_s: f64) -> [f64; 4] {
+        delay_line::constants(self.delay_s, step_s)
+    }
+
+    fn n_slots(&self, step_s: f64) -> usize {
+        delay_line::n_slots(self.delay_s, step_s)
+    }
+
+    fn recall(&self, slot: usize, step_s: f64, past: &dyn Fn(f64) -> Command) -> f64 {
+        f64::from(past(delay_line::age_s(slot, self.n_slots(step_s), step_s)).speed_mps)
+    }
+
+    #[inline(always)]
+    fn on_command<L: Lanes>(constants: &Constants, state: &mut Commanding<'_, L>) {
+        state.speed = delay_line::pass(constants, state.memory, state.step, state.speed);
+    }
+}

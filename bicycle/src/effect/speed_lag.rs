@@ -1,0 +1,37 @@
+//! First-order speed: the actuator closes the share 1 - exp(-dt / T) of its distance to the command per step.
+
+use super::{Acts, Commanding, Constants, Definition, Description, Parameter};
+use crate::lanes::Lanes;
+use crate::lanes::Real;
+
+/// First-order speed: the actuator closes the share 1 - exp(-dt / T) of its distance to the command per step.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SpeedLag {
+    /// Time constant T [s].
+    pub time_constant_s: f64,
+}
+
+impl Definition for SpeedLag {
+    const DESCRIPTION: Description = Description {
+        id: "speed_lag",
+        meaning: "first-order speed: x += (command - x) (1 - exp(-dt / T))",
+        parameters: &[Parameter { name: "time_constant_s", unit: "s", low: 0.0, high: 2.0, neutral: 0.0 }],
+    };
+    const ACTS: Acts = Acts::OnCommand;
+
+    fn values(&self) -> [f64; 4] {
+        [self.time_constant_s, 0.0, 0.0, 0.0]
+    }
+
+    fn constants(&self, step_s: f64) -> [f64; 4] {
+        let kept = if self.time_constant_s > 0.0 { (-step_s / self.time_constant_s).exp() } else { 0.0 };
+        [1.0 - kept, 0.0, 0.0, 0.0]
+    }
+
+    #[inline(always)]
+    fn on_command<L: Lanes>(constants: &Constants, state: &mut Commanding<'_, L>) {
+        let share = Real::constant(state.speed.0, constants[0]);
+        state.speed = (state.speed - state.reached_speed).mul_add(share, state.reached_speed);
+    }
+}

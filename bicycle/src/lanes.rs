@@ -1,0 +1,202 @@
+//! One set of equations for one number or for a pack of them: the arithmetic that the model is written in.
+//!
+//! [`Scalar`] computes in f64 and is the reference; the packs compute in f32, one vehicle per lane.
+
+mod packs;
+mod polynomial;
+mod portable;
+mod scalar;
+
+pub use portable::Portable;
+pub use scalar::Scalar;
+
+use std::ops::{Add, Div, Mul, Neg, Sub};
+
+/// A constant kept in both precisions, so that a kernel loads it without a conversion.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Constant {
+    double: f64,
+    single: f32,
+}
+
+impl Constant {
+    /// Both forms of a value.
+    pub fn new(value: f64) -> Self {
+        Self { double: value, single: value as f32 }
+    }
+
+    /// The value as given.
+    pub fn value(self) -> f64 {
+        self.double
+    }
+
+    /// The value rounded to f32.
+    pub fn single(self) -> f32 {
+        self.single
+    }
+}
+
+/// Arithmetic on packs of numbers. A value of this type proves that the machine has the instructions.
+///
+/// `min` and `max` return their second operand when the first is NaN, on every implementation.
+pub trait Lanes: Copy + Send + Sync + 'static {
+    /// A pack of numbers.
+    type Value: Copy + Send + Sync;
+    /// A pack of truth values.
+    type Mask: Copy;
+    /// Numbers in a pack.
+    const WIDTH: usize;
+
+    /// The same number in every lane.
+    fn constant(self, value: Constant) -> Self::Value;
+    /// a + b.
+    fn add(self, a: Self::Value, b: Self::Value) -> Self::Value;
+    /// a - b.
+    fn sub(self, a: Self::Value, b: Self::Value) -> Self::Value;
+    /// a b.
+    fn mul(self, a: Self::Value, b: Self::Value) -> Self::Value;
+    /// a / b.
+    fn div(self, a: Self::Value, b: Self::Value) -> Self::Value;
+    /// a b + c, rounded once where the machine can.
+    fn mul_add(self, a: Self::Value, b: Self::Value, c: Self::Value) -> Self::Value;
+    /// Smaller of both; `b` where `a` is NaN.
+    fn min(self, a: Self::Value, b: Self::Value) -> Self::Value;
+    /// Larger of both; `b` where `a` is NaN.
+    fn max(self, a: Self::Value, b: Self::Value) -> Self::Value;
+    /// Square root; of a tiny or negative number, a small number >= 0. Relative error below 1e-6.
+    fn sqrt(self, a: Self::Value) -> Self::Value;
+    /// An angle in turns brought to [-1/2, 1/2] by whole turns; |a| < 4 million.
+    fn wrap_turns(self, a: Self::Value) -> Self::Value;
+    /// Where a < b.
+    fn less(self, a: Self::Value, b: Self::Value) -> Self::Mask;
+    /// Where both hold.
+    fn and(self, a: Self::Mask, b: Self::Mask) -> Self::Mask;
+    /// Where either holds.
+    fn or(self, a: Self::Mask, b: Self::Mask) -> Self::Mask;
+    /// `yes` where the mask holds, `no` elsewhere.
+    fn select(self, mask: Self::Mask, yes: Self::Value, no: Self::Value) -> Self::Value;
+    /// a + b where the mask holds, a elsewhere.
+    fn add_where(self, mask: Self::Mask, a: Self::Value, b: Self::Value) -> Self::Value;
+    /// Sine and cosine of an angle in turns within [-1/2, 1/2]; packs: absolute error below 5e-7.
+    fn sin_cos_turns(self, a: Self::Value) -> (Self::Value, Self::Value);
+    /// Tangent of an angle of at most [`STEERING_DOMAIN_RAD`]; packs: absolute error below 5e-7.
+    fn tan(self, a: Self::Value) -> Self::Value;
+
+    /// A number in every lane.
+    #[inline(always)]
+    fn real(self, value: f64) -> Real<Self> {
+        Real(self, self.constant(Constant::new(value)))
+    }
+}
+
+/// Largest steering angle for which [`Lanes::tan`] is exact enough [rad].
+pub const STEERING_DOMAIN_RAD: f64 = 0.8;
+
+/// A pack of real numbers with the usual operators.
+#[derive(Clone, Copy)]
+pub struct Real<L: Lanes>(pub L, pub L::Value);
+
+impl<L: Lanes> Real<L> {
+    /// A constant in every lane.
+    #[inline(always)]
+    pub fn constant(lanes: L, value: Constant) -> Self {
+        Self(lanes, lanes.constant(value))
+    }
+
+    /// self * by + plus.
+    #[inline(always)]
+    pub fn mul_add(self, by: Self, plus: Self) -> Self {
+        Self(self.0, self.0.mul_add(self.1, by.1, plus.1))
+    }
+
+    /// Smaller of both; `other` where self is NaN.
+    #[inline(always)]
+    pub fn min(self, other: Self) -> Self {
+        Self(self.0, self.0.min(self.1, other.1))
+    }
+
+    /// Larger of both; `other` where self is NaN.
+    #[inline(always)]
+    pub fn max(self, other: Self) -> Self {
+        Self(self.0, self.0.max(self.1, other.1))
+    }
+
+    /// Brought into [low, high].
+    #[inline(always)]
+    pub fn clamp(self, low: Self, high: Self) -> Self {
+        self.max(low).min(high)
+    }
+
+    /// Square root, see [`Lanes::sqrt`].
+    #[inline(always)]
+    pub fn sqrt(self) -> Self {
+        Self(self.0, self.0.sqrt(self.1))
+    }
+
+    /// Magnitude.
+    #[inline(always)]
+    pub fn abs(self) -> Self {
+        self.max(-self)
+    }
+
+    /// See [`Lanes::wrap_turns`].
+    #[inline(always)]
+    pub fn wrap_turns(self) -> Self {
+        Self(self.0, self.0.wrap_turns(self.1))
+    }
+
+    /// See [`Lanes::sin_cos_turns`].
+    #[inline(always)]
+    pub fn sin_cos_turns(self) -> (Self, Self) {
+        let (sine, cosine) = self.0.sin_cos_turns(self.1);
+        (Self(self.0, sine), Self(self.0, cosine))
+    }
+
+    /// See [`Lanes::tan`].
+    #[inline(always)]
+    pub fn tan(self) -> Self {
+        Self(self.0, self.0.tan(self.1))
+    }
+
+    /// Where self < other.
+    #[inline(always)]
+    pub fn less(self, other: Self) -> L::Mask {
+        self.0.less(self.1, other.1)
+    }
+
+    /// self + term where the mask holds.
+    #[inline(always)]
+    pub fn add_where(self, mask: L::Mask, term: Self) -> Self {
+        Self(self.0, self.0.add_where(mask, self.1, term.1))
+    }
+
+    /// self where the mask holds, `other` elsewhere.
+    #[inline(always)]
+    pub fn or_else(self, mask: L::Mask, other: Self) -> Self {
+        Self(self.0, self.0.select(mask, self.1, other.1))
+    }
+}
+
+macro_rules! operator {
+    ($trait:ident, $method:ident) => {
+        impl<L: Lanes> $trait for Real<L> {
+            type Output = Self;
+            #[inline(always)]
+            fn $method(self, other: Self) -> Self {
+                Self(self.0, self.0.$method(self.1, other.1))
+            }
+        }
+    };
+}
+operator!(Add, add);
+operator!(Sub, sub);
+operator!(Mul, mul);
+operator!(Div, div);
+
+impl<L: Lanes> Neg for Real<L> {
+    type Output = Self;
+    #[inline(always)]
+    fn neg(self) -> Self {
+        self.0.real(0.0) - self
+    }
+}

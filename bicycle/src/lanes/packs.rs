@@ -1,0 +1,131 @@
+//! Packs on the instruction sets that `pulp` detects at run time.
+#![cfg(target_arch = "x86_64")]
+
+use super::{Constant, Lanes, polynomial};
+use pulp::x86::{V3, V4};
+use pulp::{Simd, b16, cast, f32x8, f32x16, m32x8};
+
+macro_rules! arithmetic_of_pulp {
+    () => {
+        #[inline(always)]
+        fn constant(self, value: Constant) -> Self::Value {
+            self.splat_f32s(value.single())
+        }
+        #[inline(always)]
+        fn add(self, a: Self::Value, b: Self::Value) -> Self::Value {
+            self.add_f32s(a, b)
+        }
+        #[inline(always)]
+        fn sub(self, a: Self::Value, b: Self::Value) -> Self::Value {
+            self.sub_f32s(a, b)
+        }
+        #[inline(always)]
+        fn mul(self, a: Self::Value, b: Self::Value) -> Self::Value {
+            self.mul_f32s(a, b)
+        }
+        #[inline(always)]
+        fn div(self, a: Self::Value, b: Self::Value) -> Self::Value {
+            self.div_f32s(a, b)
+        }
+        #[inline(always)]
+        fn mul_add(self, a: Self::Value, b: Self::Value, c: Self::Value) -> Self::Value {
+            self.mul_add_f32s(a, b, c)
+        }
+        #[inline(always)]
+        fn min(self, a: Self::Value, b: Self::Value) -> Self::Value {
+            self.min_f32s(a, b)
+        }
+        #[inline(always)]
+        fn max(self, a: Self::Value, b: Self::Value) -> Self::Value {
+            self.max_f32s(a, b)
+        }
+        #[inline(always)]
+        fn less(self, a: Self::Value, b: Self::Value) -> Self::Mask {
+            self.less_than_f32s(a, b)
+        }
+        #[inline(always)]
+        fn select(self, mask: Self::Mask, yes: Self::Value, no: Self::Value) -> Self::Value {
+            self.select_f32s(mask, yes, no)
+        }
+        #[inline(always)]
+        fn sin_cos_turns(self, a: Self::Value) -> (Self::Value, Self::Value) {
+            polynomial::sin_cos_turns(self, a)
+        }
+        #[inline(always)]
+        fn tan(self, a: Self::Value) -> Self::Value {
+            polynomial::tan(self, a)
+        }
+    };
+}
+
+/// Keeps the reciprocal square root away from zero.
+const TINY: Constant = Constant { double: 1e-12, single: 1e-12 };
+const HALF: Constant = Constant { double: 0.5, single: 0.5 };
+
+/// One Newton step from an estimate `y` of 1 / sqrt(x) to sqrt(x).
+#[inline(always)]
+fn refined_sqrt<L: Lanes>(lanes: L, x: L::Value, y: L::Value) -> L::Value {
+    let half = lanes.constant(HALF);
+    let root = lanes.mul(x, y);
+    let error = lanes.sub(half, lanes.mul(lanes.mul(root, half), y));
+    lanes.mul_add(root, error, root)
+}
+
+impl Lanes for V4 {
+    type Value = f32x16;
+    type Mask = b16;
+    const WIDTH: usize = 16;
+    arithmetic_of_pulp!();
+
+    #[inline(always)]
+    fn sqrt(self, a: f32x16) -> f32x16 {
+        let x = self.max(a, self.constant(TINY));
+        refined_sqrt(self, x, cast!(self.avx512f._mm512_rsqrt14_ps(cast!(x))))
+    }
+    #[inline(always)]
+    fn wrap_turns(self, a: f32x16) -> f32x16 {
+        cast!(self.avx512dq._mm512_reduce_ps::<0>(cast!(a)))
+    }
+    #[inline(always)]
+    fn and(self, a: b16, b: b16) -> b16 {
+        b16(a.0 & b.0)
+    }
+    #[inline(always)]
+    fn or(self, a: b16, b: b16) -> b16 {
+        b16(a.0 | b.0)
+    }
+    #[inline(always)]
+    fn add_where(self, mask: b16, a: f32x16, b: f32x16) -> f32x16 {
+        cast!(self.avx512f._mm512_mask_add_ps(cast!(a), mask.0, cast!(a), cast!(b)))
+    }
+}
+
+impl Lanes for V3 {
+    type Value = f32x8;
+    type Mask = m32x8;
+    const WIDTH: usize = 8;
+    arithmetic_of_pulp!();
+
+    #[inline(always)]
+    fn sqrt(self, a: f32x8) -> f32x8 {
+        let x = self.max(a, self.constant(TINY));
+        refined_sqrt(self, x, cast!(self.avx._mm256_rsqrt_ps(cast!(x))))
+    }
+    #[inline(always)]
+    fn wrap_turns(self, a: f32x8) -> f32x8 {
+        self.sub(a, cast!(self.avx._mm256_round_ps::<8>(cast!(a))))
+    }
+    #[inline(always)]
+    fn and(self, a: m32x8, b: m32x8) -> m32x8 {
+        self.and_m32s(a, b)
+    }
+    #[inline(always)]
+    fn or(self, a: m32x8, b: m32x8) -> m32x8 {
+        self.or_m32s(a, b)
+    }
+    #[inline(always)]
+    fn add_where(self, mask: m32x8, a: f32x8, b: f32x8) -> f32x8 {
+        let kept = self.avx._mm256_and_ps(cast!(mask), cast!(b));
+        self.add(a, cast!(kept))
+    }
+}

@@ -1,0 +1,65 @@
+//! The reference: one number, f64, the standard library's functions.
+
+use super::{Constant, Lanes};
+
+/// One f64.
+#[derive(Clone, Copy, Debug)]
+pub struct Scalar;
+
+impl Lanes for Scalar {
+    type Value = f64;
+    type Mask = bool;
+    const WIDTH: usize = 1;
+
+    fn constant(self, value: Constant) -> f64 {
+        value.value()
+    }
+    fn add(self, a: f64, b: f64) -> f64 {
+        a + b
+    }
+    fn sub(self, a: f64, b: f64) -> f64 {
+        a - b
+    }
+    fn mul(self, a: f64, b: f64) -> f64 {
+        a * b
+    }
+    fn div(self, a: f64, b: f64) -> f64 {
+        a / b
+    }
+    fn mul_add(self, a: f64, b: f64, c: f64) -> f64 {
+        a * b + c
+    }
+    fn min(self, a: f64, b: f64) -> f64 {
+        if a < b { a } else { b }
+    }
+    fn max(self, a: f64, b: f64) -> f64 {
+        if a > b { a } else { b }
+    }
+    fn sqrt(self, a: f64) -> f64 {
+        a.max(0.0).sqrt()
+    }
+    fn wrap_turns(self, a: f64) -> f64 {
+        a - a.round_ties_even()
+    }
+    fn less(self, a: f64, b: f64) -> bool {
+        a < b
+    }
+    fn and(self, a: bool, b: bool) -> bool {
+        a && b
+    }
+    fn or(self, a: bool, b: bool) -> bool {
+        a || b
+    }
+    fn select(self, mask: bool, yes: f64, no: f64) -> f64 {
+        if mask { yes } else { no }
+    }
+    fn add_where(self, mask: bool, a: f64, b: f64) -> f64 {
+        if mask { a + b } else { a }
+    }
+    fn sin_cos_turns(self, a: f64) -> (f64, f64) {
+        (a * std::f64::consts::TAU).sin_cos()
+    }
+    fn tan(self, a: f64) -> f64 {
+        a.tan()
+    }
+}

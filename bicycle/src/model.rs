@@ -1,0 +1,307 @@
+//! The kinematic bicycle on ground that takes a share of every motion (PIETRA, equation 2).
+
+use crate::effect::{CommandStep, Effect, EffectError, MotionStep, PreparedEffects};
+use crate::lanes::{Constant, Lanes, Real, STEERING_DOMAIN_RAD, Scalar};
+use crate::{Command, Limits, State, Vehicle};
+use serde::{Deserialize, Serialize};
+use std::f64::consts::TAU;
+
+/// What the ground under a pose does to the vehicle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GroundSample<T = f64> {
+    /// Achieved over commanded speed, in [0, 1].
+    pub linear_traction: T,
+    /// Achieved over commanded yaw rate, in [0, 1].
+    pub angular_traction: T,
+    /// Height change per metre east and north [-].
+    pub gradient: [T; 2],
+    /// Number of the terrain class.
+    pub class: T,
+}
+
+impl GroundSample {
+    /// Level ground that gives everything that is asked of it.
+    pub const FIRM: Self =
+        Self { linear_traction: 1.0, angular_traction: 1.0, gradient: [0.0; 2], class: 0.0 };
+}
+
+/// What a controller believes of its vehicle.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Model {
+    /// Between the axles [m].
+    pub wheelbase_m: f64,
+    /// What the vehicle can or may do.
+    pub limits: Limits,
+    /// What the kinematic bicycle leaves out; at most one of each id.
+    #[serde(default)]
+    pub effects: Vec<Effect>,
+}
+
+/// A model that cannot be.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum ModelError {
+    /// A length or limit is out of range.
+    #[error("{field}: expected {expected}, found {found}")]
+    Field {
+        /// Dotted path of the field.
+        field: &'static str,
+        /// The range that would do.
+        expected: &'static str,
+        /// The value that was given.
+        found: f64,
+    },
+    /// A parameter of an effect is out of range.
+    #[error(transparent)]
+    Effect(#[from] EffectError),
+    /// An effect is listed twice.
+    #[error("effects: expected each effect once, found {id} twice")]
+    Repeated {
+        /// Which effect.
+        id: &'static str,
+    },
+}
+
+impl Model {
+    /// The vehicle's geometry and limits, no effects.
+    pub fn of(vehicle: &Vehicle) -> Self {
+        Self { wheelbase_m: vehicle.geometry.wheelbase_m, limits: vehicle.limits, effects: Vec::new() }
+    }
+
+    /// Refuses values that no model can have.
+    pub fn validate(&self) -> Result<(), ModelError> {
+        let limits = &self.limits;
+        let positive = [
+            ("wheelbase_m", self.wheelbase_m),
+            ("limits.speed_max_mps", limits.speed_max_mps),
+            ("limits.steering_max_rad", limits.steering_max_rad),
+            ("limits.steering_rate_max_radps", limits.steering_rate_max_radps),
+            ("limits.acceleration_max_mps2", limits.acceleration_max_mps2),
+            ("limits.lateral_acceleration_max_mps2", limits.lateral_acceleration_max_mps2),
+            ("limits.roll_max_rad", limits.roll_max_rad),
+            ("limits.pitch_max_rad", limits.pitch_max_rad),
+        ];
+        check(&positive, "a finite number > 0", |value| value > 0.0)?;
+        let reverse = [("limits.reverse_speed_max_mps", limits.reverse_speed_max_mps)];
+        check(&reverse, "a finite number >= 0", |value| value >= 0.0)?;
+        let steering = [("limits.steering_max_rad", limits.steering_max_rad)];
+        check(&steering, "an angle of at most 0.8 rad", |value| value <= STEERING_DOMAIN_RAD)?;
+        self.effects.iter().try_for_each(Effect::validate)?;
+        let id = |i: usize| self.effects[i].description().id;
+        let repeated = (0..self.effects.len()).find(|&i| (0..i).any(|j| id(j) == id(i)));
+        repeated.map_or(Ok(()), |i| Err(ModelError::Repeated { id: id(i) }))
+    }
+}
+
+fn check(
+    fields: &[(&'static str, f64)],
+    expected: &'static str,
+    allowed: impl Fn(f64) -> bool,
+) -> Result<(), ModelError> {
+    match fields.iter().find(|(_, value)| !(value.is_finite() && allowed(*value))) {
+        Some(&(field, found)) => Err(ModelError::Field { field, expected, found }),
+        None => Ok(()),
+    }
+}
+
+/// States of a pack of vehicles. Lengths are in the unit that the stepper was made for.
+#[derive(Clone, Copy)]
+pub struct LaneState<L: Lanes> {
+    /// East [unit].
+    pub x: Real<L>,
+    /// North [unit].
+    pub y: Real<L>,
+    /// Yaw in whole turns, within [-1/2, 1/2].
+    pub turns: Real<L>,
+    /// Speed that the drive has reached [m/s].
+    pub speed: Real<L>,
+    /// Angle that the steering has reached [rad].
+    pub steering: Real<L>,
+}
+
+/// Body rates of a step, after the ground took its share.
+#[derive(Clone, Copy)]
+pub struct Rates<L: Lanes> {
+    /// Speed asked of the ground, before it took its share [m/s].
+    pub speed: Real<L>,
+    /// Yaw rate [rad/s].
+    pub yaw_rate: Real<L>,
+}
+
+/// A model made ready for one step length and one unit of length.
+#[derive(Clone, Debug)]
+pub struct Stepper {
+    per_wheelbase: Constant,
+    advance: Constant,
+    turn: Constant,
+    speed_change: Constant,
+    steering_change: Constant,
+    steering_domain: Constant,
+    unit_m: f64,
+    effects: PreparedEffects,
+}
+
+impl Stepper {
+    /// Steps of `step_s`, positions in units of `unit_m`.
+    pub fn new(model: &Model, step_s: f64, unit_m: f64) -> Self {
+        Self {
+            per_wheelbase: Constant::new(1.0 / model.wheelbase_m),
+            advance: Constant::new(step_s / unit_m),
+            turn: Constant::new(step_s / TAU),
+            speed_change: Constant::new(model.limits.acceleration_max_mps2 * step_s),
+            steering_change: Constant::new(model.limits.steering_rate_max_radps * step_s),
+            steering_domain: Constant::new(STEERING_DOMAIN_RAD),
+            unit_m,
+            effects: PreparedEffects::new(&model.effects, step_s),
+        }
+    }
+
+    /// Changes the unit of length.
+    pub fn rescale(&mut self, unit_m: f64) {
+        self.advance = Constant::new(self.advance.value() * self.unit_m / unit_m);
+        self.unit_m = unit_m;
+    }
+
+    /// Without the limits on acceleration and steering rate.
+    pub fn with_instant_actuators(mut self) -> Self {
+        let endless = Constant::new(1e30);
+        (self.speed_change, self.steering_change) = (endless, endless);
+        self
+    }
+
+    /// Whether the model has effects; if not, [`Stepper::step_bare`] does for commands within the limits.
+    pub fn has_effects(&self) -> bool {
+        !self.effects.is_empty()
+    }
+
+    /// Whether an effect reads the gradient or the class of the ground.
+    pub fn uses_ground(&self) -> bool {
+        self.effects.use_ground()
+    }
+
+    /// Numbers per vehicle that the effects carry from step to step.
+    pub fn n_slots(&self) -> usize {
+        self.effects.n_slots()
+    }
+
+    /// What the effects remember at the start, given the command in force `age_s` before;
+    /// `hold` takes slot and value.
+    pub fn recall(&self, past: &dyn Fn(f64) -> Command, hold: impl FnMut(usize, f64)) {
+        self.effects.recall(past, hold);
+    }
+
+    /// One step with actuators that follow at once; exact when the model has no effects and the commands keep
+    /// the limits on acceleration and steering rate.
+    #[inline(always)]
+    pub fn step_bare<L: Lanes>(
+        &self,
+        state: &mut LaneState<L>,
+        command: [Real<L>; 2],
+        ground: &GroundSample<Real<L>>,
+    ) -> Rates<L> {
+        let lanes = state.x.0;
+        let [speed, steering] = command;
+        (state.speed, state.steering) = (speed, steering);
+        let (sine, cosine) = state.turns.sin_cos_turns();
+        let advance = speed * ground.linear_traction * Real::constant(lanes, self.advance);
+        let curving = steering.tan() * ground.angular_traction;
+        let yaw_rate = speed * Real::constant(lanes, self.per_wheelbase) * curving;
+        state.x = advance.mul_add(cosine, state.x);
+        state.y = advance.mul_add(sine, state.y);
+        state.turns = yaw_rate.mul_add(Real::constant(lanes, self.turn), state.turns).wrap_turns();
+        Rates { speed, yaw_rate }
+    }
+
+    /// One step of the whole model: effects on the command, limits of acceleration and steering rate, effects
+    /// on the motion, traction. `memory` holds [`Stepper::n_slots`] values, `step` counts from the start.
+    #[inline(always)]
+    pub fn step<L: Lanes>(
+        &self,
+        state: &mut LaneState<L>,
+        command: [Real<L>; 2],
+        ground: &GroundSample<Real<L>>,
+        memory: &mut [L::Value],
+        step: usize,
+    ) -> Rates<L> {
+        self.actuate(state, command, memory, step);
+        let lanes = state.x.0;
+        let (sine, cosine) = state.turns.sin_cos_turns();
+        let yaw_rate = state.speed * Real::constant(lanes, self.per_wheelbase) * state.steering.tan();
+        let mut motion = MotionStep {
+            rates: [state.speed, lanes.real(0.0), yaw_rate],
+            steering: state.steering,
+            heading: [sine, cosine],
+            ground: *ground,
+        };
+        self.effects.on_motion(memory, &mut motion);
+        let [forward, lateral, yaw_rate] = motion.rates;
+        let share = ground.linear_traction * Real::constant(lanes, self.advance);
+        let (forward_step, lateral_step) = (forward * share, lateral * share);
+        state.x = forward_step.mul_add(cosine, state.x) - lateral_step * sine;
+        state.y = forward_step.mul_add(sine, lateral_step.mul_add(cosine, state.y));
+        let yaw_rate = yaw_rate * ground.angular_traction;
+        state.turns = yaw_rate.mul_add(Real::constant(lanes, self.turn), state.turns).wrap_turns();
+        Rates { speed: forward, yaw_rate }
+    }
+
+    #[inline(always)]
+    fn actuate<L: Lanes>(
+        &self,
+        state: &mut LaneState<L>,
+        command: [Real<L>; 2],
+        memory: &mut [L::Value],
+        step: usize,
+    ) {
+        let lanes = state.x.0;
+        let mut asked = CommandStep {
+            speed: command[0],
+            steering: command[1],
+            reached_speed: state.speed,
+            reached_steering: state.steering,
+            step,
+        };
+        self.effects.on_command(memory, &mut asked);
+        let towards = |asked: Real<L>, reached: Real<L>, change: Constant| {
+            let change = Real::constant(lanes, change);
+            asked.clamp(reached - change, reached + change)
+        };
+        state.speed = towards(asked.speed, state.speed, self.speed_change);
+        let domain = Real::constant(lanes, self.steering_domain);
+        let steering = towards(asked.steering, state.steering, self.steering_change);
+        state.steering = steering.clamp(-domain, domain);
+    }
+
+    /// One step of one vehicle in metres and radians: the reference. The stepper's unit must be 1 m.
+    pub fn step_state(
+        &self,
+        state: &State,
+        command: Command,
+        ground: &GroundSample,
+        memory: &mut [f64],
+        step: usize,
+    ) -> State {
+        let real = |value: f64| Real(Scalar, value);
+        let mut lanes = LaneState {
+            x: real(state.x_m),
+            y: real(state.y_m),
+            turns: real(state.yaw_rad / TAU),
+            speed: real(state.speed_mps),
+            steering: real(state.steering_rad),
+        };
+        let ground = GroundSample {
+            linear_traction: real(ground.linear_traction),
+            angular_traction: real(ground.angular_traction),
+            gradient: ground.gradient.map(real),
+            class: real(ground.class),
+        };
+        let command = [f64::from(command.speed_mps), f64::from(command.steering_rad)].map(real);
+        self.step(&mut lanes, command, &ground, memory, step);
+        State {
+            x_m: lanes.x.1,
+            y_m: lanes.y.1,
+            yaw_rad: lanes.turns.1 * TAU,
+            speed_mps: lanes.speed.1,
+            steering_rad: lanes.steering.1,
+        }
+    }
+}
