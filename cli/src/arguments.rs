@@ -8,7 +8,7 @@ use clap::{Parser, Subcommand};
 
 pub use bench::{BenchCommand, BenchControlArguments, BenchPriorMapArguments, BenchWork};
 pub use drive::{DriveArguments, InstructionSet, MapSource, Method, Pace};
-pub use values::{Goal, StartPose, VehicleSource, WorldSource};
+pub use values::{Goal, StartPose, WorldSource};
 
 /// Everything after `surefoot`.
 #[derive(Debug, Parser)]

@@ -239,7 +239,7 @@ mod tests {
             deadline_misses: 0,
             stops: BTreeMap::from([(StopReason::NoFeasibleRollout, 3), (StopReason::StaleScan, 0)]),
             seed: 1,
-            vehicle: "full-size".to_owned(),
+            vehicle: "pietra_full_size".to_owned(),
             world: "rocks".to_owned(),
             start: StartPose { x_m: 5.0, y_m: 25.0, yaw_rad: 0.0 },
             goal: Goal { x_m: 45.0, y_m: 25.0 },

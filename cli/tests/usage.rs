@@ -123,7 +123,7 @@ fn other_bad_values_are_refused_with_what_would_do() {
         (&["drive", "--seed", "1e3"], &["--seed", "whole number", "1e3"]),
         (&["drive", "--time-limit", "0"], &["--time-limit", "seconds above 0", "0"]),
         (&["drive", "--time-limit", "inf"], &["--time-limit", "finite", "inf"]),
-        (&["drive", "--world", "arena", "--bush-height", "-1"], &["--bush-height", "0 to 5 metres", "-1"]),
+        (&["drive", "--world", "arena", "--bush-height", "-1"], &["--bush-height", "0 to 2 metres", "-1"]),
         (&["drive", "--bush-height", "0.1"], &["--bush-height", "--world arena"]),
         (&["drive", "--method", "magic"], &["--method", "physics, nominal, truth", "magic"]),
         (&["drive", "--isa", "sse9"], &["--isa", "auto, avx512, avx2, portable", "sse9"]),

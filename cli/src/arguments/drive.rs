@@ -3,13 +3,11 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
+use scenarios::ArenaConfig;
 use serde::{Deserialize, Serialize};
 
-use super::values::{self, Goal, StartPose, VehicleSource, WorldSource};
+use super::values::{self, Goal, StartPose, WorldSource};
 use crate::UsageError;
-
-/// Height of the arena's bushes unless told otherwise [m].
-const ARENA_BUSH_HEIGHT_M: f64 = 0.2;
 
 /// What to drive, where, and what to believe.
 #[derive(Args, Clone, Debug)]
@@ -22,7 +20,7 @@ pub struct DriveArguments {
     #[arg(long, value_name = "rocks|arena|FILE", default_value = "rocks", help_heading = "World")]
     pub world: WorldSource,
 
-    /// Height of the arena's bushes [m]; only with --world arena [default: 0.2]
+    /// Height of the arena's bushes [m]; only with --world arena [default: 0.05]
     #[arg(long, value_name = "METRES", value_parser = values::height_m, allow_hyphen_values = true,
           help_heading = "World")]
     pub bush_height: Option<f64>,
@@ -38,11 +36,11 @@ pub struct DriveArguments {
     #[arg(long, value_name = "X,Y", allow_hyphen_values = true, help_heading = "World")]
     pub goal: Option<Goal>,
 
-    /// The machine that is simulated: a name or a TOML file [default: full-size; rc-car in the arena]
+    /// The machine that is simulated: a name or a TOML file [default: pietra_full_size; rc_car in the arena]
     ///
-    /// Names: full-size (3.4 x 1.8 m), rc-car (0.33 x 0.25 m), buggy (1/5 scale), sedan.
+    /// Names: pietra_full_size (3.4 x 1.8 m), rc_car (0.33 x 0.25 m), buggy_fifth (1/5 scale), sedan.
     #[arg(long, value_name = "NAME|FILE", help_heading = "Vehicle and controller")]
-    pub vehicle: Option<VehicleSource>,
+    pub vehicle: Option<String>,
 
     /// What the controller believes of the machine, a TOML file [default: the vehicle's geometry, no effects]
     #[arg(long, value_name = "FILE", help_heading = "Vehicle and controller")]
@@ -107,17 +105,17 @@ impl DriveArguments {
             (Some(_), WorldSource::Rocks | WorldSource::File(_)) => Err(UsageError(
                 "--bush-height: expected together with --world arena, found without it".into(),
             )),
-            (height, _) => Ok(height.unwrap_or(ARENA_BUSH_HEIGHT_M)),
+            (height, _) => Ok(height.unwrap_or(ArenaConfig::default().bush_height_m)),
         }
     }
 
-    /// The machine to simulate: the one asked for, else the one that fits the world.
-    pub fn vehicle_source(&self) -> VehicleSource {
+    /// The machine to simulate, a shipped name or a path: the one asked for, else the one that fits the world.
+    pub fn vehicle_name_or_path(&self) -> &str {
         let fitting = match self.world {
-            WorldSource::Arena => "rc-car",
-            WorldSource::Rocks | WorldSource::File(_) => "full-size",
+            WorldSource::Arena => "rc_car",
+            WorldSource::Rocks | WorldSource::File(_) => "pietra_full_size",
         };
-        self.vehicle.clone().unwrap_or_else(|| VehicleSource::Named(fitting.to_owned()))
+        self.vehicle.as_deref().unwrap_or(fitting)
     }
 
     /// Where the controller's map comes from.
@@ -189,8 +187,8 @@ Examples:
       Another field, planned for the worst fifth of outcomes.
   surefoot drive --seed 7 --method nominal
       The same field for a controller that believes in full traction everywhere.
-  surefoot drive --world arena --bush-height 0.05
-      Low bushes: over them. Try 0.3: the ramp.
+  surefoot drive --world arena --bush-height 0.3
+      Tall bushes: does it take the ramp?
   surefoot drive --world hills.npz --start 12,-3,1.57 --goal 60,20
       Real elevation; negative coordinates are fine.
 
@@ -218,7 +216,7 @@ Elevation files:
               cell in metres; optional layers of the same shape:
               canopy_height [m], low_veg_fraction [0 to 1], water [0 or 1]
   .tif        GeoTIFF, one band of heights in metres
-  .png        16-bit greyscale heights
+  .png        16-bit greyscale heights, scaled by FILE.png.toml beside it
 
 Exit codes:
   0  the goal was reached
@@ -246,16 +244,16 @@ mod tests {
         assert_eq!(drive.world, WorldSource::Rocks);
         assert_eq!((drive.alpha, drive.seed, drive.time_limit), (0.6, 1, 120.0));
         assert_eq!((drive.method, drive.map_source()), (Method::Physics, MapSource::Sensed));
-        assert_eq!(drive.vehicle_source(), VehicleSource::Named("full-size".into()));
+        assert_eq!(drive.vehicle_name_or_path(), "pietra_full_size");
         assert!(drive.n_threads() >= 1);
     }
 
     #[test]
     fn arena_brings_the_small_car_and_its_bushes() {
         let drive = parse(&["--world", "arena"]);
-        assert_eq!(drive.vehicle_source(), VehicleSource::Named("rc-car".into()));
-        assert_eq!(drive.bush_height_m(), Ok(0.2));
-        assert_eq!(parse(&["--world", "arena", "--bush-height", "0.05"]).bush_height_m(), Ok(0.05));
+        assert_eq!(drive.vehicle_name_or_path(), "rc_car");
+        assert_eq!(drive.bush_height_m(), Ok(0.05), "the help says so");
+        assert_eq!(parse(&["--world", "arena", "--bush-height", "0.4"]).bush_height_m(), Ok(0.4));
     }
 
     #[test]

@@ -31,27 +31,6 @@ impl FromStr for WorldSource {
     }
 }
 
-/// Which machine is meant.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum VehicleSource {
-    /// One that ships with Surefoot, by name.
-    Named(String),
-    /// Vehicle file (TOML).
-    File(PathBuf),
-}
-
-impl FromStr for VehicleSource {
-    type Err = String;
-
-    fn from_str(word: &str) -> Result<Self, String> {
-        if word.trim().is_empty() {
-            return Err("expected a vehicle's name or a .toml file, found nothing".to_owned());
-        }
-        let is_file = word.ends_with(".toml") || word.contains(std::path::MAIN_SEPARATOR);
-        Ok(if is_file { Self::File(PathBuf::from(word)) } else { Self::Named(word.to_owned()) })
-    }
-}
-
 /// Where the vehicle starts: its rear axle's centre in the map frame.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct StartPose {
@@ -112,7 +91,7 @@ pub(super) fn duration_s(word: &str) -> Result<f64, String> {
 
 /// A height above the ground [m].
 pub(super) fn height_m(word: &str) -> Result<f64, String> {
-    number_where(word, "a height from 0 to 5 metres", |value| (0.0..=5.0).contains(&value))
+    number_where(word, "a height from 0 to 2 metres", |value| (0.0..=2.0).contains(&value))
 }
 
 fn number_where(word: &str, expected: &str, allowed: impl Fn(f64) -> bool) -> Result<f64, String> {
@@ -180,12 +159,5 @@ mod tests {
         assert_eq!("a/b.TIF".parse(), Ok(WorldSource::File("a/b.TIF".into())));
         assert!("Rocks".parse::<WorldSource>().is_err());
         assert!("world.csv".parse::<WorldSource>().unwrap_err().contains(".npz"));
-    }
-
-    #[test]
-    fn vehicle_with_an_ending_or_a_folder_is_a_file() {
-        assert_eq!("sedan".parse(), Ok(VehicleSource::Named("sedan".into())));
-        assert_eq!("mine.toml".parse(), Ok(VehicleSource::File("mine.toml".into())));
-        assert_eq!("./mine".parse(), Ok(VehicleSource::File("./mine".into())));
     }
 }
