@@ -4,7 +4,11 @@
 //! written whole or not at all.
 
 mod config;
+mod elevation;
 mod vehicle;
 
 pub use config::{ConfigError, ConfigText};
+pub use elevation::{
+    ElevationError, ElevationFile, ElevationLayers, PngScale, read_elevation, read_elevation_png,
+};
 pub use vehicle::{parse_vehicle, read_vehicle, shipped_vehicle_names, shipped_vehicle_text};

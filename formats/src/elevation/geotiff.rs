@@ -1,0 +1,149 @@
+//! Elevation as GeoTIFF: one band, square pixels, projected metres; pixel scale from tag 33550, place from tag 33922,
+//! the value of holes from GDAL's tag 42113. Rows come from the north and are turned over.
+
+use std::io::{Read, Seek};
+
+use terrain::GridGeometry;
+use tiff::decoder::{Decoder, DecodingResult};
+use tiff::tags::Tag;
+use tiff::{ColorType, TiffError};
+
+use super::{ElevationFile, Refusal, assemble, check_cell, check_shape, flip_rows};
+
+/// Keys of the GeoKey directory (GeoTIFF 1.1, section 7) and what they may say.
+mod key {
+    pub(super) const MODEL_TYPE: u64 = 1024;
+    pub(super) const MODEL_TYPE_GEOGRAPHIC: u64 = 2;
+    pub(super) const RASTER_TYPE: u64 = 1025;
+    pub(super) const RASTER_TYPE_POINT: u64 = 2;
+    pub(super) const LINEAR_UNITS: u64 = 3076;
+    pub(super) const LINEAR_UNITS_METRE: u64 = 9001;
+}
+
+pub(super) fn read(file: impl Read + Seek) -> Result<ElevationFile, Refusal> {
+    let mut decoder = Decoder::new(file).map_err(|error| broken("file", &error))?;
+    let (n_cols, n_rows) = decoder.dimensions().map_err(|error| broken("size", &error))?;
+    let (n_rows, n_cols) = (n_rows as usize, n_cols as usize);
+    check_shape("size", n_rows, n_cols)?;
+    let color = decoder.colortype().map_err(|error| broken("pixel type", &error))?;
+    if !matches!(color, ColorType::Gray(_)) {
+        return Err(Refusal::new("pixel type", "one band of heights", format!("{color:?}")));
+    }
+    let keys = GeoKeys::read(&mut decoder)?;
+    let cell_m = pixel_scale_m(&mut decoder)?;
+    let file_south_west_m = south_west_m(&mut decoder, &keys, cell_m, n_rows)?;
+    let no_data = no_data(&mut decoder)?;
+    let pixels = decoder.read_image().map_err(|error| broken("pixels", &error))?;
+    let heights_m = heights(&pixels)?;
+    if let Some(index) = heights_m.iter().position(|height| height.is_nan()).filter(|_| no_data.is_none()) {
+        let place = format!("NaN at row {}, column {} from the north-west", index / n_cols, index % n_cols);
+        return Err(Refusal::new(
+            "pixels",
+            "finite heights, or tag 42113 to declare the value of holes",
+            place,
+        ));
+    }
+    let hole = |height: f64| no_data.is_some_and(|value| height as f32 == value as f32);
+    let heights_m = heights_m.into_iter().map(|height| if hole(height) { f32::NAN } else { height as f32 });
+    let heights_m: Vec<f32> = flip_rows(&heights_m.collect::<Vec<_>>(), n_cols).collect();
+    let geometry = GridGeometry { resolution_m: cell_m, origin: [0, 0], n_rows, n_cols };
+    Ok(ElevationFile { file_south_west_m, ..assemble("pixels", geometry, heights_m)? })
+}
+
+fn broken(field: &str, error: &TiffError) -> Refusal {
+    let found = error.to_string().split_whitespace().collect::<Vec<_>>().join(" ");
+    Refusal::new(field, "a complete GeoTIFF", found)
+}
+
+/// Numbers of a tag; `None` when the file has none.
+fn numbers<R: Read + Seek>(decoder: &mut Decoder<R>, tag: Tag) -> Result<Option<Vec<f64>>, Refusal> {
+    let field = format!("tag {}", tag.to_u16());
+    let value = decoder.find_tag(tag).map_err(|error| broken(&field, &error))?;
+    let value = value.map(|value| value.into_f64_vec().map_err(|error| broken(&field, &error)));
+    value.transpose()
+}
+
+fn pixel_scale_m<R: Read + Seek>(decoder: &mut Decoder<R>) -> Result<f64, Refusal> {
+    const FIELD: &str = "tag 33550 (pixel scale)";
+    let scale = numbers(decoder, Tag::ModelPixelScaleTag)?;
+    let Some(&[x_m, y_m, ..]) = scale.as_deref() else {
+        return Err(Refusal::new(FIELD, "the edges of a pixel in metres", "no such tag"));
+    };
+    check_cell(FIELD, x_m)?;
+    if (x_m - y_m).abs() > 1e-6 * x_m {
+        return Err(Refusal::new(FIELD, "square pixels", format!("{x_m} x {y_m} m")));
+    }
+    Ok(x_m)
+}
+
+/// Where the south-west corner of the south-western pixel lies in the file's coordinates.
+fn south_west_m<R: Read + Seek>(
+    decoder: &mut Decoder<R>,
+    keys: &GeoKeys,
+    cell_m: f64,
+    n_rows: usize,
+) -> Result<[f64; 2], Refusal> {
+    let tie = numbers(decoder, Tag::ModelTiepointTag)?;
+    let Some(&[col, row, _, x_m, y_m, ..]) = tie.as_deref() else { return Ok([0.0; 2]) };
+    if ![col, row, x_m, y_m].iter().all(|value| value.is_finite()) {
+        return Err(Refusal::new("tag 33922 (tie point)", "finite numbers", format!("{tie:?}")));
+    }
+    // A point raster ties the pixel's centre, an area raster its north-west corner.
+    let to_corner = if keys.get(key::RASTER_TYPE) == Some(key::RASTER_TYPE_POINT) { 0.5 } else { 0.0 };
+    let west_m = x_m - (col + to_corner) * cell_m;
+    let north_m = y_m + (row + to_corner) * cell_m;
+    Ok([west_m, north_m - n_rows as f64 * cell_m])
+}
+
+/// The value that marks a hole.
+fn no_data<R: Read + Seek>(decoder: &mut Decoder<R>) -> Result<Option<f64>, Refusal> {
+    let value = decoder.find_tag(Tag::GdalNodata).map_err(|error| broken("tag 42113", &error))?;
+    let Some(value) = value else { return Ok(None) };
+    let text = value.into_string().map_err(|error| broken("tag 42113", &error))?;
+    let text = text.trim_matches(|c: char| c == '\0' || c.is_whitespace());
+    let number = text.parse().map_err(|_| Refusal::new("tag 42113 (no data)", "a number", text));
+    number.map(Some)
+}
+
+fn heights(pixels: &DecodingResult) -> Result<Vec<f64>, Refusal> {
+    Ok(match pixels {
+        DecodingResult::F32(values) => values.iter().map(|v| f64::from(*v)).collect(),
+        DecodingResult::F64(values) => values.clone(),
+        DecodingResult::U8(values) => values.iter().map(|v| f64::from(*v)).collect(),
+        DecodingResult::I8(values) => values.iter().map(|v| f64::from(*v)).collect(),
+        DecodingResult::U16(values) => values.iter().map(|v| f64::from(*v)).collect(),
+        DecodingResult::I16(values) => values.iter().map(|v| f64::from(*v)).collect(),
+        DecodingResult::U32(values) => values.iter().map(|v| f64::from(*v)).collect(),
+        DecodingResult::I32(values) => values.iter().map(|v| f64::from(*v)).collect(),
+        _ => return Err(Refusal::new("pixel type", "8 to 32 bit integers or floats", "another type")),
+    })
+}
+
+/// The GeoKey directory: what the coordinates mean.
+struct GeoKeys(Vec<(u64, u64)>);
+
+impl GeoKeys {
+    /// Refuses angles and feet, which would be taken for metres.
+    fn read<R: Read + Seek>(decoder: &mut Decoder<R>) -> Result<Self, Refusal> {
+        let entries = decoder.find_tag_unsigned_vec::<u64>(Tag::GeoKeyDirectoryTag);
+        let entries = entries.map_err(|error| broken("tag 34735", &error))?.unwrap_or_default();
+        // Four numbers each: key, where its value is stored (0 = here), count, value; the first four are a header.
+        let here = entries.chunks_exact(4).skip(1).filter(|entry| entry[1] == 0);
+        let keys = Self(here.map(|entry| (entry[0], entry[3])).collect());
+        if keys.get(key::MODEL_TYPE) == Some(key::MODEL_TYPE_GEOGRAPHIC) {
+            let found = "longitude and latitude in degrees (reproject it, e.g. to UTM)";
+            return Err(Refusal::new("tag 34735 (coordinates)", "projected metres", found));
+        }
+        match keys.get(key::LINEAR_UNITS) {
+            None | Some(key::LINEAR_UNITS_METRE) => Ok(keys),
+            Some(unit) => {
+                let found = format!("unit {unit}");
+                Err(Refusal::new("tag 34735 (coordinates)", "metres (unit 9001)", found))
+            }
+        }
+    }
+
+    fn get(&self, key: u64) -> Option<u64> {
+        self.0.iter().find(|(found, _)| *found == key).map(|(_, value)| *value)
+    }
+}

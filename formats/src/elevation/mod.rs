@@ -1,0 +1,164 @@
+//! Elevation files: `.npz`, GeoTIFF and 16-bit PNG with a scale.
+
+mod geotiff;
+mod npz;
+mod png;
+
+use std::path::Path;
+
+use terrain::{GridGeometry, GridMap};
+
+use crate::ConfigError;
+
+pub use png::PngScale;
+
+/// Most cells that a file may hold: 8192 x 8192, 256 MB of heights.
+const CELLS_MAX: usize = 1 << 26;
+
+/// Measured ground as a file holds it. The map frame's origin is the grid's south-west corner, x east, y north.
+#[derive(Clone, Debug)]
+pub struct ElevationFile {
+    /// Height of the ground at the cells' centres [m]; NaN where the file declares that nothing was measured.
+    pub elevation: GridMap<f32>,
+    /// Number of cells without a height.
+    pub n_holes: usize,
+    /// The grid's south-west corner in the file's own coordinates (GeoTIFF), else (0, 0).
+    pub file_south_west_m: [f64; 2],
+    /// What else the file says of each cell.
+    pub layers: ElevationLayers,
+}
+
+/// Optional layers, each of the elevation's geometry; NaN where the file knows nothing, never infinite.
+#[derive(Clone, Debug, Default)]
+pub struct ElevationLayers {
+    /// Highest return above the ground, `canopy_height` [m].
+    pub canopy_height_m: Option<GridMap<f32>>,
+    /// Share of returns 0.3 to 3 m above the ground, `low_veg_fraction` [-].
+    pub low_vegetation_fraction: Option<GridMap<f32>>,
+    /// Open water where above zero, `water` [-].
+    pub water: Option<GridMap<f32>>,
+    /// Distance to the nearest measurement of the ground, `ground_gap` [m].
+    pub ground_gap_m: Option<GridMap<f32>>,
+}
+
+/// An elevation file that cannot be used. Every message is one line.
+#[derive(Debug, thiserror::Error)]
+pub enum ElevationError {
+    /// The file could not be read.
+    #[error("{file}: expected a readable file, found: {source}")]
+    Unreadable {
+        /// Path as given.
+        file: String,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// A part of the file is wrong.
+    #[error("{file}: {field}: expected {expected}, found {found}")]
+    Field {
+        /// Path as given.
+        file: String,
+        /// Array, tag or property.
+        field: String,
+        /// What would do.
+        expected: String,
+        /// What was there.
+        found: String,
+    },
+    /// The sidecar that scales a PNG is wrong.
+    #[error(transparent)]
+    Sidecar(#[from] ConfigError),
+}
+
+/// Reads an elevation file; the format is told by the extension: `.npz`, `.tif`, `.tiff`, or `.png` with a scale in
+/// `<file>.toml` beside it (`hill.png.toml`).
+///
+/// Errors: unreadable or truncated file, unknown extension, missing array or tag, wrong shape or type, cell size
+/// that is not > 0, infinite height, no height at all.
+pub fn read_elevation(path: &Path) -> Result<ElevationFile, ElevationError> {
+    let extension = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
+    match extension.as_str() {
+        "npz" => open_and(path, npz::read),
+        "tif" | "tiff" => open_and(path, geotiff::read),
+        "png" => read_elevation_png(path, PngScale::beside(path)?),
+        _ => Err(Refusal::new("file name", "the extension npz, tif, tiff or png", path.display()).of(path)),
+    }
+}
+
+/// Reads a 16-bit PNG with a scale given by the caller. Errors: see [`read_elevation`].
+pub fn read_elevation_png(path: &Path, scale: PngScale) -> Result<ElevationFile, ElevationError> {
+    open_and(path, |file| png::read(file, scale))
+}
+
+type Reader = std::io::BufReader<std::fs::File>;
+
+fn open_and(
+    path: &Path,
+    read: impl FnOnce(Reader) -> Result<ElevationFile, Refusal>,
+) -> Result<ElevationFile, ElevationError> {
+    let open = || {
+        let file = std::fs::File::open(path)?;
+        if file.metadata()?.is_dir() {
+            return Err(std::io::ErrorKind::IsADirectory.into());
+        }
+        Ok(std::io::BufReader::new(file))
+    };
+    let file =
+        open().map_err(|source| ElevationError::Unreadable { file: path.display().to_string(), source })?;
+    read(file).map_err(|refusal| refusal.of(path))
+}
+
+/// What is wrong with a file, before its name is known.
+#[derive(Debug)]
+struct Refusal {
+    field: String,
+    expected: String,
+    found: String,
+}
+
+impl Refusal {
+    fn new(field: impl ToString, expected: impl ToString, found: impl ToString) -> Self {
+        Self { field: field.to_string(), expected: expected.to_string(), found: found.to_string() }
+    }
+
+    fn of(self, path: &Path) -> ElevationError {
+        let Self { field, expected, found } = self;
+        ElevationError::Field { file: path.display().to_string(), field, expected, found }
+    }
+}
+
+/// Refuses sizes that are no map or do not fit into memory.
+fn check_shape(field: &str, n_rows: usize, n_cols: usize) -> Result<(), Refusal> {
+    let fits = n_rows >= 2 && n_cols >= 2 && n_rows.checked_mul(n_cols).is_some_and(|n| n <= CELLS_MAX);
+    let expected = || format!("2 x 2 to {CELLS_MAX} cells");
+    if fits { Ok(()) } else { Err(Refusal::new(field, expected(), format!("{n_rows} x {n_cols}"))) }
+}
+
+fn check_cell(field: &str, cell_m: f64) -> Result<(), Refusal> {
+    let ok = cell_m.is_finite() && cell_m > 0.0;
+    if ok { Ok(()) } else { Err(Refusal::new(field, "a finite number of metres > 0", cell_m)) }
+}
+
+/// Builds the result from rows that start in the south; NaN is a hole, infinity is refused.
+fn assemble(field: &str, geometry: GridGeometry, heights_m: Vec<f32>) -> Result<ElevationFile, Refusal> {
+    let place = |index| {
+        let cell = geometry.cell(index);
+        format!("at row {}, column {} from the south-west", cell.row, cell.col)
+    };
+    if let Some(index) = heights_m.iter().position(|height| height.is_infinite()) {
+        let found = format!("{} {}", heights_m[index], place(index));
+        return Err(Refusal::new(field, "finite heights, or NaN where nothing was measured", found));
+    }
+    let n_holes = heights_m.iter().filter(|height| height.is_nan()).count();
+    if n_holes == heights_m.len() {
+        return Err(Refusal::new(field, "at least one measured cell", "holes only"));
+    }
+    let n_values = heights_m.len();
+    let elevation = GridMap::from_values(geometry, heights_m)
+        .ok_or_else(|| Refusal::new(field, format!("{} cells", geometry.n_cells()), n_values))?;
+    Ok(ElevationFile { elevation, n_holes, file_south_west_m: [0.0; 2], layers: ElevationLayers::default() })
+}
+
+/// Images start in the north, maps in the south.
+fn flip_rows<T: Copy>(values: &[T], n_cols: usize) -> impl Iterator<Item = T> + '_ {
+    values.chunks_exact(n_cols).rev().flatten().copied()
+}
