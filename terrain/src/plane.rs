@@ -24,6 +24,8 @@ pub(crate) struct Plane {
     pub gradient: [f64; 2],
     /// Sum of squared residuals.
     pub residual_sum: f64,
+    /// Variance of the height at the centre in units of one sample's variance.
+    pub leverage: f64,
     /// Number of samples.
     pub n: usize,
 }
@@ -50,6 +52,11 @@ impl PlaneSums {
         self.h / self.n
     }
 
+    /// How far the samples lie from the centre on average, as a vector's length.
+    pub(crate) fn distance_of_mean(&self) -> f64 {
+        (self.x / self.n).hypot(self.y / self.n)
+    }
+
     /// Standard deviation of the heights, with n degrees of freedom; `None` below two samples.
     pub(crate) fn deviation(&self) -> Option<f64> {
         (self.n >= 2.0).then(|| ((self.hh - self.h * self.h / self.n).max(0.0) / self.n).sqrt())
@@ -70,6 +77,8 @@ impl PlaneSums {
             height: mean_h - gradient[0] * mean_x - gradient[1] * mean_y,
             gradient,
             residual_sum: (shh - gradient[0] * sxh - gradient[1] * syh).max(0.0),
+            leverage: 1.0 / self.n
+                + (mean_x * mean_x * syy - 2.0 * mean_x * mean_y * sxy + mean_y * mean_y * sxx) / determinant,
             n: self.n(),
         })
     }

@@ -1,6 +1,6 @@
 //! Rectangles of cells that changed.
 
-use crate::GridGeometry;
+use crate::{Cell, GridGeometry};
 use std::ops::Range;
 
 /// A contiguous rectangle of cells of a window.
@@ -16,6 +16,17 @@ impl CellRegion {
     /// All cells of a window.
     pub fn whole(geometry: &GridGeometry) -> Self {
         Self { rows: 0..geometry.n_rows, cols: 0..geometry.n_cols }
+    }
+
+    /// One cell.
+    pub fn of_cell(cell: Cell) -> Self {
+        Self { rows: cell.row..cell.row + 1, cols: cell.col..cell.col + 1 }
+    }
+
+    /// Its cells, row by row from the south-west.
+    pub fn cells(&self) -> impl Iterator<Item = Cell> + use<> {
+        let cols = self.cols.clone();
+        self.rows.clone().flat_map(move |row| cols.clone().map(move |col| Cell { row, col }))
     }
 
     /// Number of cells.

@@ -48,8 +48,7 @@ pub fn slope_at<T: Height>(heights: &GridMap<T>, cell: Cell, radius: usize) -> S
     if centre_m.is_nan() {
         return Slope::UNKNOWN;
     }
-    let around =
-        CellRegion { rows: cell.row..cell.row + 1, cols: cell.col..cell.col + 1 }.grown(radius, geometry);
+    let around = CellRegion::of_cell(cell).grown(radius, geometry);
     let mut sums = PlaneSums::default();
     for row in around.rows {
         for col in around.cols.clone() {

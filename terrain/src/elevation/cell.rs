@@ -6,6 +6,8 @@ use crate::TerrainClass;
 /// A point in the map frame, sorted into its cell.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct CellPoint {
+    /// Columns, rows from the window's south-west corner [cells].
+    pub place: [f32; 2],
     pub height_m: f32,
     pub variance_m2: f32,
     pub class: TerrainClass,
@@ -103,16 +105,55 @@ impl CellState {
         let lowest_m = points.iter().fold(f32::INFINITY, |low, p| low.min(p.height_m));
         let above = if reference_m.is_nan() { lowest_m } else { reference_m };
         let touching = |p: &&CellPoint| p.height_m <= above + config.clearance_m;
-        let rigid = RigidStatistics::of(points.iter().filter(touching).filter(|p| p.is_rigid()));
+        let touching = points.iter().filter(touching);
+        let highest_m = touching.clone().fold(f32::NEG_INFINITY, |high, p| high.max(p.height_m));
+        self.fade_obstacle(highest_m, config);
+        let rigid = RigidStatistics::of(touching.clone().filter(|p| p.is_rigid()));
         let is_wall = rigid.span_m() > config.wall_span_m;
-        for point in points.iter().filter(touching) {
+        for point in touching {
             self.take_evidence(point, is_wall);
         }
         self.cap_evidence(config.evidence_cap);
         if !is_wall && rigid.n > 0.0 {
             self.fuse_ground(&rigid, config);
         }
-        self.contradictions = 0;
+    }
+
+    /// Takes in that a ray went through the cell at `height_m` and no point of the scan fell into it.
+    pub fn pass(&mut self, height_m: f32, config: &ElevationConfig) {
+        if self.ground == Ground::Unseen {
+            self.ceiling_m = self.ceiling_m.min(height_m);
+        } else if height_m < self.ground_m - self.margin_m(config) {
+            self.contradictions += 1;
+            if self.contradictions >= config.ghost_scans {
+                *self = Self { ceiling_m: height_m, ..Self::NEW };
+            }
+            return;
+        }
+        self.fade_obstacle(height_m, config);
+    }
+
+    /// Halves the evidence of an obstacle when scan after scan shows nothing above `highest_m`. Not at once:
+    /// sparse rays miss a thin trunk in one scan and hit it in the next.
+    fn fade_obstacle(&mut self, highest_m: f32, config: &ElevationConfig) {
+        if highest_m >= self.obstacle_top_m - config.visibility_margin_m {
+            self.contradictions = 0;
+            return;
+        }
+        self.contradictions = self.contradictions.saturating_add(1);
+        let evidence = &mut self.evidence[TerrainClass::Obstacle as usize];
+        if self.contradictions >= config.ghost_scans {
+            *evidence *= 0.5;
+        }
+        if *evidence < 1.0 {
+            *evidence = 0.0;
+            self.obstacle_top_m = f32::NEG_INFINITY;
+        }
+    }
+
+    /// How far below the ground's height something must be to contradict it.
+    fn margin_m(&self, config: &ElevationConfig) -> f32 {
+        config.visibility_margin_m + 3.0 * (self.variance_m2 + self.spread_m2).sqrt()
     }
 
     fn take_evidence(&mut self, point: &CellPoint, is_wall: bool) {
@@ -146,10 +187,8 @@ impl CellState {
 
     /// Follows the variance between a scan's points: up at once, down slowly, since a scan may see one side only.
     fn learn_spread(&mut self, rigid: &RigidStatistics) {
-        if rigid.n >= 2.0 {
-            let change_m2 = rigid.excess_m2() - self.spread_m2;
-            self.spread_m2 += change_m2 * if change_m2 > 0.0 { SURPRISE_GAIN } else { SINK_GAIN };
-        }
+        let change_m2 = rigid.excess_m2() - self.spread_m2;
+        self.spread_m2 += change_m2 * if change_m2 > 0.0 { SURPRISE_GAIN } else { SINK_GAIN };
     }
 
     /// Kalman update with the mean of a scan's ground points.

@@ -2,8 +2,10 @@
 
 mod cell;
 mod config;
+mod gaps;
 mod sorting;
 mod surfacing;
+mod visibility;
 
 pub use config::{ElevationConfig, ElevationConfigError};
 
@@ -71,6 +73,7 @@ pub struct ElevationMap {
     is_placed: bool,
     fused_at_ns: Option<u64>,
     points: SortedPoints,
+    rays: visibility::RayFloor,
     surfacing: surfacing::Scratch,
 }
 
@@ -87,6 +90,7 @@ impl ElevationMap {
             is_placed: false,
             fused_at_ns: None,
             points: SortedPoints::default(),
+            rays: visibility::RayFloor::default(),
             surfacing: surfacing::Scratch::default(),
         })
     }
@@ -209,7 +213,14 @@ impl ElevationMap {
         }
     }
 
+    /// Lets the rays contradict what they passed, then the points tell what they hit.
     fn fuse_points(&mut self) {
+        self.rays.cast(&self.points, self.states.geometry(), &self.config);
+        for (cell, &floor_m) in self.rays.floors_m.iter().enumerate() {
+            if floor_m < f32::INFINITY && !self.points.is_hit(cell) {
+                self.states.values_mut()[cell].pass(floor_m, &self.config);
+            }
+        }
         for &cell in &self.points.hit_cells {
             let reference_m = self.surface.values()[cell as usize].height_m;
             let state = &mut self.states.values_mut()[cell as usize];

@@ -46,6 +46,11 @@ impl SortedPoints {
         }
     }
 
+    /// Whether a point of the scan fell into the cell.
+    pub fn is_hit(&self, cell: usize) -> bool {
+        self.counts[cell] > 0
+    }
+
     /// The points of a cell that was hit.
     pub fn in_cell(&self, cell: u32) -> &[CellPoint] {
         let end = self.ends[cell as usize] as usize;
@@ -58,6 +63,7 @@ impl SortedPoints {
         self.origin_m = [origin.x, origin.y, origin.z];
         (self.n_rejected_non_finite, self.n_out_of_window) = (0, 0);
         self.placed.clear();
+        let ([west_m, south_m], edge_m) = (geometry.south_west_m(), geometry.resolution_m);
         for point in &scan.points {
             if !point.position_m.iter().all(|v| v.is_finite()) {
                 self.n_rejected_non_finite += 1;
@@ -76,8 +82,9 @@ impl SortedPoints {
             let ray: Vector3<f64> = position - origin;
             let std_m = config.noise_floor_m + config.noise_per_range * ray.norm();
             let variance_m2 = (std_m * std_m) as f32;
-            self.placed
-                .push((cell, CellPoint { height_m: position.z as f32, variance_m2, class: point.class }));
+            let place = [(position.x - west_m) / edge_m, (position.y - south_m) / edge_m].map(|v| v as f32);
+            let height_m = position.z as f32;
+            self.placed.push((cell, CellPoint { place, height_m, variance_m2, class: point.class }));
         }
     }
 }
