@@ -2,6 +2,7 @@
 //! and the drive log.
 
 mod decision;
+mod drive_log;
 pub mod effect;
 pub mod lanes;
 mod model;
@@ -9,6 +10,7 @@ mod motion;
 mod vehicle;
 
 pub use decision::{Decision, HoldReason, StopReason};
+pub use drive_log::{Column, DriveLog, DriveLogError, DriveRow, Run};
 pub use effect::Effect;
 pub use model::{GroundSample, LaneState, Model, ModelError, Rates, Stepper};
 pub use motion::{Command, ImuSample, Odometry, State};
