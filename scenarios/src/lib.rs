@@ -4,13 +4,22 @@
 
 mod arena;
 mod friction;
+mod motion;
 mod random;
 mod rock_field;
+mod sensor_imu;
+mod sensor_odometry;
+mod sensor_range;
+mod skyline;
 mod world;
 
 pub use arena::{ARENA_GOAL_M, ARENA_START, ArenaConfig, ArenaError, arena};
 pub use friction::Stribeck;
+pub use motion::Motion;
 pub use rock_field::{
     MAPS_PER_SPLIT, RockFieldConfig, RockFieldError, RockMap, RockPopulation, Split, rock_field,
 };
+pub use sensor_imu::{IMU_PERIOD_NS, Imu, ImuConfig};
+pub use sensor_odometry::{OdometryConfig, OdometrySensor};
+pub use sensor_range::{RangeSensor, RangeSensorConfig, RangeSensorError};
 pub use world::{Bounds, Patch, World, WorldError};

@@ -284,6 +284,21 @@ impl World {
         (squares / n - (sum / n) * (sum / n)).max(0.0).sqrt()
     }
 
+    /// How much the ground around a point departs from a plane [m]: root mean square over three by three points
+    /// `spacing_m` apart.
+    pub fn roughness_m(&self, x_m: f64, y_m: f64, spacing_m: f64) -> f64 {
+        const STEPS: [f64; 3] = [-1.0, 0.0, 1.0];
+        let rows = STEPS.map(|v| STEPS.map(|u| self.height_m(x_m + u * spacing_m, y_m + v * spacing_m)));
+        let at = |j: usize, i: usize| rows[j][i];
+        let mean_m = rows.as_flattened().iter().sum::<f64>() / 9.0;
+        // Least squares on a symmetric stencil: sums of +-1 weighted heights over the six points that count.
+        let east = (0..3).map(|j| at(j, 2) - at(j, 0)).sum::<f64>() / 6.0;
+        let north = (0..3).map(|i| at(2, i) - at(0, i)).sum::<f64>() / 6.0;
+        let residual = |j: usize, i: usize| at(j, i) - mean_m - east * STEPS[i] - north * STEPS[j];
+        let squares: f64 = (0..9).map(|k| residual(k / 3, k % 3).powi(2)).sum();
+        (squares / 9.0).sqrt()
+    }
+
     #[inline]
     fn square(&self, x_m: f64, y_m: f64) -> Square {
         let geometry = self.heights.geometry();
