@@ -50,13 +50,15 @@ pub fn slope_at<T: Height>(heights: &GridMap<T>, cell: Cell, radius: usize) -> S
     }
     let around = CellRegion::of_cell(cell).grown(radius, geometry);
     let mut sums = PlaneSums::default();
+    let west = around.cols.start as f64 - cell.col as f64;
     for row in around.rows {
-        for col in around.cols.clone() {
-            let height_m = heights[Cell { row, col }].height_m();
+        let (dy, mut dx) = (row as f64 - cell.row as f64, west - 1.0);
+        for value in &heights.values()[row * geometry.n_cols..][around.cols.clone()] {
+            dx += 1.0;
+            let height_m = value.height_m();
             if !height_m.is_nan() {
-                let (dx, dy) = (col as f64 - cell.col as f64, row as f64 - cell.row as f64);
                 // Relative to the centre, so that no digits are lost on a map far above the sea.
-                sums.add(dx, dy, f64::from(height_m) - f64::from(centre_m));
+                sums.add(dx, dy, f64::from(height_m - centre_m));
             }
         }
     }

@@ -1,60 +1,77 @@
 //! Ground that no point tells of, inferred from what was seen around it.
 
 use crate::plane::PlaneSums;
-use crate::{Cell, CellRegion, GridGeometry};
+use crate::{Cell, CellRegion, GridGeometry, Knowledge, SurfaceCell, TerrainClass};
 
 /// Slope that unseen ground may well have; it makes extrapolated heights uncertain [-].
 const POSSIBLE_SLOPE: f64 = 0.3;
 
-/// Heights that inference may lean on, one per cell; NaN where there is none.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Support {
-    pub heights_m: Vec<f32>,
-    pub variances_m2: Vec<f32>,
-}
-
-/// A height inferred from neighbours.
+/// What neighbours suggest for a cell.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Inferred {
-    pub height_m: f32,
-    pub variance_m2: f32,
-    /// The part of the variance that the neighbours themselves have, on average [m2].
+    /// The neighbours' mean in class and vegetation, their plane or mean in height.
+    pub surface: SurfaceCell,
+    /// The part of the height's variance that the neighbours themselves have, on average [m2].
     pub seen_m2: f32,
 }
 
-impl Support {
-    /// The height that the known cells within `radius` along x and y suggest for `cell`; `None` without any.
-    ///
-    /// Their plane of least squares where it determines the height here better than a single cell would
-    /// (leverage up to one), with the variance of its prediction. Otherwise their mean, with the variance
-    /// that an unknown slope adds over the distance to them.
-    pub fn infer(&self, geometry: &GridGeometry, cell: Cell, radius: usize) -> Option<Inferred> {
-        let around = CellRegion::of_cell(cell).grown(radius, geometry);
-        let mut sums = PlaneSums::default();
-        let mut variance_sum_m2 = 0.0;
-        let mut datum_m = f32::NAN;
-        for row in around.rows {
-            let first = row * geometry.n_cols;
-            for col in around.cols.clone() {
-                let height_m = self.heights_m[first + col];
-                if height_m.is_nan() {
-                    continue;
-                }
-                datum_m = if datum_m.is_nan() { height_m } else { datum_m };
-                let (dx, dy) = (col as f64 - cell.col as f64, row as f64 - cell.row as f64);
-                sums.add(dx, dy, f64::from(height_m) - f64::from(datum_m));
-                variance_sum_m2 += f64::from(self.variances_m2[first + col]);
+/// The surface that the known cells within `radius` along x and y suggest for `cell`; `None` without any.
+///
+/// The height is that of their plane of least squares where it determines the height here better than a
+/// single cell would (leverage up to one), with the variance of its prediction. Otherwise it is their mean,
+/// with the variance that an unknown slope adds over the distance to them. `datum_m` is any height nearby:
+/// squares are taken relative to it.
+pub(super) fn infer(
+    surface: &[SurfaceCell],
+    geometry: &GridGeometry,
+    cell: Cell,
+    radius: usize,
+    datum_m: f32,
+) -> Option<Inferred> {
+    let around = CellRegion::of_cell(cell).grown(radius, geometry);
+    let mut sums = PlaneSums::default();
+    let mut cover = CoverSums::default();
+    let west = around.cols.start as f64 - cell.col as f64;
+    for row in around.rows {
+        let (dy, mut dx) = (row as f64 - cell.row as f64, west - 1.0);
+        for neighbour in &surface[row * geometry.n_cols..][around.cols.clone()] {
+            dx += 1.0;
+            if !neighbour.height_m.is_nan() {
+                sums.add(dx, dy, f64::from(neighbour.height_m - datum_m));
+                cover.add(neighbour);
             }
         }
-        (sums.n() > 0).then(|| {
-            let seen_m2 = variance_sum_m2 / sums.n() as f64;
-            let (rise_m, inferred_m2) = predict(&sums, geometry.resolution_m);
-            Inferred {
-                height_m: (f64::from(datum_m) + rise_m) as f32,
-                variance_m2: (seen_m2 + inferred_m2) as f32,
-                seen_m2: seen_m2 as f32,
-            }
-        })
+    }
+    (sums.n() > 0).then(|| {
+        let per_cell = 1.0 / sums.n() as f32;
+        let seen_m2 = cover.variance_m2 * per_cell;
+        let (rise_m, inferred_m2) = predict(&sums, geometry.resolution_m);
+        let surface = SurfaceCell {
+            height_m: datum_m + rise_m as f32,
+            height_variance_m2: seen_m2 + inferred_m2 as f32,
+            vegetation_height_m: cover.vegetation_m * per_cell,
+            class_probability: cover.probability.map(|sum| sum * per_cell),
+            knowledge: Knowledge::Interpolated,
+        };
+        Inferred { surface, seen_m2 }
+    })
+}
+
+/// Sums over neighbours of all but the height.
+#[derive(Default)]
+struct CoverSums {
+    variance_m2: f32,
+    vegetation_m: f32,
+    probability: [f32; TerrainClass::COUNT],
+}
+
+impl CoverSums {
+    fn add(&mut self, cell: &SurfaceCell) {
+        self.variance_m2 += cell.height_variance_m2;
+        self.vegetation_m += cell.vegetation_height_m;
+        for (sum, p) in self.probability.iter_mut().zip(&cell.class_probability) {
+            *sum += p;
+        }
     }
 }
 
@@ -83,19 +100,20 @@ impl Enclosure {
     /// All four quadrants hold a marked cell.
     pub const ALL: u8 = 0b1111;
 
-    pub fn find(&mut self, marked: &[f32], geometry: &GridGeometry, radius: usize) {
+    /// Marked are the cells with a known height.
+    pub fn find(&mut self, surface: &[SurfaceCell], geometry: &GridGeometry, radius: usize) {
         let (n_rows, n_cols) = (geometry.n_rows, geometry.n_cols);
         for buffer in [&mut self.sides, &mut self.quadrants] {
             buffer.clear();
             buffer.resize(geometry.n_cells(), 0);
         }
         for row in 0..n_rows {
-            let marked = &marked[row * n_cols..][..n_cols];
+            let marked = &surface[row * n_cols..][..n_cols];
             let sides = &mut self.sides[row * n_cols..][..n_cols];
             for shift in 0..=radius.min(n_cols - 1) {
                 for col in shift..n_cols {
-                    sides[col] |= u8::from(!marked[col - shift].is_nan());
-                    sides[col - shift] |= 2 * u8::from(!marked[col].is_nan());
+                    sides[col] |= u8::from(marked[col - shift].is_known());
+                    sides[col - shift] |= 2 * u8::from(marked[col].is_known());
                 }
             }
         }

@@ -10,7 +10,7 @@ mod visibility;
 pub use config::{ElevationConfig, ElevationConfigError};
 
 use crate::region::LatticeBounds;
-use crate::{CellRegion, Footprint, GridGeometry, GridMap, Pose, Scan, SurfaceCell};
+use crate::{CellRegion, Footprint, GridGeometry, GridMap, Pose, Scan, SurfaceCell, TerrainClass};
 use cell::{CellState, Ground};
 use nalgebra::Point3;
 use sorting::SortedPoints;
@@ -157,6 +157,7 @@ impl ElevationMap {
                 // The plane through the contact point, square to the body's z axis.
                 let rise_m = (normal.x * (x_m - contact.x) + normal.y * (y_m - contact.y)) / normal.z;
                 state.ground = Ground::Assumed;
+                state.evidence[TerrainClass::Open as usize] += 1.0;
                 state.ground_m = (contact.z - rise_m) as f32;
                 state.variance_m2 = (assumed.height_std_m * assumed.height_std_m) as f32;
             }

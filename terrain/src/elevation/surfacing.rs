@@ -1,16 +1,15 @@
 //! From what is remembered of the cells to the surface that consumers read.
 
 use super::cell::{CellState, Ground};
-use super::gaps::{Enclosure, Inferred, Support};
+use super::gaps::{Enclosure, Inferred, infer};
 use super::{ElevationConfig, ElevationMap};
-use crate::{CellRegion, GridMap, Knowledge, SurfaceCell, TerrainClass};
+use crate::{CellRegion, GridMap, Knowledge, SurfaceCell};
 
 /// Buffers kept from scan to scan.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Scratch {
     next: Vec<SurfaceCell>,
-    support: Support,
-    covered: Vec<(u32, Inferred)>,
+    inferred: Vec<(u32, SurfaceCell)>,
     enclosure: Enclosure,
 }
 
@@ -46,71 +45,66 @@ impl Scratch {
     fn draw(&mut self, states: &GridMap<CellState>, config: &ElevationConfig) {
         self.next.clear();
         self.next.extend(states.values().iter().map(seen_surface));
-        self.support.heights_m.clear();
-        self.support.heights_m.extend(self.next.iter().map(|cell| cell.height_m));
-        self.support.variances_m2.clear();
-        self.support.variances_m2.extend(self.next.iter().map(|cell| cell.height_variance_m2));
-        self.uncover(states, config);
-        self.fill_gaps(states, config);
+        let datum_m = self.next.iter().find(|cell| cell.is_known()).map_or(0.0, |cell| cell.height_m);
+        self.uncover(states, config, datum_m);
+        self.fill_gaps(states, config, datum_m);
     }
 
     /// Infers the ground where only plants or obstacles were seen: from ground within twice the gap radius,
     /// else from the lowest plant within the gap radius. It is never above anything that was seen there.
-    fn uncover(&mut self, states: &GridMap<CellState>, config: &ElevationConfig) {
-        let geometry = states.geometry();
-        let radius = config.gap_radius_cells();
-        self.covered.clear();
+    fn uncover(&mut self, states: &GridMap<CellState>, config: &ElevationConfig, datum_m: f32) {
+        let (geometry, radius) = (states.geometry(), config.gap_radius_cells());
+        self.inferred.clear();
         for (index, state) in states.values().iter().enumerate() {
             if state.ground != Ground::Unseen || !state.was_hit() {
                 continue;
             }
             let cell = geometry.cell(index);
-            let inferred = self.support.infer(geometry, cell, 2 * radius);
-            let around = CellRegion::of_cell(cell).grown(radius, geometry);
-            let Some(mut inferred) = inferred.or_else(|| lowest_plant(states, &around, config)) else {
-                continue;
+            let ground = infer(&self.next, geometry, cell, 2 * radius, datum_m)
+                .map(|inferred| (inferred.surface.height_m, inferred.surface.height_variance_m2))
+                .or_else(|| lowest_plant(states, &CellRegion::of_cell(cell).grown(radius, geometry), config));
+            let Some((height_m, height_variance_m2)) = ground else { continue };
+            let height_m = height_m.min(state.lowest_m).min(state.ceiling_m);
+            let vegetation_height_m = (state.vegetation_top_m - height_m).max(0.0);
+            let knowledge = Knowledge::Interpolated;
+            let class_probability = state.class_probability();
+            let surface = SurfaceCell {
+                height_m,
+                height_variance_m2,
+                vegetation_height_m,
+                class_probability,
+                knowledge,
             };
-            inferred.height_m = inferred.height_m.min(state.lowest_m).min(state.ceiling_m);
-            self.covered.push((index as u32, inferred));
+            self.inferred.push((index as u32, surface));
         }
-        for &(index, inferred) in &self.covered {
-            let index = index as usize;
-            self.support.heights_m[index] = inferred.height_m;
-            self.support.variances_m2[index] = inferred.variance_m2;
-            self.next[index] = SurfaceCell {
-                height_m: inferred.height_m,
-                height_variance_m2: inferred.variance_m2,
-                vegetation_height_m: (states.values()[index].vegetation_top_m - inferred.height_m).max(0.0),
-                knowledge: Knowledge::Interpolated,
-                ..self.next[index]
-            };
-        }
+        self.settle();
     }
 
-    /// Fills cells that are enclosed by seen ones, unless a ray passed below the height they would get: then
+    /// Fills cells that are enclosed by known ones, unless a ray passed below the height they would get: then
     /// there is a ditch.
-    fn fill_gaps(&mut self, states: &GridMap<CellState>, config: &ElevationConfig) {
+    fn fill_gaps(&mut self, states: &GridMap<CellState>, config: &ElevationConfig, datum_m: f32) {
         let (geometry, radius) = (states.geometry(), config.gap_radius_cells());
-        self.enclosure.find(&self.support.heights_m, geometry, radius);
-        for (index, state) in states.values().iter().enumerate() {
-            let is_gap = !self.next[index].is_known() && !state.was_hit();
-            if !is_gap || self.enclosure.quadrants[index] != Enclosure::ALL {
+        self.enclosure.find(&self.next, geometry, radius);
+        self.inferred.clear();
+        for (index, quadrants) in self.enclosure.quadrants.iter().enumerate() {
+            let state = &states.values()[index];
+            if *quadrants != Enclosure::ALL || self.next[index].is_known() || state.was_hit() {
                 continue;
             }
-            let cell = geometry.cell(index);
-            let Some(inferred) = self.support.infer(geometry, cell, radius) else { continue };
-            let tolerance_m = GAP_MARGIN_SHARE * config.visibility_margin_m + 2.0 * inferred.seen_m2.sqrt();
-            if inferred.height_m <= state.ceiling_m + tolerance_m {
-                let around = CellRegion::of_cell(cell).grown(radius, geometry);
-                let (class_probability, vegetation_height_m) = mean_cover(states, &self.next, &around);
-                self.next[index] = SurfaceCell {
-                    height_m: inferred.height_m,
-                    height_variance_m2: inferred.variance_m2,
-                    vegetation_height_m,
-                    class_probability,
-                    knowledge: Knowledge::Interpolated,
-                };
+            let inferred = infer(&self.next, geometry, geometry.cell(index), radius, datum_m);
+            let Some(Inferred { surface, seen_m2 }) = inferred else { continue };
+            let tolerance_m = GAP_MARGIN_SHARE * config.visibility_margin_m + 2.0 * seen_m2.sqrt();
+            if surface.height_m <= state.ceiling_m + tolerance_m {
+                self.inferred.push((index as u32, surface));
             }
+        }
+        self.settle();
+    }
+
+    /// Enters what was inferred; only now, so that nothing is inferred from what was inferred beside it.
+    fn settle(&mut self) {
+        for &(index, surface) in &self.inferred {
+            self.next[index as usize] = surface;
         }
     }
 }
@@ -132,33 +126,15 @@ fn seen_surface(state: &CellState) -> SurfaceCell {
     }
 }
 
-/// The lowest plant or obstacle point among cells; all that is known in a meadow without a bare spot.
+/// Height and variance of the lowest plant or obstacle point among cells: all that is known of the ground in
+/// a meadow without a bare spot.
 fn lowest_plant(
     states: &GridMap<CellState>,
     around: &CellRegion,
     config: &ElevationConfig,
-) -> Option<Inferred> {
+) -> Option<(f32, f32)> {
     let height_m = around.cells().fold(f32::INFINITY, |low_m, cell| low_m.min(states[cell].lowest_m));
-    let std_m = config.hidden_ground_std_m;
-    height_m.is_finite().then_some(Inferred { height_m, variance_m2: std_m * std_m, seen_m2: std_m * std_m })
-}
-
-/// Mean class probability and vegetation height of the cells in which something was seen.
-fn mean_cover(
-    states: &GridMap<CellState>,
-    surface: &[SurfaceCell],
-    around: &CellRegion,
-) -> ([f32; TerrainClass::COUNT], f32) {
-    let (mut n, mut probability, mut height_m) = (0.0_f32, [0.0; TerrainClass::COUNT], 0.0);
-    for cell in around.cells().filter(|&cell| states[cell].was_hit()) {
-        let seen = &surface[states.geometry().index(cell)];
-        n += 1.0;
-        height_m += seen.vegetation_height_m;
-        for (sum, p) in probability.iter_mut().zip(&seen.class_probability) {
-            *sum += p;
-        }
-    }
-    if n > 0.0 { (probability.map(|sum| sum / n), height_m / n) } else { (probability, 0.0) }
+    height_m.is_finite().then_some((height_m, config.hidden_ground_std_m * config.hidden_ground_std_m))
 }
 
 fn differs(published: &SurfaceCell, next: &SurfaceCell, step_m: f32) -> bool {

@@ -4,8 +4,6 @@ use super::ElevationConfig;
 use super::sorting::SortedPoints;
 use crate::GridGeometry;
 
-/// A ray that runs through less of a cell than this says nothing about it [cells].
-const SHORTEST_CHORD: f32 = 0.5;
 /// Standard deviations of a ray's height that its bound stays on the safe side.
 const RAY_SAFETY: f64 = 2.0;
 
@@ -52,49 +50,31 @@ impl RayFloor {
 }
 
 impl Ray {
-    /// Calls `visit` with each cell that the ray crosses and the ray's greatest height there, but not with
-    /// the cell in which it ends. The end lies in the window, the start may lie outside.
+    /// Calls `visit` with cells that the ray crosses between those of its ends, and the ray's greatest height there.
+    ///
+    /// Walks along the axis that the ray advances on most, and of each column (or row) visits the one cell
+    /// that holds the ray's middle there: a ray that only clips a cell's corner says nothing about it.
     fn for_each_cell(&self, geometry: &GridGeometry, mut visit: impl FnMut(usize, f32)) {
-        let size = [geometry.n_cols, geometry.n_rows];
         let along: [f32; 3] = std::array::from_fn(|axis| self.end[axis] - self.start[axis]);
-        let length = along[0].hypot(along[1]);
-        let mut entry =
-            (0..2).map(|axis| self.share_outside(axis, along[axis], size[axis])).fold(0.0, f32::max);
-        let mut cell = [0_usize; 2];
-        let mut next_crossing = [f32::INFINITY; 2];
-        let per_cell = along.map(|a| 1.0 / a.abs());
-        for axis in 0..2 {
-            let place = self.start[axis] + entry * along[axis];
-            cell[axis] = (place.max(0.0) as usize).min(size[axis] - 1);
-            let border = cell[axis] as f32 + if along[axis] > 0.0 { 1.0 } else { 0.0 };
-            if along[axis] != 0.0 {
-                next_crossing[axis] = (border - self.start[axis]) / along[axis];
+        let major = usize::from(along[1].abs() > along[0].abs());
+        let minor = 1 - major;
+        let size = [geometry.n_cols, geometry.n_rows];
+        let stride = [1, geometry.n_cols];
+        let (first, last) = if along[major] > 0.0 {
+            (self.start[major].floor() + 1.0, self.end[major].floor())
+        } else {
+            (self.end[major].floor() + 1.0, self.start[major].floor())
+        };
+        let inside = |place: f32| place.clamp(0.0, size[major] as f32) as usize;
+        let per_step = 1.0 / along[major];
+        let (minor_step, height_step) = (along[minor] * per_step, along[2] * per_step);
+        for place in inside(first)..inside(last) {
+            let middle = place as f32 + 0.5 - self.start[major];
+            let aside = self.start[minor] + middle * minor_step;
+            if aside >= 0.0 && aside < size[minor] as f32 {
+                let height_m = self.start[2] + middle * height_step + 0.5 * height_step.abs();
+                visit(place * stride[major] + aside as usize * stride[minor], height_m);
             }
         }
-        loop {
-            let axis = usize::from(next_crossing[1] < next_crossing[0]);
-            let exit = next_crossing[axis];
-            if exit >= 1.0 {
-                return;
-            }
-            if (exit - entry) * length >= SHORTEST_CHORD {
-                let share = if along[2] > 0.0 { exit } else { entry };
-                visit(cell[1] * size[0] + cell[0], self.start[2] + share * along[2]);
-            }
-            let stepped = cell[axis].checked_add_signed(if along[axis] > 0.0 { 1 } else { -1 });
-            match stepped.filter(|&place| place < size[axis]) {
-                Some(place) => cell[axis] = place,
-                None => return,
-            }
-            entry = exit;
-            next_crossing[axis] += per_cell[axis];
-        }
-    }
-
-    /// Share of the ray that lies before the window along one axis.
-    fn share_outside(&self, axis: usize, along: f32, size: usize) -> f32 {
-        let start = self.start[axis];
-        let outside = if along > 0.0 { -start } else { start - size as f32 };
-        if outside > 0.0 { outside / along.abs() } else { 0.0 }
     }
 }
