@@ -1,1 +1,31 @@
-//! See Cargo.toml.
+//! The physics prior: what the shape and the cover of the ground say about traction and attitude before
+//! anything was learned (PIETRA, section IV-C), as distributions of one pose and as a risk map.
+//!
+//! Readings of the paper, and what goes beyond it:
+//! - The slope of equation 15 is the absolute gradient along the heading under each wheel of a level vehicle;
+//!   "corresponds to 30 degrees" means the tangent. Loose ground counts as dirt.
+//! - Equation 17 takes the absolute angle; roll from the wheel pairs of each axle, pitch from those of each side.
+//! - A value becomes a distribution by splitting it between the two bins whose values enclose it, so that its
+//!   mean is the value and the risk map changes continuously with the ground.
+//! - The uniform distribution of equation 18 is replaced, for roll and pitch, by a triangle around the estimate;
+//!   the variance of the heights widens both.
+//! - A wheel over unknown ground has a low traction of its own, and its pairs an angle anywhere from level to a
+//!   moderate lean; a footprint that is mostly unknown counts as unknown under every wheel. The frontier can
+//!   therefore be approached, but known ground is preferred.
+//! - Ground between the wheels that rises above the plane of the contacts by more than the ground clearance
+//!   leaves the vehicle high-centred: the traction estimates fall to nothing.
+
+mod belief;
+mod config;
+mod equations;
+mod ground;
+mod lattice;
+mod lengths;
+mod pose;
+mod poses;
+mod prior_map;
+mod stencil;
+
+pub use belief::PriorBelief;
+pub use config::{PriorConfig, PriorConfigError};
+pub use prior_map::{Assumption, PriorMap, PriorMapError};

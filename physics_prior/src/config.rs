@@ -1,0 +1,145 @@
+//! What the physics prior assumes.
+
+use bicycle::Geometry;
+use serde::{Deserialize, Serialize};
+
+/// Parameters of the physics prior (PIETRA, equations 15 to 18, and the extensions stated here).
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct PriorConfig {
+    /// Share of the spread distribution in equation 18, in [0, 1].
+    pub uniform_weight: f64,
+    /// Slope along the heading at which linear traction is gone (equation 15) [rad].
+    pub linear_slope_max_rad: f64,
+    /// Slope along the heading at which angular traction is gone (equation 15) [rad].
+    pub angular_slope_max_rad: f64,
+    /// Height of vegetation at which traction is gone (equation 16) [m]. The paper takes 0.2 m for wheels of
+    /// 0.15 m diameter; see [`PriorConfig::for_vehicle`].
+    pub vegetation_height_max_m: f64,
+    /// Pseudo-count of the prior in a Dirichlet posterior; the paper takes the number of bins.
+    pub evidence: f64,
+    /// Half-width of the triangle around the estimated angle that takes the place of the uniform distribution
+    /// for roll and pitch [rad]. Over the whole range of 60 degrees, the uniform one would break a limit of
+    /// 30 degrees on level ground.
+    pub attitude_spread_rad: f64,
+    /// A footprint of which more than this share is unknown is judged as unknown ground, in [0, 1].
+    pub unknown_share_max: f64,
+    /// Traction, linear and angular, expected of a wheel on unknown ground: low, so that known ground is
+    /// preferred; not zero, so that the frontier can be approached, in [0, 1].
+    pub unknown_traction: f64,
+    /// Largest |roll| and |pitch| expected of unknown ground [rad]; a triangle falls from zero to here. Below
+    /// the vehicle's limits the frontier can be approached at every CVaR level.
+    pub unknown_attitude_rad: f64,
+    /// Added to the ground between the wheels before it is held against the ground clearance [m].
+    pub belly_margin_m: f64,
+    /// Traction of a vehicle whose belly would touch the ground is at most this, in [0, 1]; 1 turns the
+    /// check off.
+    pub high_centred_traction: f64,
+    /// Widens the footprint that must not touch an obstacle, on every side [m].
+    pub obstacle_margin_m: f64,
+}
+
+impl Default for PriorConfig {
+    fn default() -> Self {
+        Self {
+            uniform_weight: 0.2,
+            linear_slope_max_rad: 30f64.to_radians(),
+            angular_slope_max_rad: 15f64.to_radians(),
+            vegetation_height_max_m: 0.2,
+            evidence: traversability::N_BINS as f64,
+            attitude_spread_rad: 15f64.to_radians(),
+            unknown_share_max: 0.5,
+            unknown_traction: 0.3,
+            unknown_attitude_rad: 25f64.to_radians(),
+            belly_margin_m: 0.0,
+            high_centred_traction: 0.0,
+            obstacle_margin_m: 0.0,
+        }
+    }
+}
+
+/// A parameter that makes no sense.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("{field}: expected {expected}, found {found}")]
+pub struct PriorConfigError {
+    /// Name of the field.
+    pub field: &'static str,
+    /// The range that would do.
+    pub expected: &'static str,
+    /// The value that was given.
+    pub found: f64,
+}
+
+impl PriorConfig {
+    /// The defaults with the height of vegetation scaled to the wheels: the paper's 0.2 m for 0.15 m diameter.
+    pub fn for_vehicle(geometry: &Geometry) -> Self {
+        let per_diameter = 0.2 / 0.15;
+        Self { vegetation_height_max_m: per_diameter * 2.0 * geometry.wheel_radius_m, ..Self::default() }
+    }
+
+    /// Refuses values outside their documented ranges.
+    pub fn validate(&self) -> Result<(), PriorConfigError> {
+        let shares = [
+            ("uniform_weight", self.uniform_weight),
+            ("unknown_share_max", self.unknown_share_max),
+            ("unknown_traction", self.unknown_traction),
+            ("high_centred_traction", self.high_centred_traction),
+        ];
+        check(&shares, "a number from 0 to 1", |v| (0.0..=1.0).contains(&v))?;
+        let angles = [
+            ("linear_slope_max_rad", self.linear_slope_max_rad),
+            ("angular_slope_max_rad", self.angular_slope_max_rad),
+            ("attitude_spread_rad", self.attitude_spread_rad),
+            ("unknown_attitude_rad", self.unknown_attitude_rad),
+        ];
+        check(&angles, "an angle in radians above 0 and below pi/2", |v| {
+            v > 0.0 && v < std::f64::consts::FRAC_PI_2
+        })?;
+        let positive =
+            [("vegetation_height_max_m", self.vegetation_height_max_m), ("evidence", self.evidence)];
+        check(&positive, "a finite number > 0", |v| v > 0.0)?;
+        check(&[("belly_margin_m", self.belly_margin_m)], "a finite number", |_| true)?;
+        check(&[("obstacle_margin_m", self.obstacle_margin_m)], "a finite number >= 0", |v| v >= 0.0)
+    }
+}
+
+fn check(
+    fields: &[(&'static str, f64)],
+    expected: &'static str,
+    allowed: impl Fn(f64) -> bool,
+) -> Result<(), PriorConfigError> {
+    match fields.iter().find(|(_, value)| !(value.is_finite() && allowed(*value))) {
+        Some(&(field, found)) => Err(PriorConfigError { field, expected, found }),
+        None => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_defaults_are_valid() {
+        assert_eq!(PriorConfig::default().validate(), Ok(()));
+    }
+
+    #[test]
+    fn a_wrong_value_is_refused_with_field_range_and_number() {
+        let default = PriorConfig::default();
+        let wrong = [
+            (PriorConfig { uniform_weight: 1.1, ..default }, "uniform_weight"),
+            (PriorConfig { linear_slope_max_rad: 0.0, ..default }, "linear_slope_max_rad"),
+            (PriorConfig { angular_slope_max_rad: f64::NAN, ..default }, "angular_slope_max_rad"),
+            (PriorConfig { vegetation_height_max_m: -0.2, ..default }, "vegetation_height_max_m"),
+            (PriorConfig { evidence: 0.0, ..default }, "evidence"),
+            (PriorConfig { unknown_share_max: -0.1, ..default }, "unknown_share_max"),
+            (PriorConfig { belly_margin_m: f64::INFINITY, ..default }, "belly_margin_m"),
+            (PriorConfig { obstacle_margin_m: -1.0, ..default }, "obstacle_margin_m"),
+        ];
+        for (config, field) in wrong {
+            assert_eq!(config.validate().unwrap_err().field, field);
+        }
+        let message = PriorConfig { uniform_weight: 1.1, ..default }.validate().unwrap_err().to_string();
+        assert_eq!(message, "uniform_weight: expected a number from 0 to 1, found 1.1");
+    }
+}

@@ -1,0 +1,37 @@
+//! The vehicle as the prior sees it.
+
+use bicycle::Geometry;
+use terrain::{Footprint, WheelLayout};
+
+/// Where the vehicle touches, covers and overhangs the ground.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Lengths {
+    pub wheels: WheelLayout,
+    /// Must not touch an obstacle.
+    pub footprint: Footprint,
+    /// Between the wheels, where the ground may not rise above the clearance: from axle to axle and half a
+    /// wheel's radius beyond them, and as far short of the wheels' middle planes, about a tyre's half width.
+    pub belly: Footprint,
+    pub ground_clearance_m: f32,
+    pub wheel_radius_m: f64,
+}
+
+impl Lengths {
+    pub fn new(geometry: &Geometry, obstacle_margin_m: f64) -> Self {
+        Self {
+            wheels: WheelLayout { wheelbase_m: geometry.wheelbase_m, track_m: geometry.track_m },
+            footprint: Footprint {
+                front_m: geometry.length_m - geometry.rear_overhang_m + obstacle_margin_m,
+                rear_m: geometry.rear_overhang_m + obstacle_margin_m,
+                half_width_m: 0.5 * geometry.width_m + obstacle_margin_m,
+            },
+            belly: Footprint {
+                front_m: geometry.wheelbase_m + 0.5 * geometry.wheel_radius_m,
+                rear_m: 0.5 * geometry.wheel_radius_m,
+                half_width_m: (0.5 * (geometry.track_m - geometry.wheel_radius_m)).max(0.0),
+            },
+            ground_clearance_m: geometry.ground_clearance_m as f32,
+            wheel_radius_m: geometry.wheel_radius_m,
+        }
+    }
+}

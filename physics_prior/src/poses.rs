@@ -1,0 +1,193 @@
+//! All poses of a risk map over the ground below.
+
+use terrain::{Cell, GridGeometry, GridMap, SurfaceCell, TerrainClass};
+use traversability::{CvarLevel, Ground, GroundFlags, PmfQuad, Risk};
+
+use crate::equations::Equations;
+use crate::ground::{Contact, ContactGround};
+use crate::lattice::Ratio;
+use crate::lengths::Lengths;
+use crate::pose::Placed;
+use crate::stencil::{Reach, Stencil};
+
+/// How the ground under a pose becomes a risk.
+#[derive(Clone, Debug)]
+pub(crate) enum Judgement {
+    Physics { equations: Equations, level: CvarLevel, evidence: f32 },
+    Nominal,
+}
+
+/// The poses that cells and yaw bins stand for. Lattice indices are columns, rows on the global lattice.
+#[derive(Clone, Debug)]
+pub(crate) struct Poses {
+    pub judgement: Judgement,
+    pub ground: ContactGround,
+    lengths: Lengths,
+    ratio: Ratio,
+    n_yaws: usize,
+    /// Shape [row phase, column phase, yaw].
+    stencils: Vec<Stencil>,
+    reach: Reach,
+}
+
+impl Poses {
+    pub fn new(
+        judgement: Judgement,
+        lengths: Lengths,
+        ratio: Ratio,
+        surface_resolution_m: f64,
+        risk: &GridGeometry,
+        n_yaws: usize,
+    ) -> Self {
+        let stencils = stencils(&lengths, ratio, surface_resolution_m, n_yaws);
+        let own_cell = ratio.covered(0).end + 1;
+        let around = Reach { min: [-own_cell; 2], max: [own_cell; 2] };
+        let reach = stencils.iter().map(Stencil::reach).fold(around, Reach::union);
+        let window = window(risk, ratio, reach, surface_resolution_m);
+        let ground = ContactGround::unknown(window, lengths.wheel_radius_m);
+        Self { judgement, ground, lengths, ratio, n_yaws, stencils, reach }
+    }
+
+    /// Makes room for another window of the risk map; the ground must be read anew.
+    pub fn move_to(&mut self, risk: &GridGeometry) {
+        let window = window(risk, self.ratio, self.reach, self.ground.window().resolution_m);
+        self.ground = ContactGround::unknown(window, self.lengths.wheel_radius_m);
+    }
+
+    /// Whether the pose in the centre of a risk cell reads any surface cell from `min` to `max`, per axis.
+    pub fn reads(&self, axis: usize, risk_index: i64, min: i64, max: i64) -> bool {
+        let base = self.ratio.base(risk_index);
+        base + self.reach.min[axis] <= max && base + self.reach.max[axis] >= min
+    }
+
+    /// Risks of one risk cell for every yaw bin.
+    pub fn risks(&self, cell: [i64; 2], risks: &mut [Risk]) {
+        let base = cell.map(|index| self.ratio.base(index));
+        let [col_phase, row_phase] = cell.map(|index| self.ratio.phase_index(index));
+        let first = (row_phase * self.ratio.n_phases() + col_phase) * self.n_yaws;
+        for (stencil, risk) in self.stencils[first..first + self.n_yaws].iter().zip(risks) {
+            *risk = self.risk(&Placed { ground: &self.ground, stencil, base });
+        }
+    }
+
+    fn risk(&self, placed: &Placed) -> Risk {
+        let counts = placed.counts();
+        let free = match &self.judgement {
+            Judgement::Physics { equations, level, .. } => {
+                equations.distribution(&placed.pose_ground(counts, &self.lengths)).risk(*level)
+            }
+            Judgement::Nominal => Risk::NONE,
+        };
+        if counts.obstacles > 0 { free.blocked() } else { free }
+    }
+
+    /// Distribution at any pose; `None` outside the ground's window and for the nominal judgement.
+    pub fn distribution(&self, x_m: f64, y_m: f64, yaw_rad: f64) -> Option<(PmfQuad, f32)> {
+        let Judgement::Physics { equations, evidence, .. } = &self.judgement else { return None };
+        let resolution_m = self.ground.window().resolution_m;
+        let place = [x_m, y_m].map(|v| v / resolution_m);
+        let base = place.map(|v| v.floor() as i64);
+        let phase = place.map(|v| v - v.floor());
+        let stencil = Stencil::new(&self.lengths, resolution_m, phase, yaw_rad);
+        self.contains(base, stencil.reach()).then(|| {
+            let placed = Placed { ground: &self.ground, stencil: &stencil, base };
+            (equations.distribution(&placed.pose_ground(placed.counts(), &self.lengths)), *evidence)
+        })
+    }
+
+    fn contains(&self, base: [i64; 2], reach: Reach) -> bool {
+        let window = self.ground.window();
+        let inside = |axis: usize, n: usize| {
+            let start = base[axis] - window.origin[axis];
+            start + reach.min[axis] >= 0 && start + reach.max[axis] < n as i64
+        };
+        inside(0, window.n_cols) && inside(1, window.n_rows)
+    }
+
+    /// The ground in one risk cell: mean gradient of the known surface cells in it, likeliest class, an obstacle
+    /// if any of them is one, unknown if less than half of them are known.
+    pub fn ground_in(&self, cell: [i64; 2], surface: &GridMap<SurfaceCell>) -> Ground {
+        let [cols, rows] = cell.map(|index| self.ratio.covered(index));
+        let mut tally = Tally::default();
+        for row in rows {
+            for col in cols.clone() {
+                let contact = &self.ground.contacts()[self.ground.index([col, row])];
+                tally.add(contact, cell_at(surface, [col, row]));
+            }
+        }
+        tally.ground()
+    }
+}
+
+fn cell_at(surface: &GridMap<SurfaceCell>, lattice: [i64; 2]) -> Option<&SurfaceCell> {
+    let geometry = surface.geometry();
+    let col = usize::try_from(lattice[0] - geometry.origin[0]).ok().filter(|&col| col < geometry.n_cols)?;
+    let row = usize::try_from(lattice[1] - geometry.origin[1]).ok().filter(|&row| row < geometry.n_rows)?;
+    Some(&surface[Cell { row, col }])
+}
+
+/// Surface cells of one risk cell, added up.
+#[derive(Default)]
+struct Tally {
+    n_cells: u32,
+    n_known: u32,
+    gradient: [f32; 2],
+    class_probability: [f32; TerrainClass::COUNT],
+    obstacle: bool,
+}
+
+impl Tally {
+    fn add(&mut self, contact: &Contact, cell: Option<&SurfaceCell>) {
+        self.n_cells += 1;
+        if !contact.is_unknown() {
+            self.n_known += 1;
+            self.gradient[0] += contact.values[Contact::GRADIENT_EAST];
+            self.gradient[1] += contact.values[Contact::GRADIENT_NORTH];
+        }
+        if let Some(cell) = cell {
+            let sums = self.class_probability.iter_mut().zip(&cell.class_probability);
+            sums.for_each(|(sum, probability)| *sum += probability);
+            self.obstacle |= cell.class() == TerrainClass::Obstacle;
+        }
+    }
+
+    fn ground(&self) -> Ground {
+        let class = TerrainClass::ALL.into_iter().fold(TerrainClass::Open, |best, class| {
+            let likelier = self.class_probability[class as usize] > self.class_probability[best as usize];
+            if likelier { class } else { best }
+        });
+        let mut flags = GroundFlags::default();
+        if self.obstacle {
+            flags = flags.with(GroundFlags::OBSTACLE);
+        }
+        if 2 * self.n_known < self.n_cells {
+            flags = flags.with(GroundFlags::UNKNOWN);
+        }
+        let gradient = self.gradient.map(|sum| sum / self.n_known.max(1) as f32);
+        Ground { gradient, class: class as u8, flags }
+    }
+}
+
+fn stencils(lengths: &Lengths, ratio: Ratio, resolution_m: f64, n_yaws: usize) -> Vec<Stencil> {
+    let phases = 0..ratio.n_phases() as i64;
+    let mut stencils = Vec::with_capacity(ratio.n_phases().pow(2) * n_yaws);
+    for row in phases.clone() {
+        for col in phases.clone() {
+            for yaw_bin in 0..n_yaws {
+                let yaw_rad = (yaw_bin as f64 + 0.5) * std::f64::consts::TAU / n_yaws as f64;
+                let phase = [ratio.phase(col), ratio.phase(row)];
+                stencils.push(Stencil::new(lengths, resolution_m, phase, yaw_rad));
+            }
+        }
+    }
+    stencils
+}
+
+/// The surface cells that the poses of a risk map read.
+fn window(risk: &GridGeometry, ratio: Ratio, reach: Reach, resolution_m: f64) -> GridGeometry {
+    let n = [risk.n_cols, risk.n_rows].map(|n| n as i64);
+    let first = |axis: usize| ratio.base(risk.origin[axis]) + reach.min[axis];
+    let last = |axis: usize| ratio.base(risk.origin[axis] + n[axis] - 1) + reach.max[axis];
+    let count = |axis: usize| (last(axis) - first(axis) + 1).max(0) as usize;
+    GridGeometry { resolution_m, origin: [first(0), first(1)], n_rows: count(1), n_cols: count(0) }
+}

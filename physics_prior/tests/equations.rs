@@ -1,0 +1,210 @@
+//! The equations of the prior in closed form, on ground simple enough to compute by hand.
+
+mod common;
+
+use std::f64::consts::TAU;
+
+use common::*;
+use physics_prior::{Assumption, PriorConfig};
+use proptest::prelude::*;
+use terrain::{SurfaceCell, TerrainClass};
+use traversability::{Bins, Pmf};
+
+/// The prior without its spread: distributions are the estimates themselves.
+fn sharp() -> Assumption {
+    let prior = PriorConfig { uniform_weight: 0.0, ..PriorConfig::default() };
+    Assumption::Physics { prior, level: level(1.0) }
+}
+
+fn uniform_share() -> f32 {
+    0.2
+}
+
+#[test]
+fn a_plane_gives_traction_roll_and_pitch_exactly_at_every_yaw() {
+    let (east, north) = (0.21f64, -0.13f64);
+    let ground = surface(window(0.1, 40, 40), |x, y| open(100.0 + east * x + north * y));
+    let map = prior_map(&CAR, &sharp(), &ground, 13);
+    for step in 0..40 {
+        let yaw = step as f64 * TAU / 40.0;
+        let belief = map.belief(2.03, 1.98, yaw).unwrap();
+        // Slope along the heading and across it, to the left.
+        let along = east * yaw.cos() + north * yaw.sin();
+        let across = -east * yaw.sin() + north * yaw.cos();
+        let linear = 1.0 - along.abs() / 30f64.to_radians().tan();
+        let angular = (1.0 - along.abs() / 15f64.to_radians().tan()).max(0.0);
+        // Heights near 100 m carry 8e-6 m of rounding over a wheel distance of 0.2 m.
+        let close = |pmf: &Pmf, bins: &Bins, expected: f64| {
+            let expected = expected.clamp(f64::from(bins.values()[0]), f64::from(bins.values()[11]));
+            assert!(
+                (f64::from(pmf.mean(bins)) - expected).abs() < 3e-4,
+                "{} {expected} {yaw}",
+                pmf.mean(bins)
+            );
+        };
+        close(&belief.linear, &Bins::TRACTION, linear);
+        close(&belief.angular, &Bins::TRACTION, angular);
+        close(&belief.roll, &Bins::ATTITUDE, across.atan().abs());
+        close(&belief.pitch, &Bins::ATTITUDE, along.atan().abs());
+    }
+}
+
+#[test]
+fn the_estimate_stands_in_the_bins_beside_it_and_nowhere_else() {
+    // Along the slope tan 15 deg: linear traction 1 - tan 15 / tan 30 = 0.5359, pitch 15 deg between the values
+    // 12.5 and 17.5, roll 0 in the first bin, angular traction nothing.
+    let ground = surface(window(0.1, 40, 40), |x, _| open(15f64.to_radians().tan() * x));
+    let belief = prior_map(&CAR, &sharp(), &ground, 4).belief(2.0, 2.0, 0.0).unwrap();
+    let share = (0.535_898_4 - 0.45) / 0.1;
+    let mut linear = [0.0; 12];
+    (linear[5], linear[6]) = (1.0 - share, share);
+    let (mut angular, mut roll, mut pitch) = ([0.0; 12], [0.0; 12], [0.0; 12]);
+    (angular[0], roll[0], pitch[2], pitch[3]) = (1.0, 1.0, 0.5, 0.5);
+    let pairs =
+        [(belief.linear, linear), (belief.angular, angular), (belief.roll, roll), (belief.pitch, pitch)];
+    for (pmf, expected) in pairs {
+        for (p, q) in pmf.probabilities().iter().zip(&expected) {
+            assert!((p - q).abs() < 2e-4, "{pmf:?} {expected:?}");
+        }
+    }
+}
+
+#[test]
+fn half_high_vegetation_halves_the_traction() {
+    // (0.2 - 0.1) / 0.2 = 0.5, half-way between the values 0.45 and 0.55; the uniform share is 0.2.
+    let ground =
+        surface(window(0.1, 40, 40), |_, _| SurfaceCell::certain(0.0, TerrainClass::Vegetation, 0.1));
+    let belief = prior_map(&CAR, &physics(0.4), &ground, 4).belief(2.0, 2.0, 0.3).unwrap();
+    for pmf in [belief.linear, belief.angular] {
+        for (bin, p) in pmf.probabilities().iter().enumerate() {
+            let expected = uniform_share() / 12.0 + if bin == 5 || bin == 6 { 0.4 } else { 0.0 };
+            assert!((p - expected).abs() < 1e-5, "bin {bin}: {p} {expected}");
+        }
+    }
+}
+
+#[test]
+fn vegetation_beyond_the_largest_height_stops() {
+    let ground =
+        surface(window(0.1, 40, 40), |_, _| SurfaceCell::certain(0.0, TerrainClass::Vegetation, 0.5));
+    let belief = prior_map(&CAR, &sharp(), &ground, 4).belief(2.0, 2.0, 0.3).unwrap();
+    assert_eq!(belief.linear.probabilities()[0], 1.0);
+}
+
+#[test]
+fn semantic_shares_weigh_dirt_against_vegetation() {
+    // A quarter vegetation of half the largest height on level ground: 0.75 * 1 + 0.25 * 0.5 = 0.875.
+    let mut cell = SurfaceCell::certain(0.0, TerrainClass::Open, 0.1);
+    cell.class_probability = [0.5, 0.25, 0.25, 0.0];
+    let ground = surface(window(0.1, 40, 40), |_, _| cell);
+    let belief = prior_map(&CAR, &sharp(), &ground, 4).belief(2.0, 2.0, 1.0).unwrap();
+    // Shares are kept in units of 1/255.
+    assert!((belief.linear.mean(&Bins::TRACTION) - 0.875).abs() < 0.5 / 255.0);
+    assert!((belief.linear.probabilities()[11] - 0.75).abs() < 1.0 / 255.0);
+}
+
+#[test]
+fn equation_18_mixes_the_uniform_distribution_into_traction() {
+    // Level ground: 0.8 at traction 1 and 0.2 / 12 everywhere. Left tail at 0.4: the uniform part gives the
+    // eleven lower bins, 11/60 with values summing to 5; the rest of 0.4 lies at 1.
+    let belief = prior_map(&CAR, &physics(0.4), &level_ground(window(0.1, 40, 40)), 4);
+    let belief = belief.belief(2.0, 2.0, 0.0).unwrap();
+    let tail = (5.0 * 0.2 / 12.0 + (0.4 - 11.0 / 60.0)) / 0.4;
+    let risk = belief.risk(level(0.4));
+    assert!((risk.linear_traction - tail).abs() < 1e-5);
+    assert!((risk.angular_traction - tail).abs() < 1e-5);
+    assert_eq!(belief.evidence, 12.0);
+}
+
+#[test]
+fn roll_and_pitch_take_their_wheel_pairs() {
+    // Only the front left wheel stands on a table 0.05 m high: one of two roll pairs and one of two pitch pairs
+    // lean. Heading east from (2, 2): wheels at x 2 and 4.4, y 2 +- 0.75.
+    let ground = surface(window(0.1, 80, 80), |x, y| open(if x > 3.8 && y > 2.4 { 0.2 } else { 0.0 }));
+    let belief = prior_map(&TRUCK, &sharp(), &ground, 4).belief(2.0, 2.0, 0.0).unwrap();
+    let (roll, pitch) = ((0.2f32 / 1.5).atan(), (0.2f32 / 2.4).atan());
+    // The level pair's zero counts as the smallest bin value, 2.5 degrees.
+    let mean = |lean: f32| 0.5 * (lean + 2.5f32.to_radians());
+    assert!((belief.roll.mean(&Bins::ATTITUDE) - mean(roll)).abs() < 1e-5);
+    assert!((belief.pitch.mean(&Bins::ATTITUDE) - mean(pitch)).abs() < 1e-5);
+}
+
+#[test]
+fn level_ground_stays_drivable_at_every_level_from_005_up() {
+    for (geometry, ground) in [(CAR, window(0.1, 40, 40)), (TRUCK, window(0.2, 60, 60))] {
+        let map = prior_map(&geometry, &physics(0.4), &level_ground(ground), 13);
+        let centre = ground.centre_m(middle(&ground));
+        let belief = map.belief(centre[0], centre[1], 0.7).unwrap();
+        for step in 5..=100 {
+            let risk = belief.risk(level(f64::from(step) / 100.0));
+            assert!(risk.roll_rad < 15f32.to_radians() && risk.pitch_rad < 15f32.to_radians());
+            // At 0.05 the tail holds the three lowest bins of the uniform share: (0 + 0.05 + 0.15) / 3.
+            assert!(risk.linear_traction > 0.06, "{step} {risk:?}");
+        }
+        assert!((belief.risk(level(0.05)).linear_traction - 0.2 / 3.0).abs() < 1e-5);
+    }
+}
+
+#[test]
+fn an_uncertain_height_widens_the_attitude_and_leaves_the_traction() {
+    // Standard deviation 0.02 m per wheel, 0.0283 m per pair, over 0.2 m: 8.1 degrees about level.
+    let noisy = |deviation_m: f64| {
+        let ground = surface(window(0.1, 40, 40), |_, _| SurfaceCell {
+            height_variance_m2: (deviation_m * deviation_m) as f32,
+            ..open(0.0)
+        });
+        prior_map(&CAR, &sharp(), &ground, 4).belief(2.0, 2.0, 0.0).unwrap()
+    };
+    let (sure, unsure) = (noisy(0.0), noisy(0.02));
+    assert_eq!(sure.linear, unsure.linear);
+    // E|X| of a triangle of variance s^2 about zero is w / 3 = sqrt(6) s / 3.
+    let expected = (6f64.sqrt() / 3.0 * 0.02 * 2f64.sqrt() / 0.2) as f32;
+    let mean = unsure.roll.mean(&Bins::ATTITUDE);
+    // What lies below the smallest bin value counts as that, which raises the mean by less than half a degree.
+    assert!(mean > expected && mean < expected + 0.5f32.to_radians(), "{mean} {expected}");
+    let previous = [0.0, 0.005, 0.01, 0.02, 0.04].map(|d| noisy(d).risk(level(0.2)).roll_rad);
+    assert!(previous.windows(2).all(|pair| pair[0] <= pair[1]), "{previous:?}");
+    assert!(noisy(1e6).roll.probabilities().iter().all(|p| p.is_finite()));
+}
+
+#[test]
+fn ground_between_the_wheels_that_reaches_the_belly_stops() {
+    // A post half-way between the axles; the belly hangs 0.35 m above the plane of the wheels' contacts.
+    let with_post = |height_m: f64| {
+        let ground = surface(window(0.1, 80, 80), |x, y| {
+            let under = (x - 3.2).abs() < 0.25 && (y - 2.0).abs() < 0.15;
+            open(0.1 * x + if under { height_m } else { 0.0 })
+        });
+        prior_map(&TRUCK, &sharp(), &ground, 4).belief(2.0, 2.0, 0.0).unwrap()
+    };
+    let free = 1.0 - 0.1 / 30f32.to_radians().tan();
+    assert!((with_post(0.34).linear.mean(&Bins::TRACTION) - free).abs() < 1e-3);
+    assert_eq!(with_post(0.36).linear.mean(&Bins::TRACTION), 0.0);
+    assert_eq!(with_post(0.36).angular.mean(&Bins::TRACTION), 0.0);
+    assert_eq!(with_post(0.36).pitch, with_post(0.34).pitch);
+}
+
+proptest! {
+    #[test]
+    fn distributions_sum_to_one_and_turn_with_the_ground(
+        slope in 0.0..1.5f64,
+        direction in 0.0..TAU,
+        yaw in 0.0..TAU,
+        turn in 0.0..TAU,
+        deviation_m in 0.0..0.1f64,
+    ) {
+        let tilted = |direction: f64| {
+            let ground = surface(window(0.1, 20, 20), |x, y| SurfaceCell {
+                height_variance_m2: (deviation_m * deviation_m) as f32,
+                ..open(slope * ((x - 1.0) * direction.cos() + (y - 1.0) * direction.sin()))
+            });
+            prior_map(&CAR, &physics(0.4), &ground, 1)
+        };
+        let still = tilted(direction).belief(1.0, 1.0, yaw).unwrap();
+        let turned = tilted(direction + turn).belief(1.0, 1.0, yaw + turn).unwrap();
+        for pmf in [still.linear, still.angular, still.roll, still.pitch] {
+            prop_assert!(Pmf::new(*pmf.probabilities()).is_ok());
+        }
+        prop_assert!(close(still.risk(level(0.4)), turned.risk(level(0.4)), 1e-3));
+    }
+}

@@ -1,0 +1,305 @@
+//! The map: every pose, obstacles, holes, partial updates, threads.
+
+mod common;
+
+use std::f64::consts::PI;
+
+use common::*;
+use physics_prior::{Assumption, PriorConfig, PriorConfigError, PriorMap, PriorMapError};
+use proptest::prelude::*;
+use terrain::{Cell, CellRegion, GridGeometry, GridMap, SurfaceCell, TerrainClass};
+use traversability::{GroundFlags, Risk};
+
+const NOMINAL: Assumption = Assumption::Nominal { obstacle_margin_m: 0.0 };
+
+#[test]
+fn the_map_is_the_belief_of_every_pose() {
+    let ground = rough(window(0.1, 40, 44), 3);
+    for resolution_m in [0.1, 0.2, 0.05, 0.25] {
+        let risk = GridGeometry { resolution_m, origin: [3, 5], n_rows: 12, n_cols: 10 };
+        let mut map = PriorMap::new(&CAR, &physics(0.3), 0.1, risk, 7).unwrap();
+        map.update_all(&ground).unwrap();
+        let view = map.risk_map().view();
+        for row in 1..risk.n_rows - 1 {
+            for col in 1..risk.n_cols - 1 {
+                let [x_m, y_m] = risk.centre_m(Cell { row, col });
+                for yaw in 0..7 {
+                    let found = view.risk(Cell { row, col }, yaw);
+                    let belief = map.belief(x_m + 1e-9, y_m + 1e-9, view.yaw_rad(yaw)).unwrap();
+                    let expected = belief.risk(level(0.3));
+                    let expected = if found.is_blocked() { expected.blocked() } else { expected };
+                    assert!(
+                        close(found, expected, 1e-4),
+                        "{resolution_m} {row} {col} {yaw} {found:?} {expected:?}"
+                    );
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn mirrored_ground_gives_the_mirrored_map() {
+    let geometry = GridGeometry { resolution_m: 0.1, origin: [-20, -20], n_rows: 40, n_cols: 40 };
+    let ground = rough(geometry, 11);
+    let mirrored = GridMap::from_values(
+        geometry,
+        (0..geometry.n_cells())
+            .map(|i| {
+                let Cell { row, col } = geometry.cell(i);
+                ground[Cell { row: geometry.n_rows - 1 - row, col }]
+            })
+            .collect(),
+    )
+    .unwrap();
+    let [map, mirror] = [&ground, &mirrored].map(|ground| prior_map(&CAR, &physics(0.5), ground, 12));
+    for row in 0..40 {
+        for col in 0..40 {
+            for yaw in 0..12 {
+                let risk = map.risk_map().view().risk(Cell { row, col }, yaw);
+                let reflected = mirror.risk_map().view().risk(Cell { row: 39 - row, col }, 11 - yaw);
+                assert!(close(risk, reflected, 1e-4), "{row} {col} {yaw} {risk:?} {reflected:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn uphill_is_as_bad_as_downhill() {
+    let ground = surface(window(0.1, 40, 40), |x, y| open(0.2 * x - 0.1 * y));
+    let map = prior_map(&CAR, &physics(0.5), &ground, 12);
+    let centre = middle(ground.geometry());
+    for yaw in 0..6 {
+        let view = map.risk_map().view();
+        assert!(close(view.risk(centre, yaw), view.risk(centre, yaw + 6), 1e-5));
+    }
+}
+
+#[test]
+fn obstacles_block_every_pose_whose_footprint_touches_them() {
+    let geometry = window(0.1, 80, 80);
+    let post = Cell { row: 41, col: 37 };
+    let mut ground = level_ground(geometry);
+    ground[post] = SurfaceCell::certain(0.0, TerrainClass::Obstacle, 0.0);
+    let [post_x_m, post_y_m] = geometry.centre_m(post);
+    for assumption in [physics(0.4), NOMINAL] {
+        let map = prior_map(&TRUCK, &assumption, &ground, 16);
+        let view = map.risk_map().view();
+        for index in 0..geometry.n_cells() {
+            let cell = geometry.cell(index);
+            if cell.row == 0 || cell.row == 79 || cell.col == 0 || cell.col == 79 {
+                continue;
+            }
+            let [x_m, y_m] = geometry.centre_m(cell);
+            for yaw in 0..16 {
+                let (sin, cos) = view.yaw_rad(yaw).sin_cos();
+                let forward_m = cos * (post_x_m - x_m) + sin * (post_y_m - y_m);
+                let left_m = -sin * (post_x_m - x_m) + cos * (post_y_m - y_m);
+                // How far the centre of the post's cell lies outside the rectangle [-0.5, 2.9] x [-0.9, 0.9]:
+                // closer than half an edge it surely touches, further than half a diagonal of 0.0707 m surely not.
+                let ahead_m = (forward_m - 2.9).max(-0.5 - forward_m).max(0.0);
+                let outside_m = ahead_m.hypot((left_m.abs() - 0.9).max(0.0));
+                let blocked = view.risk(cell, yaw).is_blocked();
+                if outside_m < 0.049 {
+                    assert!(blocked, "{cell:?} {yaw} {outside_m}");
+                } else if outside_m > 0.0708 {
+                    assert!(!blocked, "{cell:?} {yaw} {outside_m}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn the_margin_widens_the_footprint() {
+    let geometry = window(0.1, 40, 40);
+    let mut ground = level_ground(geometry);
+    // Heading west from column 20 the rear lies 0.035 m behind the centre, x = 2.05; the post starts at x = 2.3.
+    ground[Cell { row: 20, col: 23 }] = SurfaceCell::certain(0.0, TerrainClass::Obstacle, 0.0);
+    let blocked = |obstacle_margin_m: f64| {
+        let map = prior_map(&CAR, &Assumption::Nominal { obstacle_margin_m }, &ground, 1);
+        map.risk_map().view().risk(Cell { row: 20, col: 20 }, 0).is_blocked()
+    };
+    assert!(!blocked(0.21));
+    assert!(blocked(0.22));
+}
+
+#[test]
+fn the_nominal_map_is_full_traction_on_level_ground_whatever_the_ground() {
+    let ground = rough(window(0.1, 40, 40), 5);
+    let map = prior_map(&CAR, &NOMINAL, &ground, 13);
+    let inside = |index: usize| {
+        let cell = ground.geometry().cell(index / 13);
+        (1..39).contains(&cell.row) && (1..39).contains(&cell.col)
+    };
+    let risks = map.risk_map().view().risks.iter().enumerate().filter(|(index, _)| inside(*index));
+    let (mut n_free, mut n_blocked) = (0, 0);
+    for (_, &risk) in risks {
+        assert!(risk == Risk::NONE || risk == Risk::NONE.blocked());
+        if risk.is_blocked() { n_blocked += 1 } else { n_free += 1 }
+    }
+    assert!(n_free > 1000 && n_blocked > 1000);
+    assert!(map.belief(2.0, 2.0, 0.0).is_none());
+}
+
+#[test]
+fn unknown_ground_can_be_approached_and_is_never_preferred() {
+    let geometry = window(0.2, 60, 60);
+    // Nothing is known east of x = 6.
+    let ground = surface(geometry, |x, _| if x < 6.0 { open(0.0) } else { SurfaceCell::UNKNOWN });
+    for at in [0.05, 0.2, 0.4, 0.6, 0.8, 1.0] {
+        let map = prior_map(&TRUCK, &physics(at), &ground, 8);
+        let view = map.risk_map().view();
+        let risk_at = |x_m: f64| view.risk_at(x_m, 6.1, 0.1);
+        let (known, frontier, unknown) = (risk_at(2.1), risk_at(4.7), risk_at(9.1));
+        for risk in [frontier, unknown] {
+            assert!(
+                risk.roll_rad < 30f32.to_radians() && risk.pitch_rad < 30f32.to_radians(),
+                "{at} {risk:?}"
+            );
+            assert!(risk.linear_traction > 0.06 && risk.angular_traction > 0.06, "{at} {risk:?}");
+        }
+        // At 0.05 the tail lies in the uniform share of equation 18, which is the same everywhere.
+        assert!(known.linear_traction >= frontier.linear_traction - 1e-6, "{at}");
+        assert!(frontier.linear_traction >= unknown.linear_traction - 1e-6, "{at}");
+        if at > 0.05 {
+            assert!(known.linear_traction > 1.2 * frontier.linear_traction, "{at}");
+        }
+        assert!(known.roll_rad < frontier.roll_rad && known.roll_rad < unknown.roll_rad);
+    }
+    // In the mean: 0.2 * 0.5 of the uniform share and 0.8 * 0.3 of unknown ground.
+    let mean = prior_map(&TRUCK, &physics(1.0), &ground, 8).risk_map().view().risk_at(9.1, 6.1, 0.1);
+    assert!((mean.linear_traction - 0.34).abs() < 1e-5);
+}
+
+#[test]
+fn holes_and_numbers_that_are_none_never_reach_the_map() {
+    let mut ground = rough(window(0.1, 40, 40), 9);
+    let poison = SurfaceCell {
+        height_m: f32::NAN,
+        height_variance_m2: f32::NAN,
+        vegetation_height_m: f32::NAN,
+        ..open(0.0)
+    };
+    for (i, value) in [(400, f32::NAN), (700, f32::INFINITY), (900, f32::NEG_INFINITY)] {
+        ground.values_mut()[i] = SurfaceCell { height_m: value, ..poison };
+        ground.values_mut()[i + 60] = SurfaceCell { height_variance_m2: value, ..open(0.0) };
+        ground.values_mut()[i + 120] = SurfaceCell { vegetation_height_m: value, ..open(0.0) };
+        ground.values_mut()[i + 180] = SurfaceCell { class_probability: [value; 4], ..open(0.0) };
+    }
+    let map = prior_map(&CAR, &physics(0.4), &ground, 13);
+    let view = map.risk_map().view();
+    for risk in view.risks {
+        assert!((0.0..=1.0).contains(&risk.linear_traction) && (0.0..=1.0).contains(&risk.angular_traction));
+        assert!((0.0..=3.2).contains(&risk.roll_rad) && (0.0..=3.2).contains(&risk.pitch_rad));
+    }
+    assert!(view.ground.iter().all(|ground| ground.gradient.iter().all(|g| g.is_finite())));
+    assert!(view.ground[400].flags.contains(GroundFlags::UNKNOWN));
+}
+
+#[test]
+fn the_ground_carries_gradient_class_and_flags() {
+    let fine = window(0.1, 40, 40);
+    let mut ground = surface(fine, |x, y| SurfaceCell {
+        class_probability: if y < 2.0 { [0.3, 0.7, 0.0, 0.0] } else { [0.2, 0.2, 0.6, 0.0] },
+        ..open(0.25 * x - 0.125 * y)
+    });
+    ground[Cell { row: 10, col: 11 }] = SurfaceCell::certain(0.0, TerrainClass::Obstacle, 0.0);
+    for (row, col) in [(20, 20), (20, 21), (21, 20), (30, 30)] {
+        ground[Cell { row, col }] = SurfaceCell::UNKNOWN;
+    }
+    let coarse = GridGeometry { resolution_m: 0.2, origin: [0, 0], n_rows: 20, n_cols: 20 };
+    let mut map = PriorMap::new(&CAR, &physics(0.4), 0.1, coarse, 4).unwrap();
+    map.update_all(&ground).unwrap();
+    let at = |row, col| map.risk_map().view().ground[coarse.index(Cell { row, col })];
+    assert!((at(4, 13).gradient[0] - 0.25).abs() < 1e-5 && (at(4, 13).gradient[1] + 0.125).abs() < 1e-5);
+    assert_eq!(at(4, 13).class, TerrainClass::Loose as u8);
+    assert_eq!(at(15, 4).class, TerrainClass::Vegetation as u8);
+    assert!(at(5, 5).flags.contains(GroundFlags::OBSTACLE));
+    assert_eq!(at(10, 10).flags, GroundFlags::UNKNOWN);
+    assert_eq!(at(15, 15).flags, GroundFlags::default());
+}
+
+#[test]
+fn the_map_does_not_depend_on_the_number_of_threads() {
+    let ground = rough(window(0.1, 40, 40), 21);
+    let in_pool = |n_threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(n_threads).build().unwrap();
+        pool.install(|| prior_map(&CAR, &physics(0.4), &ground, 13).risk_map().clone())
+    };
+    let one = in_pool(1);
+    for n_threads in [2, 3, 7] {
+        assert_eq!(one, in_pool(n_threads));
+    }
+}
+
+#[test]
+fn a_moved_window_and_a_new_level_are_taken_over_whole() {
+    let ground = rough(window(0.1, 60, 60), 2);
+    let risk = GridGeometry { resolution_m: 0.1, origin: [0, 0], n_rows: 20, n_cols: 20 };
+    let mut map = PriorMap::new(&CAR, &physics(0.4), 0.1, risk, 5).unwrap();
+    map.update_all(&ground).unwrap();
+    map.place_at([25, 30]);
+    map.set_level(level(0.8));
+    let nothing = CellRegion { rows: 0..0, cols: 0..0 };
+    map.update_dirty(&ground, &nothing).unwrap();
+    let mut fresh =
+        PriorMap::new(&CAR, &physics(0.8), 0.1, GridGeometry { origin: [25, 30], ..risk }, 5).unwrap();
+    fresh.update_all(&ground).unwrap();
+    assert_eq!(map.risk_map(), fresh.risk_map());
+    // Far from the surface everything is unknown, and nothing panics.
+    map.place_at([-100_000, 7_000_000]);
+    map.update_all(&ground).unwrap();
+    assert!(map.risk_map().view().ground.iter().all(|ground| ground.flags == GroundFlags::UNKNOWN));
+}
+
+#[test]
+fn what_cannot_be_mapped_is_refused() {
+    let geometry = window(0.1, 10, 10);
+    let new = |assumption: &Assumption, surface_m: f64, n_yaws: usize| {
+        PriorMap::new(&CAR, assumption, surface_m, geometry, n_yaws).map(|_| ())
+    };
+    assert_eq!(new(&physics(0.4), 0.1, 0), Err(PriorMapError::NoYaws));
+    assert_eq!(new(&physics(0.4), 0.0, 4), Err(PriorMapError::Resolution { surface_m: 0.0, risk_m: 0.1 }));
+    assert!(new(&physics(0.4), 0.1 * PI, 4).is_err());
+    let prior = PriorConfig { evidence: -1.0, ..PriorConfig::default() };
+    let found = new(&Assumption::Physics { prior, level: level(0.4) }, 0.1, 4);
+    assert!(matches!(found, Err(PriorMapError::Config(PriorConfigError { field: "evidence", .. }))));
+    let mut map = PriorMap::new(&CAR, &physics(0.4), 0.1, geometry, 4).unwrap();
+    let error = map.update_all(&level_ground(window(0.2, 10, 10))).unwrap_err();
+    assert_eq!(error.to_string(), "resolution of the surface: expected 0.1 m, found 0.2 m");
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(48))]
+    #[test]
+    fn a_partial_update_is_bit_equal_to_a_full_one(
+        seed in 0..1000u64,
+        rows in (0..40usize, 1..12usize),
+        cols in (0..40usize, 1..12usize),
+        resolution_m in prop::sample::select(vec![0.1, 0.2, 0.05]),
+    ) {
+        let geometry = window(0.1, 40, 40);
+        let before = rough(geometry, seed);
+        let other = rough(geometry, seed + 1000);
+        let changed =
+            CellRegion { rows: rows.0..(rows.0 + rows.1).min(40), cols: cols.0..(cols.0 + cols.1).min(40) };
+        let mut after = before.clone();
+        for row in changed.rows.clone() {
+            for col in changed.cols.clone() {
+                after[Cell { row, col }] = other[Cell { row, col }];
+            }
+        }
+        let risk = GridGeometry { resolution_m, origin: [2, 4], n_rows: 30, n_cols: 24 };
+        let mut partial = PriorMap::new(&CAR, &physics(0.4), 0.1, risk, 5).unwrap();
+        partial.update_all(&before).unwrap();
+        partial.update_dirty(&after, &changed).unwrap();
+        let mut full = PriorMap::new(&CAR, &physics(0.4), 0.1, risk, 5).unwrap();
+        full.update_all(&after).unwrap();
+        prop_assert_eq!(partial.risk_map(), full.risk_map());
+        // Later partial updates build on what the first one left.
+        partial.update_dirty(&before, &changed).unwrap();
+        full.update_all(&before).unwrap();
+        prop_assert_eq!(partial.risk_map(), full.risk_map());
+    }
+}
