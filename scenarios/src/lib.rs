@@ -5,6 +5,7 @@
 mod arena;
 mod friction;
 mod motion;
+mod plant;
 mod random;
 mod rock_field;
 mod sensor_imu;
@@ -16,6 +17,7 @@ mod world;
 pub use arena::{ARENA_GOAL_M, ARENA_START, ArenaConfig, ArenaError, arena};
 pub use friction::Stribeck;
 pub use motion::Motion;
+pub use plant::{CommandError, Plant, PlantError, WheelState};
 pub use rock_field::{
     MAPS_PER_SPLIT, RockFieldConfig, RockFieldError, RockMap, RockPopulation, Split, rock_field,
 };

@@ -1,0 +1,349 @@
+//! The plant: the machine as it is, in rigid-body and tyre physics.
+//!
+//! rapier carries the body, its contact with the ground and the integration; on it stand four wheels of our own.
+//! What no model of ours knows: load that moves between the wheels, friction that falls with load, forces that
+//! build up over a distance, wheels that wrap around rocks, per-cell friction, differentials, a speed servo.
+//!
+//! Deterministic: the same vehicle, world, start and commands give the same bits.
+
+mod chassis;
+mod drivetrain;
+mod envelope;
+mod ground;
+mod rest;
+mod servo;
+mod tyre;
+mod vegetation;
+mod wheel;
+
+use std::sync::Arc;
+
+use bicycle::{Command, Vehicle, VehicleError};
+use nalgebra::{Isometry3, Rotation3, Translation3, UnitQuaternion, Vector3};
+use terrain::Pose;
+
+use crate::{Motion, World};
+use chassis::{BodyMotion, Chassis, Wrench};
+use drivetrain::Drivetrain;
+use ground::Ground;
+use rest::{Rest, Stance};
+use servo::{DelayQueue, SteeringServo};
+use wheel::{RunningGear, Strut, Wheel, WheelInput};
+
+/// Acceleration of gravity [m/s2].
+pub(crate) const GRAVITY_MPS2: f64 = 9.81;
+
+/// Time the vehicle is given to sink into its springs before the first command [s].
+const SETTLING_S: f64 = 1.5;
+/// Below this cosine of the body's tilt (70 degrees) it has rolled over.
+const ROLLED_OVER_COSINE: f64 = 0.342;
+
+/// Why there is no plant.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum PlantError {
+    /// No vehicle can be like this.
+    #[error("vehicle: {0}")]
+    Vehicle(#[from] VehicleError),
+    /// A tyre that its own vehicle squeezes flat.
+    #[error(
+        "tyre.radial_stiffness_n_per_m: expected a static deflection below {most_m:.3} m (a third of the \
+         radius), found {found_m:.3} m"
+    )]
+    FlatTyre {
+        /// A third of the wheel's radius [m].
+        most_m: f64,
+        /// Deflection under a quarter of the weight [m].
+        found_m: f64,
+    },
+    /// The start is no pose.
+    #[error("start: expected finite x, y, yaw, found {0:?}")]
+    NonFiniteStart([f64; 3]),
+    /// A wheel would stand outside the world.
+    #[error(
+        "start: expected every wheel between ({:.1}, {:.1}) and ({:.1}, {:.1}) m, found one at ({:.1}, {:.1}) m",
+        extent_m[0][0], extent_m[0][1], extent_m[1][0], extent_m[1][1], found_m[0], found_m[1]
+    )]
+    StartOutside {
+        /// South-west and north-east end of the world's surface [m].
+        extent_m: [[f64; 2]; 2],
+        /// The wheel [m].
+        found_m: [f64; 2],
+    },
+}
+
+/// A command that is no number.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[error("command: expected finite speed and steering, found {speed_mps} m/s and {steering_rad} rad")]
+pub struct CommandError {
+    /// The speed given [m/s].
+    pub speed_mps: f32,
+    /// The steering angle given [rad].
+    pub steering_rad: f32,
+}
+
+/// How one wheel stands.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct WheelState {
+    /// Normal force of the ground, zero in the air [N].
+    pub load_n: f64,
+    /// Centre of its contact in the map frame, if it touches the ground [m].
+    pub contact_m: Option<[f64; 3]>,
+    /// Hub in the map frame [m].
+    pub hub_m: [f64; 3],
+    /// Circumferential speed of the unloaded radius [m/s].
+    pub speed_mps: f64,
+    /// Travel of the strut from rest, upwards [m].
+    pub travel_m: f64,
+}
+
+/// The machine in its world.
+pub struct Plant {
+    ground: Ground,
+    chassis: Chassis,
+    gear: RunningGear,
+    wheels: [Wheel; 4],
+    struts: [Strut; 4],
+    /// Force on each wheel of an axle per difference of travel [N/m], front and rear.
+    anti_roll_n_per_m: [f64; 2],
+    drivetrain: Drivetrain,
+    servo: SteeringServo,
+    queue: DelayQueue,
+    limits: bicycle::Limits,
+    radius_m: f64,
+    command: Command,
+    motion: BodyMotion,
+    specific_force_mps2: Vector3<f64>,
+    step_s: f64,
+    n_steps: u64,
+    left_world: bool,
+}
+
+impl Plant {
+    /// Length of a step [s].
+    pub const STEP_S: f64 = 1e-3;
+
+    /// Puts the vehicle on the ground with its rear axle's centre at `start` = (x [m], y [m], yaw [rad]),
+    /// parked, and lets it sink into its springs.
+    pub fn new(vehicle: &Vehicle, world: Arc<World>, start: [f64; 3]) -> Result<Self, PlantError> {
+        Self::with_step(vehicle, world, start, Self::STEP_S)
+    }
+
+    /// The same with another step length [s], to see what the step does.
+    pub fn with_step(
+        vehicle: &Vehicle,
+        world: Arc<World>,
+        start: [f64; 3],
+        step_s: f64,
+    ) -> Result<Self, PlantError> {
+        vehicle.validate()?;
+        if start.iter().any(|value| !value.is_finite()) {
+            return Err(PlantError::NonFiniteStart(start));
+        }
+        let ground = Ground::new(world);
+        let rest = Rest::new(vehicle);
+        let gear = RunningGear::new(vehicle, &rest, ground.resolution_m(), step_s);
+        let stance = rest.stance(vehicle, &gear.envelope);
+        check_tyre(vehicle, &rest, &gear)?;
+        check_start(&stance, &ground, start)?;
+        let pose = standing(&stance, &gear, &ground, start);
+        let chassis = Chassis::new(vehicle, &rest, &stance, &ground, &pose, step_s);
+        let track_m = vehicle.geometry.track_m;
+        let axles = [vehicle.front, vehicle.rear];
+        let mut plant = Self {
+            motion: chassis.motion(),
+            chassis,
+            wheels: stance.hub_m.map(Wheel::at),
+            struts: std::array::from_fn(|i| {
+                Strut::new(axles[i / 2].suspension, rest.load_n[i], vehicle.wheel.mass_kg)
+            }),
+            anti_roll_n_per_m: axles.map(|axle| axle.anti_roll_nm_per_rad / (track_m * track_m)),
+            drivetrain: Drivetrain::new(vehicle, &rest),
+            servo: SteeringServo::new(vehicle),
+            queue: DelayQueue::new(vehicle.servo.delay_s, step_s),
+            limits: vehicle.limits,
+            radius_m: vehicle.geometry.wheel_radius_m,
+            command: Command::default(),
+            specific_force_mps2: Vector3::z() * GRAVITY_MPS2,
+            step_s,
+            n_steps: 0,
+            left_world: false,
+            ground,
+            gear,
+        };
+        plant.advance(SETTLING_S);
+        plant.n_steps = 0;
+        Ok(plant)
+    }
+
+    /// Takes a command; it is held until the next one and limited to what the vehicle may do.
+    pub fn set_command(&mut self, command: Command) -> Result<(), CommandError> {
+        let Command { speed_mps, steering_rad } = command;
+        if !(speed_mps.is_finite() && steering_rad.is_finite()) {
+            return Err(CommandError { speed_mps, steering_rad });
+        }
+        let fastest_mps = self.limits.speed_max_mps as f32;
+        let reverse_mps = self.limits.reverse_speed_max_mps as f32;
+        self.command = Command { speed_mps: speed_mps.clamp(-reverse_mps, fastest_mps), steering_rad };
+        Ok(())
+    }
+
+    /// Runs for the nearest whole number of steps.
+    pub fn advance(&mut self, duration_s: f64) {
+        for _ in 0..(duration_s / self.step_s).round() as u64 {
+            self.step();
+        }
+    }
+
+    /// Runs for one step.
+    pub fn step(&mut self) {
+        let command = self.queue.pass(self.command);
+        self.servo.step(f64::from(command.steering_rad), self.step_s);
+        let spin_radps = self.wheels.map(|wheel| wheel.spin_radps);
+        let torques = self.drivetrain.step(f64::from(command.speed_mps), spin_radps, self.step_s);
+        let [left_rad, right_rad] = self.servo.wheel_angles_rad();
+        let steering_rad = [left_rad, right_rad, 0.0, 0.0];
+        let anti_roll_n = self.anti_roll_n();
+        let mut wrench = Wrench::default();
+        for i in 0..4 {
+            let input =
+                WheelInput { steering_rad: steering_rad[i], torque: torques[i], anti_roll_n: anti_roll_n[i] };
+            let wheel = (&mut self.wheels[i], &self.struts[i]);
+            self.gear.step(wheel, &input, &self.motion, &self.ground, &mut wrench);
+        }
+        self.move_body(&wrench);
+    }
+
+    fn anti_roll_n(&self) -> [f64; 4] {
+        let travel_m = self.wheels.map(|wheel| wheel.travel_m);
+        let [front, rear] = self.anti_roll_n_per_m;
+        let front_n = front * (travel_m[0] - travel_m[1]);
+        let rear_n = rear * (travel_m[2] - travel_m[3]);
+        [front_n, -front_n, rear_n, -rear_n]
+    }
+
+    fn move_body(&mut self, wrench: &Wrench) {
+        let before_mps = self.motion.velocity_at_mps(&self.motion.origin_m);
+        self.chassis.step(wrench, &self.motion, &self.ground);
+        self.motion = self.chassis.motion();
+        let after_mps = self.motion.velocity_at_mps(&self.motion.origin_m);
+        let acceleration_mps2 = (after_mps - before_mps) / self.step_s;
+        self.specific_force_mps2 = self.motion.in_body(&(acceleration_mps2 + Vector3::z() * GRAVITY_MPS2));
+        self.left_world |= (0..4).any(|i| {
+            let hub_m = self.hub_m(i);
+            !self.ground.contains(hub_m.x, hub_m.y)
+        });
+        self.n_steps += 1;
+    }
+
+    fn hub_m(&self, i: usize) -> Vector3<f64> {
+        self.wheels[i].frame(&self.motion, 0.0).hub_m
+    }
+}
+
+/// What can be seen of the plant.
+impl Plant {
+    /// Time since the start [s].
+    pub fn time_s(&self) -> f64 {
+        self.n_steps as f64 * self.step_s
+    }
+
+    /// Pose of the rear axle's centre.
+    pub fn pose(&self) -> Pose {
+        let [ahead, left, up] = self.motion.axes;
+        let rotation = Rotation3::from_basis_unchecked(&[ahead, left, up]);
+        let (roll_rad, pitch_rad, yaw_rad) = rotation.euler_angles();
+        let origin_m = self.motion.origin_m;
+        Pose { x_m: origin_m.x, y_m: origin_m.y, z_m: origin_m.z, roll_rad, pitch_rad, yaw_rad }
+    }
+
+    /// How the vehicle moves; the specific force is the mean over the last step.
+    pub fn motion(&self) -> Motion {
+        let body = &self.motion;
+        let spin_radps = self.wheels.map(|wheel| wheel.spin_radps);
+        Motion {
+            pose: self.pose(),
+            velocity_mps: body.in_body(&body.velocity_at_mps(&body.origin_m)).into(),
+            angular_rate_radps: body.in_body(&body.angular_radps).into(),
+            specific_force_mps2: self.specific_force_mps2.into(),
+            wheel_speed_mps: self.drivetrain.mean_spin_radps(&spin_radps) * self.radius_m,
+            steering_rad: self.servo.steering_rad(),
+        }
+    }
+
+    /// How the wheels stand: front left, front right, rear left, rear right.
+    pub fn wheels(&self) -> [WheelState; 4] {
+        std::array::from_fn(|i| {
+            let wheel = &self.wheels[i];
+            WheelState {
+                load_n: wheel.load_n,
+                contact_m: wheel.contact.map(|contact| contact.point_m.into()),
+                hub_m: self.hub_m(i).into(),
+                speed_mps: wheel.spin_radps * self.radius_m,
+                travel_m: wheel.travel_m,
+            }
+        })
+    }
+
+    /// Whether the body lies on its side or its roof.
+    pub fn rolled_over(&self) -> bool {
+        self.motion.axes[2].z < ROLLED_OVER_COSINE
+    }
+
+    /// Whether a wheel has ever been beyond the border of the world, where the ground is made up.
+    pub fn left_world(&self) -> bool {
+        self.left_world
+    }
+
+    /// Whether every number of the state is one.
+    pub fn is_finite(&self) -> bool {
+        let wheels = self.wheels.iter().flat_map(|wheel| [wheel.travel_m, wheel.spin_radps]);
+        self.pose().is_finite()
+            && self.motion.linear_mps.iter().chain(self.motion.angular_radps.iter()).all(|v| v.is_finite())
+            && wheels.into_iter().all(f64::is_finite)
+    }
+}
+
+fn check_tyre(vehicle: &Vehicle, rest: &Rest, gear: &RunningGear) -> Result<(), PlantError> {
+    let most_m = vehicle.geometry.wheel_radius_m / 3.0;
+    let found_m = gear.envelope.deflection_m(0.25 * rest.mass_kg * GRAVITY_MPS2);
+    if found_m < most_m { Ok(()) } else { Err(PlantError::FlatTyre { most_m, found_m }) }
+}
+
+fn check_start(stance: &Stance, ground: &Ground, start: [f64; 3]) -> Result<(), PlantError> {
+    let level = Isometry3::rotation(Vector3::z() * start[2]);
+    for hub_m in stance.hub_m {
+        let off_m = level * hub_m;
+        let found_m = [start[0] + off_m.x, start[1] + off_m.y];
+        if !ground.contains(found_m[0], found_m[1]) {
+            return Err(PlantError::StartOutside { extent_m: ground.extent_m(), found_m });
+        }
+    }
+    Ok(())
+}
+
+/// A pose in which the deepest wheel stands as deep as at rest and the body follows the ground under the wheels.
+fn standing(stance: &Stance, gear: &RunningGear, ground: &Ground, start: [f64; 3]) -> Isometry3<f64> {
+    let [x_m, y_m, yaw_rad] = start;
+    let level = UnitQuaternion::from_euler_angles(0.0, 0.0, yaw_rad);
+    let heights_m = stance.hub_m.map(|hub_m| {
+        let off_m = level * hub_m;
+        ground.height_m(x_m + off_m.x, y_m + off_m.y)
+    });
+    let [front_left, front_right, rear_left, rear_right] = heights_m;
+    let wheelbase_m = stance.hub_m[0].x;
+    let track_m = stance.hub_m[0].y - stance.hub_m[1].y;
+    let pitch_rad = ((rear_left + rear_right - front_left - front_right) / (2.0 * wheelbase_m)).atan();
+    let roll_rad = ((front_left + rear_left - front_right - rear_right) / (2.0 * track_m)).atan();
+    let rotation = UnitQuaternion::from_euler_angles(roll_rad, pitch_rad, yaw_rad);
+    let axes = [Vector3::x(), Vector3::y(), Vector3::z()].map(|axis| rotation * axis);
+    let [forward, left, up] = axes;
+    let lowest_m = 0.5 * (rear_left + rear_right);
+    let depth_m = stance.hub_m.map(|hub_m| {
+        let hub_m = Vector3::new(x_m, y_m, lowest_m) + rotation * hub_m;
+        gear.envelope.depth_m(ground, &envelope::WheelFrame { hub_m, forward, left, up })
+    });
+    let deepest_m = depth_m.into_iter().fold(f64::NEG_INFINITY, f64::max);
+    let rest_depth_m = gear.envelope.radius_m() - stance.axle_height_m;
+    let z_m = lowest_m + deepest_m - rest_depth_m;
+    Isometry3::from_parts(Translation3::new(x_m, y_m, z_m), rotation)
+}

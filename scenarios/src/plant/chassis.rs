@@ -1,0 +1,247 @@
+//! The body as a rigid body of rapier, with its contact with the ground.
+
+use bicycle::Vehicle;
+use nalgebra::{Isometry3, Vector3};
+use rapier3d::prelude::{
+    Array2, Collider, ColliderBuilder, ColliderHandle, IntegrationParameters, MassProperties, PhysicsWorld,
+    Pose as RapierPose, RigidBodyBuilder, RigidBodyHandle, Rotation, Vector,
+};
+
+use super::GRAVITY_MPS2;
+use super::ground::Ground;
+use super::rest::{Rest, Stance};
+
+/// Friction of the body's panels on the ground [-].
+const PANEL_FRICTION: f64 = 0.5;
+/// Steps between checks whether a hull is near the ground.
+const CHECK_STEPS: u32 = 8;
+/// A hull counts as near the ground below this share of the ground clearance.
+const NEAR_SHARE: f64 = 0.25;
+/// Places along the vehicle at which its underside is held against the ground.
+const UNDERSIDE_PLACES: f64 = 36.0;
+/// Below this cosine of the body's tilt its sides may touch first: every hull then counts as near.
+const TILTED_COSINE: f64 = 0.6;
+
+/// How the body lies and moves, in map coordinates.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct BodyMotion {
+    /// Centre of the rear axle [m].
+    pub origin_m: Vector3<f64>,
+    /// Forward, left and up.
+    pub axes: [Vector3<f64>; 3],
+    /// Centre of gravity [m].
+    pub cog_m: Vector3<f64>,
+    /// Velocity of the centre of gravity [m/s].
+    pub linear_mps: Vector3<f64>,
+    /// Angular velocity [rad/s].
+    pub angular_radps: Vector3<f64>,
+}
+
+/// Force and torque about the centre of gravity, in map coordinates.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Wrench {
+    pub force_n: Vector3<f64>,
+    pub torque_nm: Vector3<f64>,
+}
+
+/// A box of the body.
+struct Hull {
+    collider: ColliderHandle,
+    /// Points of the underside in the body frame [m].
+    underside_m: Vec<Vector3<f64>>,
+}
+
+/// The rigid body.
+pub(crate) struct Chassis {
+    physics: PhysicsWorld,
+    body: RigidBodyHandle,
+    hulls: Vec<Hull>,
+    near_m: f64,
+    cog_m: Vector3<f64>,
+    step_s: f64,
+    steps_to_check: u32,
+}
+
+impl BodyMotion {
+    pub(crate) fn point_m(&self, local_m: &Vector3<f64>) -> Vector3<f64> {
+        self.origin_m + self.direction(local_m)
+    }
+
+    pub(crate) fn direction(&self, local: &Vector3<f64>) -> Vector3<f64> {
+        self.axes[0] * local.x + self.axes[1] * local.y + self.axes[2] * local.z
+    }
+
+    pub(crate) fn in_body(&self, vector: &Vector3<f64>) -> Vector3<f64> {
+        Vector3::from(self.axes.map(|axis| axis.dot(vector)))
+    }
+
+    pub(crate) fn velocity_at_mps(&self, point_m: &Vector3<f64>) -> Vector3<f64> {
+        self.linear_mps + self.angular_radps.cross(&(point_m - self.cog_m))
+    }
+}
+
+impl Wrench {
+    pub(crate) fn add_at(&mut self, force_n: Vector3<f64>, point_m: &Vector3<f64>, body: &BodyMotion) {
+        self.force_n += force_n;
+        self.torque_nm += (point_m - body.cog_m).cross(&force_n);
+    }
+}
+
+impl Chassis {
+    pub(crate) fn new(
+        vehicle: &Vehicle,
+        rest: &Rest,
+        stance: &Stance,
+        ground: &Ground,
+        pose: &Isometry3<f64>,
+        step_s: f64,
+    ) -> Self {
+        let mut physics = PhysicsWorld::new();
+        physics.gravity = Vector::new(0.0, 0.0, -GRAVITY_MPS2);
+        physics.integration_parameters = IntegrationParameters {
+            dt: step_s,
+            num_solver_iterations: 1,
+            length_unit: vehicle.geometry.length_m / 3.0,
+            ..IntegrationParameters::default()
+        };
+        physics.insert_collider(heightfield(ground), None);
+        let mass = MassProperties::new(glam(&stance.cog_m), rest.mass_kg, glam(&rest.inertia_kgm2));
+        let builder = RigidBodyBuilder::dynamic()
+            .pose(rapier_pose(pose))
+            .additional_mass_properties(mass)
+            .can_sleep(false);
+        let body = physics.insert_body(builder);
+        let spacing_m = (vehicle.geometry.length_m / UNDERSIDE_PLACES).max(0.5 * ground.resolution_m());
+        let hulls = boxes(vehicle, stance)
+            .into_iter()
+            .map(|[low_m, high_m]| Hull {
+                collider: physics.insert_collider(panel(&low_m, &high_m), Some(body)),
+                underside_m: underside(&low_m, &high_m, spacing_m),
+            })
+            .collect();
+        let near_m = NEAR_SHARE * vehicle.geometry.ground_clearance_m;
+        Self { physics, body, hulls, near_m, cog_m: stance.cog_m, step_s, steps_to_check: 0 }
+    }
+
+    /// How the body lies and moves now.
+    pub(crate) fn motion(&self) -> BodyMotion {
+        let body = &self.physics.bodies[self.body];
+        let pose = body.position();
+        let axes = [Vector::X, Vector::Y, Vector::Z].map(|axis| nalgebra(pose.rotation * axis));
+        let origin_m = nalgebra(pose.translation);
+        let mut motion = BodyMotion {
+            origin_m,
+            axes,
+            cog_m: origin_m,
+            linear_mps: nalgebra(body.linvel()),
+            angular_radps: nalgebra(body.angvel()),
+        };
+        motion.cog_m = motion.point_m(&self.cog_m);
+        motion
+    }
+
+    /// Moves the body by a step under gravity, the wheels' forces and contact with the ground.
+    pub(crate) fn step(&mut self, wrench: &Wrench, motion: &BodyMotion, ground: &Ground) {
+        if self.steps_to_check == 0 {
+            self.steps_to_check = CHECK_STEPS;
+            self.wake_near_hulls(motion, ground);
+        }
+        self.steps_to_check -= 1;
+        let body = &mut self.physics.bodies[self.body];
+        body.reset_forces(false);
+        body.reset_torques(false);
+        body.add_force(glam(&wrench.force_n), false);
+        body.add_torque(glam(&wrench.torque_nm), false);
+        self.physics.step();
+    }
+
+    /// Contact with the ground costs more than all the rest: hulls take part only near it.
+    fn wake_near_hulls(&mut self, motion: &BodyMotion, ground: &Ground) {
+        let until_check_m = motion.linear_mps.norm() * self.step_s * f64::from(CHECK_STEPS);
+        let margin_m = self.near_m + until_check_m;
+        let tilted = motion.axes[2].z < TILTED_COSINE;
+        let low = |local_m: &Vector3<f64>| {
+            let point_m = motion.point_m(local_m);
+            point_m.z - ground.height_m(point_m.x, point_m.y) < margin_m
+        };
+        for hull in &self.hulls {
+            let near = tilted || hull.underside_m.iter().any(low);
+            self.physics.colliders[hull.collider].set_enabled(near);
+        }
+    }
+}
+
+/// Corners of the boxes in the body frame: the belly between the axles, and what hangs over front and rear, which
+/// ends at hub height so that wheels meet steep ground before bumpers do.
+fn boxes(vehicle: &Vehicle, stance: &Stance) -> [[Vector3<f64>; 2]; 3] {
+    let geometry = &vehicle.geometry;
+    let belly_m = geometry.ground_clearance_m - stance.axle_height_m;
+    let bumper_m = belly_m.max(0.0);
+    let top_m = (belly_m + 0.5 * geometry.ground_clearance_m)
+        .max(2.0 * vehicle.body.cog_height_m - stance.axle_height_m)
+        .max(bumper_m + 0.25 * geometry.wheel_radius_m);
+    let span = |from_m: f64, to_m: f64, bottom_m: f64| {
+        [
+            Vector3::new(from_m, -0.5 * geometry.width_m, bottom_m),
+            Vector3::new(to_m, 0.5 * geometry.width_m, top_m),
+        ]
+    };
+    let front_m = geometry.length_m - geometry.rear_overhang_m;
+    [
+        span(-geometry.rear_overhang_m, 0.0, bumper_m),
+        span(0.0, geometry.wheelbase_m, belly_m),
+        span(geometry.wheelbase_m, front_m.max(geometry.wheelbase_m), bumper_m),
+    ]
+}
+
+fn panel(low_m: &Vector3<f64>, high_m: &Vector3<f64>) -> Collider {
+    let half_m = (high_m - low_m) * 0.5;
+    let middle_m = (high_m + low_m) * 0.5;
+    ColliderBuilder::cuboid(half_m.x, half_m.y, half_m.z)
+        .translation(glam(&middle_m))
+        .friction(PANEL_FRICTION)
+        .density(0.0)
+        .build()
+}
+
+fn underside(low_m: &Vector3<f64>, high_m: &Vector3<f64>, spacing_m: f64) -> Vec<Vector3<f64>> {
+    let places = |low_m: f64, high_m: f64| {
+        let n = ((high_m - low_m) / spacing_m).ceil().max(1.0) as i32;
+        (0..=n).map(move |i| low_m + (high_m - low_m) * f64::from(i) / f64::from(n))
+    };
+    places(low_m.x, high_m.x)
+        .flat_map(|x_m| places(low_m.y, high_m.y).map(move |y_m| Vector3::new(x_m, y_m, low_m.z)))
+        .collect()
+}
+
+/// The ground as rapier's heightfield. That one is y-up, its rows along z and columns along x; turned by a right
+/// angle about x, its rows run south and its diagonals from south-west to north-east, as the world's do.
+fn heightfield(ground: &Ground) -> Collider {
+    let [n_rows, n_cols] = ground.size();
+    let [low_m, high_m] = ground.extent_m();
+    let height = |index: usize| {
+        let (row, col) = (n_rows - 1 - index % n_rows, index / n_rows);
+        f64::from(ground.surface_m()[row * n_cols + col])
+    };
+    let heights = Array2::new(n_rows, n_cols, (0..n_rows * n_cols).map(height).collect());
+    let scale = Vector::new(high_m[0] - low_m[0], 1.0, high_m[1] - low_m[1]);
+    let middle = Vector::new(0.5 * (low_m[0] + high_m[0]), 0.5 * (low_m[1] + high_m[1]), 0.0);
+    ColliderBuilder::heightfield(heights, scale)
+        .rotation(Vector::X * std::f64::consts::FRAC_PI_2)
+        .translation(middle)
+        .friction(PANEL_FRICTION)
+        .build()
+}
+
+fn rapier_pose(pose: &Isometry3<f64>) -> RapierPose {
+    let q = pose.rotation.coords;
+    RapierPose::from_parts(glam(&pose.translation.vector), Rotation::from_xyzw(q.x, q.y, q.z, q.w))
+}
+
+fn glam(vector: &Vector3<f64>) -> Vector {
+    Vector::new(vector.x, vector.y, vector.z)
+}
+
+fn nalgebra(vector: Vector) -> Vector3<f64> {
+    Vector3::new(vector.x, vector.y, vector.z)
+}

@@ -1,0 +1,126 @@
+//! Speed servo, motor, limited-slip differentials and brakes.
+
+use bicycle::Vehicle;
+
+use super::rest::Rest;
+
+/// Torque between a wheel and the mean of the driven wheels, per difference of circumferential speed, over the
+/// wheel's load: how tight the limited-slip differentials are [s/m].
+const DIFFERENTIAL_S_PER_M: f64 = 0.25;
+/// Time the servo adds to the motor's response [s].
+const SERVO_TIME_S: f64 = 0.08;
+/// The integral's time over the servo's [-].
+const INTEGRAL_RATIO: f64 = 4.0;
+/// Below this commanded speed the parking brake is set when the wheels stand still [m/s].
+const PARKING_SPEED_MPS: f64 = 1e-3;
+/// Wheel speed below which the parking brake is set [m/s].
+const STANDSTILL_MPS: f64 = 0.05;
+
+/// Torques on one wheel.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct WheelTorque {
+    /// Along the rolling direction [N m].
+    pub drive_nm: f64,
+    /// Largest magnitude against the wheel's turning relative to the body [N m].
+    pub brake_nm: f64,
+}
+
+/// Holds the commanded speed.
+pub(crate) struct Drivetrain {
+    mass_kg: f64,
+    radius_m: f64,
+    drive_max_nm: f64,
+    brake_max_nm: f64,
+    power_max_w: f64,
+    acceleration_max_mps2: f64,
+    response_s: f64,
+    /// Share of the drive torque on each wheel.
+    drive_share: [f64; 4],
+    /// Share of the brake torque on each wheel.
+    brake_share: [f64; 4],
+    differential_nms: f64,
+    reference_mps: f64,
+    integral_n: f64,
+    drive_nm: f64,
+    brake_nm: f64,
+}
+
+impl Drivetrain {
+    pub(crate) fn new(vehicle: &Vehicle, rest: &Rest) -> Self {
+        let rear = vehicle.drivetrain.rear_share;
+        let brake_rear = rest.load_n[2] / (rest.load_n[0] + rest.load_n[2]);
+        let pairs = |rear: f64| [0.5 * (1.0 - rear), 0.5 * (1.0 - rear), 0.5 * rear, 0.5 * rear];
+        let radius_m = vehicle.geometry.wheel_radius_m;
+        let mean_load_n = 0.25 * rest.mass_kg * super::GRAVITY_MPS2;
+        Self {
+            mass_kg: rest.mass_kg,
+            radius_m,
+            drive_max_nm: vehicle.drivetrain.drive_torque_max_nm,
+            brake_max_nm: vehicle.drivetrain.brake_torque_max_nm,
+            power_max_w: vehicle.drivetrain.power_max_w,
+            acceleration_max_mps2: vehicle.limits.acceleration_max_mps2,
+            response_s: vehicle.drivetrain.response_s,
+            drive_share: pairs(rear),
+            brake_share: pairs(brake_rear),
+            differential_nms: DIFFERENTIAL_S_PER_M * mean_load_n * radius_m * radius_m,
+            reference_mps: 0.0,
+            integral_n: 0.0,
+            drive_nm: 0.0,
+            brake_nm: 0.0,
+        }
+    }
+
+    /// Torques for wheels that turn at `spin_radps` relative to the body.
+    pub(crate) fn step(&mut self, commanded_mps: f64, spin_radps: [f64; 4], step_s: f64) -> [WheelTorque; 4] {
+        let mean_radps = self.mean_spin_radps(&spin_radps);
+        let (drive_nm, brake_nm) = self.servo(commanded_mps, mean_radps, step_s);
+        let share = step_s / (self.response_s + step_s);
+        self.drive_nm += share * (drive_nm - self.drive_nm);
+        // Brakes let go at once: else the motor starts against them.
+        self.brake_nm += if brake_nm < self.brake_nm { 1.0 } else { share } * (brake_nm - self.brake_nm);
+        std::array::from_fn(|i| {
+            let driven = if self.drive_share[i] > 0.0 { 1.0 } else { 0.0 };
+            let differential_nm = driven * self.differential_nms * (mean_radps - spin_radps[i]);
+            WheelTorque {
+                drive_nm: self.drive_nm * self.drive_share[i] + differential_nm,
+                brake_nm: self.brake_nm * self.brake_share[i],
+            }
+        })
+    }
+
+    /// Mean speed of the driven wheels [rad/s].
+    pub(crate) fn mean_spin_radps(&self, spin_radps: &[f64; 4]) -> f64 {
+        let driven = || (0..4).filter(|&i| self.drive_share[i] > 0.0);
+        driven().map(|i| spin_radps[i]).sum::<f64>() / driven().count() as f64
+    }
+
+    /// Wanted drive and brake torque: proportional-integral control of the wheel speed with the acceleration of
+    /// the ramped reference fed forward.
+    fn servo(&mut self, commanded_mps: f64, mean_radps: f64, step_s: f64) -> (f64, f64) {
+        let speed_mps = mean_radps * self.radius_m;
+        let most_mps = self.acceleration_max_mps2 * step_s;
+        let change_mps = (commanded_mps - self.reference_mps).clamp(-most_mps, most_mps);
+        self.reference_mps += change_mps;
+        if commanded_mps.abs() < PARKING_SPEED_MPS
+            && self.reference_mps.abs() < PARKING_SPEED_MPS
+            && speed_mps.abs() < STANDSTILL_MPS
+        {
+            self.integral_n = 0.0;
+            return (0.0, self.brake_max_nm);
+        }
+        let servo_s = self.response_s + SERVO_TIME_S;
+        let gain = 0.5 * self.mass_kg / servo_s;
+        let error_mps = self.reference_mps - speed_mps;
+        let feed_n = self.mass_kg * change_mps / step_s;
+        let wanted_nm = (feed_n + gain * error_mps + self.integral_n) * self.radius_m;
+        let forward = if self.reference_mps < 0.0 { -1.0 } else { 1.0 };
+        let power_nm = self.power_max_w / mean_radps.abs().max(1e-3);
+        let drive_max_nm = self.drive_max_nm.min(power_nm);
+        let along_nm = (forward * wanted_nm).clamp(-self.brake_max_nm, drive_max_nm);
+        // Integrates only while the actuators follow, or when that leads back to where they do.
+        if along_nm == forward * wanted_nm || (wanted_nm > 0.0) != (error_mps > 0.0) {
+            self.integral_n += gain * error_mps * step_s / (INTEGRAL_RATIO * servo_s);
+        }
+        if along_nm > 0.0 { (forward * along_nm, 0.0) } else { (0.0, -along_nm) }
+    }
+}

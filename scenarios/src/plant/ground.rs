@@ -1,0 +1,90 @@
+//! The surface that wheels and body touch: the ground, raised by the height of obstacles.
+
+use std::sync::Arc;
+
+use crate::{Patch, World};
+
+/// Heights that stop a vehicle, in the layout that the wheels' many lookups want.
+pub(crate) struct Ground {
+    surface_m: Vec<f32>,
+    first_centre_m: [f64; 2],
+    cells_per_m: f64,
+    n_rows: usize,
+    n_cols: usize,
+    world: Arc<World>,
+}
+
+impl Ground {
+    pub(crate) fn new(world: Arc<World>) -> Self {
+        let geometry = *world.geometry();
+        let raised = |(height_m, patch): (&f32, &Patch)| height_m + patch.obstacle_height_m;
+        Self {
+            surface_m: world.heights.values().iter().zip(world.patches.values()).map(raised).collect(),
+            first_centre_m: geometry.south_west_m().map(|edge_m| edge_m + 0.5 * geometry.resolution_m),
+            cells_per_m: 1.0 / geometry.resolution_m,
+            n_rows: geometry.n_rows,
+            n_cols: geometry.n_cols,
+            world,
+        }
+    }
+
+    /// Height of the surface [m]; beyond the border that of the nearest edge.
+    #[inline]
+    pub(crate) fn height_m(&self, x_m: f64, y_m: f64) -> f64 {
+        let place = |value_m: f64, first_m: f64, n: usize| {
+            let place = ((value_m - first_m) * self.cells_per_m).max(0.0).min((n - 1) as f64);
+            let index = (place as usize).min(n - 2);
+            (index, place - index as f64)
+        };
+        let (col, u) = place(x_m, self.first_centre_m[0], self.n_cols);
+        let (row, v) = place(y_m, self.first_centre_m[1], self.n_rows);
+        let start = row * self.n_cols + col;
+        let south = &self.surface_m[start..start + self.n_cols + 2];
+        let [south_west, south_east] = [south[0], south[1]].map(f64::from);
+        let [north_west, north_east] = [south[self.n_cols], south[self.n_cols + 1]].map(f64::from);
+        // The diagonal runs from south-west to north-east.
+        if u >= v {
+            south_west + u * (south_east - south_west) + v * (north_east - south_east)
+        } else {
+            south_west + v * (north_west - south_west) + u * (north_east - north_west)
+        }
+    }
+
+    /// What the ground is made of.
+    #[inline]
+    pub(crate) fn patch(&self, x_m: f64, y_m: f64) -> &Patch {
+        self.world.patch(x_m, y_m)
+    }
+
+    /// Whether the point lies between cell centres, where the surface is given and not continued.
+    pub(crate) fn contains(&self, x_m: f64, y_m: f64) -> bool {
+        let inside = |value_m: f64, first_m: f64, n: usize| {
+            let place = (value_m - first_m) * self.cells_per_m;
+            place >= 0.0 && place <= (n - 1) as f64
+        };
+        inside(x_m, self.first_centre_m[0], self.n_cols) && inside(y_m, self.first_centre_m[1], self.n_rows)
+    }
+
+    /// South-west and north-east end of the surface [m].
+    pub(crate) fn extent_m(&self) -> [[f64; 2]; 2] {
+        let [x_m, y_m] = self.first_centre_m;
+        let cell_m = 1.0 / self.cells_per_m;
+        let far_m = [x_m + (self.n_cols - 1) as f64 * cell_m, y_m + (self.n_rows - 1) as f64 * cell_m];
+        [[x_m, y_m], far_m]
+    }
+
+    /// Number of rows and columns.
+    pub(crate) fn size(&self) -> [usize; 2] {
+        [self.n_rows, self.n_cols]
+    }
+
+    /// All heights, row-major from the south-west [m].
+    pub(crate) fn surface_m(&self) -> &[f32] {
+        &self.surface_m
+    }
+
+    /// Edge of a cell [m].
+    pub(crate) fn resolution_m(&self) -> f64 {
+        1.0 / self.cells_per_m
+    }
+}

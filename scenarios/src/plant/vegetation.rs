@@ -1,0 +1,55 @@
+//! Plants that a wheel presses down and a bumper pushes through.
+
+use nalgebra::Vector2;
+
+/// Resistance over load for plants as tall as the wheel [-].
+const WHEEL_RESISTANCE: f64 = 0.4;
+/// Resistance over load for plants that reach a wheel's diameter up the bumper [-].
+const BUMPER_RESISTANCE: f64 = 0.3;
+/// How far stems bend before they give way, over the wheel's diameter [-].
+const BENDING_SHARE: f64 = 0.1;
+
+/// Bending of the stems before one wheel, east and north [m]: they push back before they give way, so that a
+/// vehicle stuck in a bush stays stuck.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Stems(Vector2<f64>);
+
+/// How deep a wheel stands in plants.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Immersion {
+    /// Height of the plants above the foot of the wheel [m].
+    pub height_m: f64,
+    /// Diameter of the wheel [m].
+    pub diameter_m: f64,
+    /// From the ground to the belly [m].
+    pub clearance_m: f64,
+}
+
+impl Immersion {
+    /// Horizontal resistance over the wheel's load [-].
+    pub(crate) fn resistance(&self) -> f64 {
+        let ratio = self.height_m / self.diameter_m;
+        let above_belly = (self.height_m - self.clearance_m).max(0.0) / self.diameter_m;
+        WHEEL_RESISTANCE * ratio * ratio + BUMPER_RESISTANCE * above_belly
+    }
+}
+
+impl Stems {
+    /// Bends the stems by a step of motion and gives their force on the wheel, east and north [N].
+    pub(crate) fn push_n(
+        &mut self,
+        immersion: &Immersion,
+        velocity_mps: Vector2<f64>,
+        load_n: f64,
+        step_s: f64,
+    ) -> Vector2<f64> {
+        if immersion.height_m <= 0.0 {
+            self.0 = Vector2::zeros();
+            return Vector2::zeros();
+        }
+        let bending_m = BENDING_SHARE * immersion.diameter_m;
+        let decay = step_s * velocity_mps.norm() / bending_m;
+        self.0 = (self.0 + velocity_mps * step_s) / (1.0 + decay);
+        -self.0 * (immersion.resistance() * load_n / bending_m)
+    }
+}

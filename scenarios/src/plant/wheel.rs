@@ -1,0 +1,294 @@
+//! One wheel on its strut: travel, spin, and the forces it hands to the body.
+
+use bicycle::{Suspension, Vehicle};
+use nalgebra::{Vector2, Vector3};
+
+use super::chassis::{BodyMotion, Wrench};
+use super::drivetrain::WheelTorque;
+use super::envelope::{Contact, Envelope, WheelFrame};
+use super::ground::Ground;
+use super::rest::Rest;
+use super::tyre::{Footing, Shear, Tyre};
+use super::vegetation::{Immersion, Stems};
+
+/// Stiffness of the travel stops over that of the spring [-].
+const STOP_RATIO: f64 = 10.0;
+/// Damping of the travel stops over critical for the wheel [-].
+const STOP_DAMPING: f64 = 0.3;
+/// Radial damping of the tyre over critical for the wheel [-].
+const TYRE_DAMPING: f64 = 0.05;
+
+/// State of one wheel.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Wheel {
+    /// Hub in the body frame at rest [m].
+    hub_m: Vector3<f64>,
+    /// Travel of the strut from rest, upwards [m].
+    pub travel_m: f64,
+    travel_mps: f64,
+    /// Turning about the axle in space, forward positive [rad/s].
+    turning_radps: f64,
+    /// Turning relative to the body [rad/s].
+    pub spin_radps: f64,
+    shear: Shear,
+    stems: Stems,
+    /// Normal force of the ground [N].
+    pub load_n: f64,
+    /// Where the ground pushes, if it does.
+    pub contact: Option<Contact>,
+}
+
+/// Strut of one axle's wheels.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Strut {
+    suspension: Suspension,
+    /// Spring force at rest [N].
+    preload_n: f64,
+    stop_n_per_m: f64,
+    stop_ns_per_m: f64,
+}
+
+/// What acts on one wheel from the vehicle's side.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct WheelInput {
+    pub steering_rad: f64,
+    pub torque: WheelTorque,
+    /// Force of the anti-roll bar between body and wheel [N].
+    pub anti_roll_n: f64,
+}
+
+/// What all wheels have in common.
+pub(crate) struct RunningGear {
+    pub envelope: Envelope,
+    tyre: Tyre,
+    mass_kg: f64,
+    spin_inertia_kgm2: f64,
+    radius_m: f64,
+    clearance_m: f64,
+    rolling_resistance: f64,
+    reference_load_n: f64,
+    radial_n_per_m: f64,
+    radial_ns_per_m: f64,
+    step_s: f64,
+}
+
+/// How the tread moves over the ground.
+struct Slide {
+    forward: Vector3<f64>,
+    left: Vector3<f64>,
+    slip_mps: Vector2<f64>,
+    rolling_radius_m: f64,
+    load_n: f64,
+}
+
+/// What the ground does to a wheel.
+struct Stand {
+    /// Force on the hub [N].
+    force_n: Vector3<f64>,
+    /// Friction's torque against the wheel's turning [N m].
+    grip_nm: f64,
+    /// Its growth with the turning within a step [N m s].
+    grip_nms: f64,
+    /// Rolling resistance [N m].
+    resistance_nm: f64,
+}
+
+impl Wheel {
+    pub(crate) fn at(hub_m: Vector3<f64>) -> Self {
+        Self {
+            hub_m,
+            travel_m: 0.0,
+            travel_mps: 0.0,
+            turning_radps: 0.0,
+            spin_radps: 0.0,
+            shear: Shear::default(),
+            stems: Stems::default(),
+            load_n: 0.0,
+            contact: None,
+        }
+    }
+
+    /// Where the wheel is on a body that moves so.
+    pub(crate) fn frame(&self, body: &BodyMotion, steering_rad: f64) -> WheelFrame {
+        let [ahead, left, up] = body.axes;
+        let (sin, cos) = steering_rad.sin_cos();
+        WheelFrame {
+            hub_m: body.point_m(&(self.hub_m + Vector3::z() * self.travel_m)),
+            forward: ahead * cos + left * sin,
+            left: left * cos - ahead * sin,
+            up,
+        }
+    }
+}
+
+impl Strut {
+    pub(crate) fn new(suspension: Suspension, load_n: f64, wheel_kg: f64) -> Self {
+        let stop_n_per_m = STOP_RATIO * suspension.stiffness_n_per_m;
+        let stop_ns_per_m = 2.0 * STOP_DAMPING * (stop_n_per_m * wheel_kg).sqrt();
+        Self { suspension, preload_n: load_n, stop_n_per_m, stop_ns_per_m }
+    }
+
+    /// Force at a travel [N], its stiffness [N/m] and damping [N s/m].
+    fn law(&self, travel_m: f64) -> [f64; 3] {
+        let Suspension { stiffness_n_per_m, damping_ns_per_m, travel_m: most_m } = self.suspension;
+        let spring_n = self.preload_n + stiffness_n_per_m * travel_m;
+        // An unloaded spring is loose, it does not pull.
+        let spring = if spring_n > 0.0 { [spring_n, stiffness_n_per_m] } else { [0.0, 0.0] };
+        let beyond_m = travel_m - travel_m.clamp(-most_m, most_m);
+        if beyond_m == 0.0 {
+            return [spring[0], spring[1], damping_ns_per_m];
+        }
+        let force_n = spring[0] + self.stop_n_per_m * beyond_m;
+        [force_n, spring[1] + self.stop_n_per_m, damping_ns_per_m + self.stop_ns_per_m]
+    }
+}
+
+impl RunningGear {
+    pub(crate) fn new(vehicle: &Vehicle, rest: &Rest, cell_m: f64, step_s: f64) -> Self {
+        let radial_n_per_m = vehicle.tyre.radial_stiffness_n_per_m;
+        let reference_load_n = 0.25 * rest.mass_kg * super::GRAVITY_MPS2;
+        let radius_m = vehicle.geometry.wheel_radius_m;
+        let width_m = vehicle.wheel.width_m;
+        Self {
+            envelope: Envelope::new(radius_m, width_m, radial_n_per_m, reference_load_n, cell_m),
+            tyre: Tyre::new(vehicle, reference_load_n),
+            mass_kg: vehicle.wheel.mass_kg,
+            spin_inertia_kgm2: vehicle.wheel.spin_inertia_kgm2,
+            radius_m,
+            clearance_m: vehicle.geometry.ground_clearance_m,
+            rolling_resistance: vehicle.tyre.rolling_resistance,
+            reference_load_n,
+            radial_n_per_m,
+            radial_ns_per_m: 2.0 * TYRE_DAMPING * (radial_n_per_m * vehicle.wheel.mass_kg).sqrt(),
+            step_s,
+        }
+    }
+
+    /// Advances a wheel by a step and adds its forces on the body to `wrench`.
+    pub(crate) fn step(
+        &self,
+        (wheel, strut): (&mut Wheel, &Strut),
+        input: &WheelInput,
+        body: &BodyMotion,
+        ground: &Ground,
+        wrench: &mut Wrench,
+    ) {
+        let frame = wheel.frame(body, input.steering_rad);
+        let hub_mps = body.velocity_at_mps(&frame.hub_m) + frame.up * wheel.travel_mps;
+        let body_radps = body.angular_radps.dot(&frame.left);
+        wheel.contact = self.envelope.touch(ground, &frame);
+        let stand = match wheel.contact {
+            Some(contact) => {
+                let slide = self.slide(wheel, &contact, &frame, &hub_mps, body);
+                self.stand(wheel, &contact, &slide, ground)
+            }
+            None => self.hang(wheel),
+        };
+        let shaft_nm = self.turn(wheel, &stand, &input.torque, body_radps);
+        // About its own axle the wheel turns freely: there the body feels the shaft and nothing else.
+        let arm_m = wheel.contact.map_or_else(Vector3::zeros, |contact| contact.point_m - frame.hub_m);
+        let moment_nm = arm_m.cross(&stand.force_n);
+        wrench.torque_nm += moment_nm - frame.left * (moment_nm.dot(&frame.left) + shaft_nm);
+        // Along the strut the body feels the spring and nothing else.
+        let along_n = stand.force_n.dot(&frame.up);
+        let strut_n = self.stroke(wheel, strut, along_n - input.anti_roll_n) + input.anti_roll_n;
+        let stems_n = self.stems_n(wheel, &frame, &hub_mps, ground);
+        wrench.add_at(stand.force_n + frame.up * (strut_n - along_n) + stems_n, &frame.hub_m, body);
+    }
+
+    fn slide(
+        &self,
+        wheel: &Wheel,
+        contact: &Contact,
+        frame: &WheelFrame,
+        hub_mps: &Vector3<f64>,
+        body: &BodyMotion,
+    ) -> Slide {
+        let forward = frame.left.cross(&contact.normal).normalize();
+        let left = contact.normal.cross(&forward);
+        // All of the body's turning but that about the axle, which is the wheel's own.
+        let carrier_radps = body.angular_radps - frame.left * body.angular_radps.dot(&frame.left);
+        let carried_mps = hub_mps + carrier_radps.cross(&(contact.point_m - frame.hub_m));
+        // Radial tyres roll on a radius a third of the deflection below the unloaded one.
+        let rolling_radius_m = self.radius_m - (self.radius_m - contact.loaded_radius_m) / 3.0;
+        let tread_mps = wheel.turning_radps * rolling_radius_m;
+        let slip_mps = Vector2::new(carried_mps.dot(&forward) - tread_mps, carried_mps.dot(&left));
+        let damping_ns_per_m = self.radial_ns_per_m * (contact.force_n / self.reference_load_n).min(1.0);
+        let load_n = (contact.force_n - damping_ns_per_m * hub_mps.dot(&contact.normal)).max(0.0);
+        Slide { forward, left, slip_mps, rolling_radius_m, load_n }
+    }
+
+    fn stand(&self, wheel: &mut Wheel, contact: &Contact, slide: &Slide, ground: &Ground) -> Stand {
+        let soil = ground.patch(contact.point_m.x, contact.point_m.y);
+        let footing = Footing {
+            slip_mps: slide.slip_mps,
+            rolling_mps: wheel.spin_radps * slide.rolling_radius_m,
+            load_n: slide.load_n,
+            friction: soil.friction,
+        };
+        let grip = self.tyre.grip(&mut wheel.shear, &footing, self.step_s);
+        let resistance = self.rolling_resistance + f64::from(soil.rolling_resistance);
+        wheel.load_n = slide.load_n;
+        Stand {
+            force_n: contact.normal * slide.load_n
+                + slide.forward * grip.force_n.x
+                + slide.left * grip.force_n.y,
+            grip_nm: grip.force_n.x * slide.rolling_radius_m,
+            grip_nms: grip.stiffness_ns_per_m * slide.rolling_radius_m * slide.rolling_radius_m,
+            resistance_nm: resistance * slide.load_n * slide.rolling_radius_m,
+        }
+    }
+
+    fn hang(&self, wheel: &mut Wheel) -> Stand {
+        wheel.shear = Shear::default();
+        wheel.load_n = 0.0;
+        Stand { force_n: Vector3::zeros(), grip_nm: 0.0, grip_nms: 0.0, resistance_nm: 0.0 }
+    }
+
+    /// Turns the wheel by a step, implicitly in the slip, and gives the torque of the shaft on the wheel [N m].
+    fn turn(&self, wheel: &mut Wheel, stand: &Stand, torque: &WheelTorque, body_radps: f64) -> f64 {
+        let inertia_kgm2 = self.spin_inertia_kgm2 + self.step_s * stand.grip_nms;
+        let free_radps = wheel.turning_radps + self.step_s * (torque.drive_nm - stand.grip_nm) / inertia_kgm2;
+        // Brake and rolling resistance stop the wheel at most; they do not turn it back.
+        let most_nm = torque.brake_nm + stand.resistance_nm;
+        let stopping_nm = -inertia_kgm2 * (free_radps - body_radps) / self.step_s;
+        let retarding_nm = stopping_nm.clamp(-most_nm, most_nm);
+        wheel.turning_radps = free_radps + self.step_s * retarding_nm / inertia_kgm2;
+        wheel.spin_radps = if retarding_nm == stopping_nm { 0.0 } else { wheel.turning_radps - body_radps };
+        let braking_nm = if most_nm > 0.0 { retarding_nm * torque.brake_nm / most_nm } else { 0.0 };
+        torque.drive_nm + braking_nm
+    }
+
+    /// Moves the strut by a step, implicitly in its own and the tyre's stiffness, and gives its force [N].
+    fn stroke(&self, wheel: &mut Wheel, strut: &Strut, load_n: f64) -> f64 {
+        let [force_n, stiffness_n_per_m, damping_ns_per_m] = strut.law(wheel.travel_m);
+        let tyre_n_per_m = if wheel.contact.is_some() { self.radial_n_per_m } else { 0.0 };
+        let inertia_kg = self.mass_kg
+            + self.step_s * (damping_ns_per_m + self.step_s * (stiffness_n_per_m + tyre_n_per_m));
+        wheel.travel_mps = (self.mass_kg * wheel.travel_mps + self.step_s * (load_n - force_n)) / inertia_kg;
+        wheel.travel_m += self.step_s * wheel.travel_mps;
+        force_n + (self.step_s * stiffness_n_per_m + damping_ns_per_m) * wheel.travel_mps
+    }
+
+    fn stems_n(
+        &self,
+        wheel: &mut Wheel,
+        frame: &WheelFrame,
+        hub_mps: &Vector3<f64>,
+        ground: &Ground,
+    ) -> Vector3<f64> {
+        // Plants are met at the leading edge of the wheel.
+        let ahead_m = self.radius_m.copysign(hub_mps.dot(&frame.forward));
+        let edge_m = frame.hub_m + frame.forward * ahead_m;
+        let plants_m = f64::from(ground.patch(edge_m.x, edge_m.y).vegetation_height_m);
+        let mut immersion =
+            Immersion { height_m: plants_m, diameter_m: 2.0 * self.radius_m, clearance_m: self.clearance_m };
+        if plants_m > 0.0 {
+            let foot_m = frame.hub_m.z - self.radius_m;
+            let above_m = ground.height_m(edge_m.x, edge_m.y) + plants_m - foot_m;
+            immersion.height_m = above_m.clamp(0.0, plants_m);
+        }
+        let force_n = wheel.stems.push_n(&immersion, hub_mps.xy(), self.reference_load_n, self.step_s);
+        Vector3::new(force_n.x, force_n.y, 0.0)
+    }
+}

@@ -1,0 +1,106 @@
+//! The machines and grounds that the plant is validated with.
+#![allow(dead_code, missing_docs)]
+
+use std::sync::Arc;
+
+use bicycle::{
+    Axle, Body, Drivetrain, Geometry, Limits, Servo, Suspension, Tyre, Vehicle, Wheel,
+};
+use scenarios::{Patch, Stribeck, World};
+use terrain::GridGeometry;
+
+/// 3.4 x 1.8 m, 1500 kg: m g = 14 715 N.
+pub fn full_size() -> Vehicle {
+    let axle = |anti_roll_nm_per_rad| Axle {
+        suspension: Suspension { stiffness_n_per_m: 30_200.0, damping_ns_per_m: 2560.0, travel_m: 0.15 },
+        anti_roll_nm_per_rad,
+    };
+    Vehicle {
+        name: "full_size".into(),
+        geometry: Geometry {
+            wheelbase_m: 2.5,
+            track_m: 1.55,
+            length_m: 3.4,
+            width_m: 1.8,
+            rear_overhang_m: 0.45,
+            ground_clearance_m: 0.35,
+            wheel_radius_m: 0.45,
+        },
+        limits: Limits {
+            speed_max_mps: 30.0,
+            reverse_speed_max_mps: 3.0,
+            steering_max_rad: 0.5236,
+            steering_rate_max_radps: 0.6,
+            acceleration_max_mps2: 1.5,
+            lateral_acceleration_max_mps2: 3.0,
+            roll_max_rad: 0.5236,
+            pitch_max_rad: 0.5236,
+        },
+        body: Body { mass_kg: 1360.0, inertia_kgm2: [370.0, 1270.0, 1420.0], cog_ahead_m: 1.25, cog_height_m: 0.75 },
+        wheel: Wheel { mass_kg: 35.0, spin_inertia_kgm2: 5.0, width_m: 0.25 },
+        front: axle(6000.0),
+        rear: axle(3000.0),
+        drivetrain: Drivetrain {
+            drive_torque_max_nm: 6000.0,
+            brake_torque_max_nm: 8000.0,
+            power_max_w: 60_000.0,
+            rear_share: 0.5,
+            response_s: 0.15,
+        },
+        servo: Servo { response_s: 0.15, delay_s: 0.05 },
+        tyre: Tyre {
+            rolling_resistance: 0.02,
+            relaxation_length_m: 0.3,
+            load_sensitivity: 0.1,
+            radial_stiffness_n_per_m: 150_000.0,
+        },
+    }
+}
+
+/// 0.33 x 0.25 m, 3 kg, wheels of 0.15 m.
+pub fn rc_car() -> Vehicle {
+    let axle = Axle {
+        suspension: Suspension { stiffness_n_per_m: 379.0, damping_ns_per_m: 12.1, travel_m: 0.02 },
+        anti_roll_nm_per_rad: 0.0,
+    };
+    Vehicle {
+        name: "rc_car".into(),
+        geometry: Geometry {
+            wheelbase_m: 0.18,
+            track_m: 0.19,
+            length_m: 0.33,
+            width_m: 0.25,
+            rear_overhang_m: 0.075,
+            ground_clearance_m: 0.05,
+            wheel_radius_m: 0.075,
+        },
+        limits: Limits {
+            speed_max_mps: 5.0,
+            reverse_speed_max_mps: 0.75,
+            steering_max_rad: 0.5236,
+            steering_rate_max_radps: 4.0,
+            acceleration_max_mps2: 2.5,
+            lateral_acceleration_max_mps2: 4.0,
+            roll_max_rad: 0.5236,
+            pitch_max_rad: 0.7854,
+        },
+        body: Body { mass_kg: 2.4, inertia_kgm2: [0.010, 0.020, 0.026], cog_ahead_m: 0.09, cog_height_m: 0.075 },
+        wheel: Wheel { mass_kg: 0.15, spin_inertia_kgm2: 0.00068, width_m: 0.06 },
+        front: axle,
+        rear: axle,
+        drivetrain: Drivetrain {
+            drive_torque_max_nm: 2.5,
+            brake_torque_max_nm: 3.0,
+            power_max_w: 60.0,
+            rear_share: 0.5,
+            response_s: 0.05,
+        },
+        servo: Servo { response_s: 0.06, delay_s: 0.02 },
+        tyre: Tyre {
+            rolling_resistance: 0.03,
+            relaxation_length_m: 0.03,
+            load_sensitivity: 0.05,
+            radial_stiffness_n_per_m: 3000.0,
+        },
+    }
+}
