@@ -1,0 +1,238 @@
+//! The shape of the repository, held by what `cargo metadata` and the text of the tree say.
+
+#![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
+
+use cargo_metadata::{DependencyKind, Metadata, MetadataCommand};
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+use std::sync::LazyLock;
+
+/// Every crate with the internal crates that its product may use, and no others. `cli` calls `bench` to run
+/// `surefoot bench`; `tests` may use all, but has no product: it has dev-dependencies only.
+const MAY_USE: [(&str, &[&str]); 11] = [
+    ("terrain", &[]),
+    ("traversability", &["terrain"]),
+    ("bicycle", &[]),
+    ("physics_prior", &["terrain", "traversability", "bicycle"]),
+    ("mppi", &["traversability", "bicycle"]),
+    ("navigator", &["terrain", "traversability", "bicycle", "physics_prior", "mppi"]),
+    ("scenarios", &["terrain", "bicycle"]),
+    ("formats", &["terrain", "traversability", "bicycle"]),
+    ("bench", &LIBRARIES),
+    ("cli", &LIBRARIES_AND_BENCH),
+    ("tests", &[]),
+];
+const LIBRARIES: [&str; 8] =
+    ["terrain", "traversability", "bicycle", "physics_prior", "mppi", "navigator", "scenarios", "formats"];
+const LIBRARIES_AND_BENCH: [&str; 9] = [
+    "terrain",
+    "traversability",
+    "bicycle",
+    "physics_prior",
+    "mppi",
+    "navigator",
+    "scenarios",
+    "formats",
+    "bench",
+];
+
+/// Crates that may read a clock: those that talk to a person or measure.
+const MAY_READ_CLOCK: [&str; 3] = ["cli", "bench", "tests"];
+/// Crates that may touch files and processes.
+const MAY_TOUCH_FILES: [&str; 3] = ["formats", "cli", "tests"];
+/// Where unsafe code may stand: the rollout kernel, and the allocator that counts in a test.
+const MAY_BE_UNSAFE: [&str; 3] = ["mppi/src/kernel.rs", "mppi/src/kernel/", "mppi/tests/allocations.rs"];
+/// The model's dynamics, which no plant may use.
+const DYNAMICS: [&str; 8] =
+    ["Effect", "GroundSample", "LaneState", "Model", "Stepper", "effect", "lanes", "*"];
+
+static METADATA: LazyLock<Metadata> = LazyLock::new(|| MetadataCommand::new().no_deps().exec().unwrap());
+
+fn root() -> &'static Path {
+    METADATA.workspace_root.as_std_path()
+}
+
+fn read(path: &str) -> String {
+    std::fs::read_to_string(root().join(path)).unwrap_or_else(|error| panic!("{path}: {error}"))
+}
+
+/// A source file: its path from the repository's root, and its text without comments.
+struct Source {
+    path: String,
+    code: String,
+}
+
+impl Source {
+    fn read(path: &Path) -> Self {
+        let text = std::fs::read_to_string(path).unwrap();
+        let without_comment = |line: &str| line.split("//").next().unwrap_or_default().to_owned();
+        Self {
+            path: path.strip_prefix(root()).unwrap().to_str().unwrap().to_owned(),
+            code: text.lines().map(without_comment).collect::<Vec<_>>().join("\n"),
+        }
+    }
+
+    fn in_crates(&self, crates: &[&str]) -> bool {
+        self.path.split('/').next().is_some_and(|folder| crates.contains(&folder))
+    }
+
+    /// Where `needle` stands in the code as whole words.
+    fn places(&self, needle: &str) -> Vec<String> {
+        let is_word = |c: char| c.is_alphanumeric() || c == '_';
+        let found = |line: &str| {
+            line.match_indices(needle).any(|(start, _)| {
+                let (before, after) = (&line[..start], &line[start + needle.len()..]);
+                !before.ends_with(is_word) && !after.starts_with(is_word)
+            })
+        };
+        let lines = self.code.lines().enumerate().filter(|(_, line)| found(line));
+        lines.map(|(i, line)| format!("{}:{}: {}", self.path, i + 1, line.trim())).collect()
+    }
+
+    /// Names that the code takes from a crate by `crate::name` or `crate::{name, ..}`.
+    fn names_from(&self, from: &str) -> Vec<&str> {
+        let path = format!("{from}::");
+        let listed = |(start, _): (usize, &str)| {
+            let rest = &self.code[start + path.len()..];
+            let end = if rest.starts_with('{') {
+                rest.find('}')
+            } else {
+                rest.find([';', '(', ',', ')', ' ', '>'])
+            };
+            &rest[..end.unwrap_or(rest.len())]
+        };
+        let separates = |c: char| !(c.is_alphanumeric() || c == '_' || c == '*');
+        let lists = self.code.match_indices(&path).map(listed);
+        lists.flat_map(|list| list.split(separates)).filter(|name| !name.is_empty()).collect()
+    }
+}
+
+/// Every Rust file of every crate but this one, which has to name what it forbids.
+fn sources() -> Vec<Source> {
+    let mut folders: Vec<PathBuf> = MAY_USE.iter().map(|(name, _)| root().join(name)).collect();
+    let mut sources = Vec::new();
+    while let Some(folder) = folders.pop() {
+        for entry in std::fs::read_dir(&folder).unwrap() {
+            let path = entry.unwrap().path();
+            if path.is_dir() {
+                folders.push(path);
+            } else if path.extension().is_some_and(|extension| extension == "rs") {
+                sources.push(Source::read(&path));
+            }
+        }
+    }
+    sources.retain(|source| source.path != "tests/tests/architecture.rs");
+    assert!(sources.len() > 20, "the walk found only {} files", sources.len());
+    sources
+}
+
+fn assert_absent(word: &str, searched: impl Fn(&Source) -> bool) {
+    let places: Vec<String> =
+        sources().iter().filter(|source| searched(source)).flat_map(|source| source.places(word)).collect();
+    assert!(places.is_empty(), "`{word}` must not stand in\n{}", places.join("\n"));
+}
+
+#[test]
+fn crates_use_only_what_they_may() {
+    let may_use: BTreeMap<&str, &[&str]> = MAY_USE.into_iter().collect();
+    let packages = METADATA.workspace_packages();
+    let names: BTreeSet<&str> = packages.iter().map(|package| package.name.as_str()).collect();
+    assert_eq!(names, may_use.keys().copied().collect(), "the crates of the workspace");
+    for package in packages {
+        let name = package.name.as_str();
+        for dependency in package.dependencies.iter().filter(|dependency| dependency.path.is_some()) {
+            let used = dependency.name.as_str();
+            assert!(names.contains(used), "{name} uses {used}, which lies outside the workspace");
+            let allowed = dependency.kind != DependencyKind::Normal || may_use[name].contains(&used);
+            assert!(allowed, "{name} uses {used}; it may use {:?}", may_use[name]);
+        }
+    }
+}
+
+#[test]
+fn folders_are_crates_and_share_the_lints() {
+    for package in METADATA.workspace_packages() {
+        let manifest = format!("{}/Cargo.toml", package.name);
+        assert_eq!(root().join(&manifest), package.manifest_path.as_std_path(), "folder name = crate name");
+        assert!(read(&manifest).contains("[lints]\nworkspace = true"), "{manifest} has lints of its own");
+        assert_eq!(package.publish, Some(Vec::new()), "{manifest}: nothing is published yet");
+    }
+}
+
+#[test]
+fn the_map_shows_the_crates_that_exist_and_no_others() {
+    let text = read("ARCHITECTURE.md");
+    // A room is a row of the table: | `name` | ...
+    let rooms: BTreeSet<&str> =
+        text.lines().filter_map(|line| line.strip_prefix("| `")?.split('`').next()).collect();
+    assert_eq!(rooms, MAY_USE.iter().map(|(name, _)| *name).collect());
+}
+
+#[test]
+fn the_map_points_at_files_that_exist() {
+    let text = read("ARCHITECTURE.md");
+    let quoted = text.split('`').skip(1).step_by(2);
+    let missing: Vec<&str> =
+        quoted.filter(|name| name.ends_with(".rs") && !root().join(name).exists()).collect();
+    assert!(missing.is_empty(), "ARCHITECTURE.md names {missing:?}");
+}
+
+#[test]
+fn files_stay_short() {
+    let sources = sources();
+    let long = sources.iter().filter(|source| source.code.lines().count() > 800);
+    let long: Vec<&str> = long.map(|source| source.path.as_str()).collect();
+    assert!(long.is_empty(), "over 800 lines: {long:?}");
+}
+
+#[test]
+fn nothing_below_the_command_line_reads_a_clock() {
+    for clock in ["Instant", "SystemTime", "UNIX_EPOCH", "sleep"] {
+        assert_absent(clock, |source| !source.in_crates(&MAY_READ_CLOCK));
+    }
+}
+
+#[test]
+fn nothing_below_formats_touches_files_or_processes() {
+    let is_product = |source: &Source| source.path.split('/').nth(1) == Some("src");
+    for access in ["std::fs", "std::process", "std::env", "std::net", "File"] {
+        assert_absent(access, |source| is_product(source) && !source.in_crates(&MAY_TOUCH_FILES));
+    }
+}
+
+#[test]
+fn no_plant_is_built_on_the_models_dynamics() {
+    for source in sources().iter().filter(|source| source.in_crates(&["scenarios"])) {
+        for name in source.names_from("bicycle") {
+            assert!(!DYNAMICS.contains(&name), "{} uses bicycle's {name}", source.path);
+        }
+    }
+}
+
+#[test]
+fn unsafe_code_stands_in_the_kernel_alone() {
+    let allowed = |source: &Source| MAY_BE_UNSAFE.iter().any(|place| source.path.starts_with(place));
+    for word in ["unsafe", "unsafe_code"] {
+        assert_absent(word, |source| !allowed(source));
+    }
+}
+
+#[test]
+fn no_test_is_skipped() {
+    assert_absent("#[ignore", |_| true);
+}
+
+#[test]
+fn the_readme_says_how_to_drive_and_to_test_and_ci_does_the_latter() {
+    let readme = read("README.md");
+    let commands: Vec<&str> =
+        readme.lines().map(str::trim).filter(|line| line.starts_with("cargo ")).collect();
+    let first = |start: &str| {
+        let found = commands.iter().find(|command| command.starts_with(start));
+        *found.unwrap_or_else(|| panic!("README.md: no `{start}` among {commands:?}"))
+    };
+    first("cargo run --release -- drive");
+    let script = read(".ci/run");
+    let run: Vec<&str> = script.lines().filter(|line| line.starts_with("cargo ")).collect();
+    assert_eq!(run, [first("cargo test")], ".ci/run and README.md must agree");
+}
