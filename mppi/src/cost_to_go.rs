@@ -33,7 +33,8 @@ pub enum Neighbourhood {
 pub struct CostToGoConfig {
     /// Directions of travel that the search knows.
     pub neighbourhood: Neighbourhood,
-    /// Speed on unknown cells over the vehicle's speed limit, in (0, 1].
+    /// Speed on unknown cells over the vehicle's speed limit, in (0, 1]; whatever the risk map says of them, unless
+    /// the footprint touches an obstacle.
     pub unknown_speed_share: f64,
     /// Speed beyond the window over the vehicle's speed limit, in (0, 1].
     pub outside_speed_share: f64,
@@ -246,18 +247,18 @@ impl CostToGo {
         for (index, risks) in map.risks.chunks_exact(map.n_yaws).enumerate() {
             let flags = map.ground[index].flags;
             let place = self.padded(map.geometry.cell(index));
-            self.slowness[place] = if flags.contains(GroundFlags::OBSTACLE) {
-                [self.forbidden_slowness(); 16]
-            } else if flags.contains(GroundFlags::UNKNOWN) {
-                [self.slowness_at(self.config.unknown_speed_share); 16]
-            } else {
-                yaw_bins.map(|bin| self.slowness_of(risks[bin]))
-            };
+            self.slowness[place] = yaw_bins.map(|bin| self.slowness_of(flags, risks[bin]));
         }
     }
 
-    /// Time per metre [s/m] over ground that is known.
-    fn slowness_of(&self, risk: Risk) -> f32 {
+    /// Time per metre of one pose [s/m].
+    fn slowness_of(&self, flags: GroundFlags, risk: Risk) -> f32 {
+        if flags.contains(GroundFlags::OBSTACLE) {
+            return self.forbidden_slowness();
+        }
+        if flags.contains(GroundFlags::UNKNOWN) && !risk.is_blocked() {
+            return self.slowness_at(self.config.unknown_speed_share);
+        }
         // Each comparison fails for NaN, so that a broken value is forbidden.
         let upright = risk.roll_rad <= self.roll_max_rad && risk.pitch_rad <= self.pitch_max_rad;
         let moves = risk.linear_traction * self.config.forbidden_slowdown as f32 > 1.0;

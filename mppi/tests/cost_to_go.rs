@@ -252,6 +252,11 @@ fn unknown_ground_takes_the_assumed_share_of_the_speed() {
     unknown.iter().for_each(|cell| flag(&mut map, cell.row, cell.col, GroundFlags::UNKNOWN));
     let field = field(Neighbourhood::Eight, &map, map.geometry().centre_m(Cell { row: 5, col: 3 }));
     close(at(&field.view(), 5, 23), 20.0 * RESOLUTION_M / (SPEED_MPS * UNKNOWN_SPEED_SHARE));
+    // A footprint that touches an obstacle forbids an unknown cell too: a wall of such poses costs one cell of it.
+    (1..10).for_each(|row| block(&mut map, row, 15));
+    let walled = self::field(Neighbourhood::Eight, &map, map.geometry().centre_m(Cell { row: 5, col: 3 }));
+    let expected_cells = 19.0 / UNKNOWN_SPEED_SHARE + SLOWDOWN;
+    close(at(&walled.view(), 5, 23), expected_cells * RESOLUTION_M / SPEED_MPS);
 }
 
 #[test]
@@ -294,6 +299,9 @@ fn random_map(seed: u64, n_rows: usize, n_cols: usize, n_yaws: usize) -> RiskMap
             roll_rad: rng.random_range(0.0..0.55),
             pitch_rad: rng.random_range(0.0..0.65),
         };
+        if rng.random_bool(0.05) {
+            *risk = risk.blocked();
+        }
     }
     for ground in ground {
         ground.flags = match rng.random_range(0..10) {
@@ -332,7 +340,7 @@ impl Oracle<'_> {
             if self.goal_inside() { 0.0 } else { SPEED_MPS * OUTSIDE_SPEED_SHARE }
         } else if flags.contains(GroundFlags::OBSTACLE) {
             0.0
-        } else if flags.contains(GroundFlags::UNKNOWN) {
+        } else if flags.contains(GroundFlags::UNKNOWN) && risk.roll_rad < 3.0 {
             SPEED_MPS * UNKNOWN_SPEED_SHARE
         } else if risk.roll_rad > 0.5 || risk.pitch_rad > 0.6 {
             0.0
