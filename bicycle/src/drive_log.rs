@@ -264,7 +264,7 @@ impl<'a> Run<'a> {
     }
 
     /// The rows with all their values.
-    pub fn drive_rows(&self) -> impl ExactSizeIterator<Item = DriveRow> + 'a {
+    pub fn drive_rows(self) -> impl ExactSizeIterator<Item = DriveRow> + 'a {
         let log = self.log;
         self.rows().map(move |row| DriveRow {
             time_s: log.time_s[row],

@@ -5,10 +5,12 @@
 
 mod config;
 mod elevation;
+mod recording;
 mod vehicle;
 
 pub use config::{ConfigError, ConfigText};
 pub use elevation::{
     ElevationError, ElevationFile, ElevationLayers, PngScale, read_elevation, read_elevation_png,
 };
+pub use recording::{DriveRecorder, McapDriveLog, McapReadError, RecordError, read_drive_log_mcap};
 pub use vehicle::{parse_vehicle, read_vehicle, shipped_vehicle_names, shipped_vehicle_text};

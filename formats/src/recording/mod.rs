@@ -1,0 +1,284 @@
+//! Recordings of drives as MCAP under Foxglove's own schemas, and the drive log back out of them.
+
+mod drive_row;
+mod grids;
+mod json;
+mod read;
+mod scene;
+mod watched_file;
+
+use std::collections::BTreeMap;
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use bicycle::{Command, Decision, DriveRow};
+use foxglove::messages::{
+    FrameTransform, Grid, PointCloud, PoseInFrame, PosesInFrame, SceneUpdate, Timestamp,
+};
+use foxglove::{
+    Channel, Context, Encode, FoxgloveError, McapCompression, McapWriteOptions, McapWriterHandle,
+};
+use serde::Serialize;
+use terrain::{GridMap, Pose, Scan, SurfaceCell};
+use traversability::RiskMapView;
+
+use drive_row::DriveLogRow;
+use json::JsonChannels;
+use watched_file::{Fault, WatchedFile};
+
+pub use read::{McapDriveLog, McapReadError, read_drive_log_mcap};
+
+/// Frame of maps, poses and rollouts: x east, y north, z up.
+const MAP_FRAME: &str = "map";
+/// Frame of scans: the rear axle's centre, forward-left-up.
+const BODY_FRAME: &str = "body";
+/// Longest stretch of a drive that a crash may cost.
+const FLUSH_INTERVAL_NS: u64 = 1_000_000_000;
+
+/// A recording that cannot be written.
+#[derive(Debug, thiserror::Error)]
+pub enum RecordError {
+    /// The file could not be created or its first bytes not be written.
+    #[error("{}: expected a place to record to, found: {problem}", path.display())]
+    Create {
+        /// Path as given.
+        path: PathBuf,
+        /// What the system said.
+        problem: String,
+    },
+    /// A later write failed, e.g. because the disk is full; what was written before stays readable.
+    #[error("{}: the recording ends here, a write failed: {problem}", path.display())]
+    Write {
+        /// Path as given.
+        path: PathBuf,
+        /// What the system said.
+        problem: String,
+    },
+    /// A diagnostic value has no form in JSON.
+    #[error("topic {topic}: expected values that JSON can hold, found: {problem}")]
+    NoJson {
+        /// Topic.
+        topic: &'static str,
+        /// What the serialiser said.
+        problem: String,
+    },
+}
+
+/// Writes a drive into an MCAP file that opens in Foxglove.
+///
+/// It writes into the file that it is given, chunk by chunk, and flushes once per second of the drive: a process that
+/// is killed leaves all but its last second, readable. Finishing, or dropping, adds the index. Times are the
+/// caller's, monotonic [ns].
+pub struct DriveRecorder {
+    path: PathBuf,
+    writer: McapWriterHandle<WatchedFile>,
+    fault: Fault,
+    flushed_at_ns: Option<u64>,
+    channels: Channels,
+    json: JsonChannels,
+}
+
+/// Topics under Foxglove's schemas.
+struct Channels {
+    transform: Channel<FrameTransform>,
+    pose: Channel<PoseInFrame>,
+    goal: Channel<PoseInFrame>,
+    path: Channel<PosesInFrame>,
+    rollouts: Channel<SceneUpdate>,
+    elevation: Channel<Grid>,
+    risk: Channel<Grid>,
+    scan: Channel<PointCloud>,
+    drive_log: Channel<DriveLogRow>,
+}
+
+impl Channels {
+    fn new(context: &Arc<Context>) -> Self {
+        fn channel<T: Encode>(context: &Arc<Context>, topic: &str) -> Channel<T> {
+            context.channel_builder(topic).build()
+        }
+        Self {
+            transform: channel(context, "/tf"),
+            pose: channel(context, "/pose"),
+            goal: channel(context, "/goal"),
+            path: channel(context, "/path"),
+            rollouts: channel(context, "/rollouts"),
+            elevation: channel(context, "/elevation"),
+            risk: channel(context, "/risk"),
+            scan: channel(context, "/scan"),
+            drive_log: channel(context, drive_row::TOPIC),
+        }
+    }
+}
+
+impl DriveRecorder {
+    /// Creates the file, or empties it, and writes its head; `about` is kept in the file (seed, vehicle, revision).
+    ///
+    /// Errors: [`RecordError::Create`], also when the disk is full already.
+    pub fn create(path: &Path, about: BTreeMap<String, String>) -> Result<Self, RecordError> {
+        let problem = |problem: String| RecordError::Create { path: path.to_owned(), problem };
+        let file = std::fs::File::create(path).map_err(|error| problem(error.to_string()))?;
+        Self::into_file(path, WatchedFile::new(file), about)
+    }
+
+    fn into_file(
+        path: &Path,
+        file: WatchedFile,
+        about: BTreeMap<String, String>,
+    ) -> Result<Self, RecordError> {
+        let fault = file.fault();
+        let problem = |error: FoxgloveError| {
+            let problem = fault.text().unwrap_or_else(|| error.to_string());
+            RecordError::Create { path: path.to_owned(), problem }
+        };
+        // Without seeking, a chunk goes out in one piece once it is complete.
+        let options = McapWriteOptions::new().disable_seeking(true).compression(Some(McapCompression::Lz4));
+        let context = Context::new();
+        let writer = context.mcap_writer_with_options(options).create(file).map_err(problem)?;
+        writer.write_metadata("surefoot", about).map_err(problem)?;
+        writer.flush().map_err(problem)?;
+        let channels = Channels::new(&context);
+        let json = JsonChannels::new(context);
+        Ok(Self { path: path.to_owned(), writer, fault, flushed_at_ns: None, channels, json })
+    }
+
+    /// Where the vehicle is. Errors, here and below: [`RecordError::Write`].
+    pub fn pose(&mut self, at_ns: u64, pose: &Pose) -> Result<(), RecordError> {
+        self.channels.transform.log_with_time(&scene::transform(at_ns, pose), at_ns);
+        self.channels.pose.log_with_time(&scene::pose_in_frame(at_ns, pose), at_ns);
+        self.wrote(at_ns)
+    }
+
+    /// Where the vehicle should go.
+    pub fn goal(&mut self, at_ns: u64, pose: &Pose) -> Result<(), RecordError> {
+        self.channels.goal.log_with_time(&scene::pose_in_frame(at_ns, pose), at_ns);
+        self.wrote(at_ns)
+    }
+
+    /// Where the vehicle has been.
+    pub fn path(&mut self, at_ns: u64, poses: &[Pose]) -> Result<(), RecordError> {
+        self.channels.path.log_with_time(&scene::poses_in_frame(at_ns, poses), at_ns);
+        self.wrote(at_ns)
+    }
+
+    /// Rolled-out futures as points of the map frame [m], best first.
+    pub fn rollouts(&mut self, at_ns: u64, best_first: &[Vec<[f64; 3]>]) -> Result<(), RecordError> {
+        self.channels.rollouts.log_with_time(&scene::rollouts(at_ns, best_first), at_ns);
+        self.wrote(at_ns)
+    }
+
+    /// What the vehicle knows of the ground.
+    pub fn elevation(&mut self, at_ns: u64, map: &GridMap<SurfaceCell>) -> Result<(), RecordError> {
+        self.channels.elevation.log_with_time(&grids::elevation(at_ns, map), at_ns);
+        self.wrote(at_ns)
+    }
+
+    /// The risk map at the yaw bin that holds `yaw_rad`, usually the vehicle's.
+    pub fn risk(&mut self, at_ns: u64, map: &RiskMapView<'_>, yaw_rad: f64) -> Result<(), RecordError> {
+        self.channels.risk.log_with_time(&grids::risk(at_ns, map, yaw_rad), at_ns);
+        self.wrote(at_ns)
+    }
+
+    /// A sweep of the range sensor, in the body frame.
+    pub fn scan(&mut self, at_ns: u64, scan: &Scan) -> Result<(), RecordError> {
+        self.channels.scan.log_with_time(&scene::point_cloud(at_ns, scan), at_ns);
+        self.wrote(at_ns)
+    }
+
+    /// What was asked of the vehicle.
+    pub fn command(&mut self, at_ns: u64, command: &Command) -> Result<(), RecordError> {
+        self.json("/command", at_ns, command)
+    }
+
+    /// What the controller decided, with its reason.
+    pub fn decision(&mut self, at_ns: u64, decision: &Decision) -> Result<(), RecordError> {
+        self.json("/decision", at_ns, &json::DecisionRecord::from(decision))
+    }
+
+    /// Figures of one control cycle, whatever the controller reports: every number becomes plottable under its
+    /// field's name. Errors: also [`RecordError::NoJson`].
+    pub fn controller(&mut self, at_ns: u64, diagnostics: &impl Serialize) -> Result<(), RecordError> {
+        self.json("/controller", at_ns, diagnostics)
+    }
+
+    /// One row of the drive log, which [`read_drive_log_mcap`] finds again bit by bit.
+    pub fn drive_row(&mut self, at_ns: u64, run: &str, row: &DriveRow) -> Result<(), RecordError> {
+        self.channels.drive_log.log_with_time(&DriveLogRow::new(run, row), at_ns);
+        self.wrote(at_ns)
+    }
+
+    /// Writes the index and closes the file. Errors: [`RecordError::Write`].
+    pub fn finish(self) -> Result<(), RecordError> {
+        let Self { path, writer, fault, .. } = self;
+        let problem = |problem: String| RecordError::Write { path: path.clone(), problem };
+        let closed = writer.close();
+        if let Some(text) = fault.text() {
+            return Err(problem(text));
+        }
+        let mut file = closed.map_err(|error| problem(error.to_string()))?;
+        file.flush().map_err(|error| problem(error.to_string()))
+    }
+
+    fn json(&mut self, topic: &'static str, at_ns: u64, value: &impl Serialize) -> Result<(), RecordError> {
+        let logged = self.json.log(topic, at_ns, value);
+        logged.map_err(|problem| RecordError::NoJson { topic, problem })?;
+        self.wrote(at_ns)
+    }
+
+    /// Channels swallow errors, so the file is asked; flushes when it is time.
+    fn wrote(&mut self, at_ns: u64) -> Result<(), RecordError> {
+        let since_ns = self.flushed_at_ns.map(|flushed_at_ns| at_ns.saturating_sub(flushed_at_ns));
+        if since_ns.is_none_or(|since_ns| since_ns >= FLUSH_INTERVAL_NS) {
+            self.flushed_at_ns = Some(at_ns);
+            self.writer.flush().map_err(|error| self.failed(error.to_string()))?;
+        }
+        self.fault.text().map_or(Ok(()), |problem| Err(self.failed(problem)))
+    }
+
+    fn failed(&self, problem: String) -> RecordError {
+        let problem = self.fault.text().unwrap_or(problem);
+        RecordError::Write { path: self.path.clone(), problem }
+    }
+}
+
+/// A caller's time as Foxglove keeps it.
+fn timestamp(at_ns: u64) -> Timestamp {
+    let seconds = u32::try_from(at_ns / 1_000_000_000).unwrap_or(u32::MAX);
+    Timestamp::new(seconds, (at_ns % 1_000_000_000) as u32)
+}
+
+#[cfg(all(test, unix))]
+mod tests {
+    use std::fs::File;
+    use std::os::fd::OwnedFd;
+    use std::os::unix::net::UnixStream;
+
+    use super::*;
+
+    #[test]
+    fn a_write_that_fails_during_the_drive_is_reported_and_stays_reported() {
+        let (ours, theirs) = UnixStream::pair().unwrap();
+        let file = WatchedFile::new(File::from(OwnedFd::from(ours)));
+        let path = Path::new("drive.mcap");
+        let mut recorder = DriveRecorder::into_file(path, file, BTreeMap::new()).unwrap();
+        recorder.pose(0, &Pose::default()).unwrap();
+        drop(theirs);
+        // The next flush is due one second of the drive later.
+        recorder.pose(999_999_999, &Pose::default()).unwrap();
+        let message = recorder.pose(1_000_000_000, &Pose::default()).unwrap_err().to_string();
+        assert!(message.starts_with("drive.mcap: the recording ends here, a write failed: Broken pipe"));
+        assert!(recorder.pose(1_000_000_001, &Pose::default()).is_err());
+        assert!(matches!(recorder.finish(), Err(RecordError::Write { .. })));
+    }
+
+    #[test]
+    #[cfg(target_os = "linux")]
+    fn a_full_disk_is_said_before_the_drive() {
+        let error = DriveRecorder::create(Path::new("/dev/full"), BTreeMap::new()).err().unwrap();
+        let message = error.to_string();
+        assert!(
+            message.starts_with("/dev/full: expected a place to record to, found: No space left"),
+            "{message}"
+        );
+    }
+}

@@ -1,0 +1,86 @@
+//! The drive log out of a recording, as far as the recording goes.
+
+use std::collections::BTreeSet;
+use std::fs::File;
+use std::io::BufReader;
+use std::path::Path;
+
+use bicycle::DriveLog;
+use mcap::io::MessageReader;
+use mcap::sans_io::LinearReaderOptions;
+
+use super::drive_row;
+
+/// Longest record or chunk that is believed: far above what recorders write.
+const RECORD_BYTES_MAX: usize = 1 << 28;
+
+/// A drive log from a recording.
+#[derive(Clone, Debug)]
+pub struct McapDriveLog {
+    /// What could be read.
+    pub log: DriveLog,
+    /// Why reading ended early, e.g. because the recorder was killed; `None` when the recording is complete.
+    pub ended_early: Option<String>,
+}
+
+/// A recording without a drive log. Every message is one line.
+#[derive(Debug, thiserror::Error)]
+pub enum McapReadError {
+    /// The file could not be opened.
+    #[error("{file}: expected a readable file, found: {source}")]
+    Unreadable {
+        /// Path as given.
+        file: String,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// No row of a drive log was found.
+    #[error("{file}: expected messages on topic {topic}, found {found}")]
+    NoRows {
+        /// Path as given.
+        file: String,
+        /// The drive log's topic.
+        topic: &'static str,
+        /// What was there instead.
+        found: String,
+    },
+}
+
+/// Reads the drive log of a recording made by [`super::DriveRecorder`].
+///
+/// A recording that breaks off or is damaged gives all rows before that place, and says so. Errors: the file cannot
+/// be opened, or holds no row at all.
+pub fn read_drive_log_mcap(path: &Path) -> Result<McapDriveLog, McapReadError> {
+    let file = path.display().to_string();
+    let source = match File::open(path) {
+        Ok(source) => BufReader::new(source),
+        Err(source) => return Err(McapReadError::Unreadable { file, source }),
+    };
+    let options = LinearReaderOptions::default()
+        .with_record_length_limit(RECORD_BYTES_MAX)
+        .with_prevalidate_chunk_crcs(true);
+    let mut topics = BTreeSet::new();
+    let mut log = DriveLog::default();
+    let mut ended_early = None;
+    for message in MessageReader::new_with_options(source, options) {
+        let added = message.map_err(|error| error.to_string()).and_then(|message| {
+            topics.insert(message.channel.topic.clone());
+            if message.channel.topic == drive_row::TOPIC { add_row(&mut log, &message.data) } else { Ok(()) }
+        });
+        if let Err(problem) = added {
+            ended_early = Some(format!("after {} rows: {problem}", log.n_rows()));
+            break;
+        }
+    }
+    if log.n_rows() > 0 {
+        return Ok(McapDriveLog { log, ended_early });
+    }
+    let topics = Vec::from_iter(topics).join(", ");
+    let found = ended_early.unwrap_or_else(|| format!("only topics: {topics}"));
+    Err(McapReadError::NoRows { file, topic: drive_row::TOPIC, found })
+}
+
+fn add_row(log: &mut DriveLog, bytes: &[u8]) -> Result<(), String> {
+    let (run, row) = drive_row::decode(bytes).ok_or("a message that is no row of a drive log")?;
+    log.push(&run, &row).map_err(|error| error.to_string())
+}
