@@ -1,1 +1,10 @@
-//! See Cargo.toml.
+//! What the two costly parts of a control cycle cost on this machine: one update of the controller, and the risk map
+//! of the physics prior. Both are measured through the interface that a drive uses.
+
+mod error;
+pub mod prior_map;
+mod spread;
+mod stopwatch;
+
+pub use error::BenchError;
+pub use spread::Spread;

@@ -1,0 +1,21 @@
+//! Why a benchmark did not run.
+
+/// Why a benchmark did not run.
+#[derive(Debug, thiserror::Error)]
+pub enum BenchError {
+    /// Nothing to measure.
+    #[error("updates: expected at least 1, found 0")]
+    NoUpdates,
+    /// The vehicle that the benchmark drives cannot be read.
+    #[error(transparent)]
+    Vehicle(#[from] formats::ConfigError),
+    /// The risk of the map cannot be judged.
+    #[error(transparent)]
+    Level(#[from] traversability::CvarLevelError),
+    /// The risk map cannot be made.
+    #[error(transparent)]
+    Prior(#[from] physics_prior::PriorMapError),
+    /// The system refused the threads.
+    #[error("threads: {0}")]
+    Threads(#[from] rayon::ThreadPoolBuildError),
+}
