@@ -1,6 +1,7 @@
 //! What the map remembers of one cell, and how one scan's points change it.
 
 use super::ElevationConfig;
+use super::statistics::RigidStatistics;
 use crate::TerrainClass;
 
 /// A point in the map frame, sorted into its cell.
@@ -57,7 +58,7 @@ pub(super) struct CellState {
 /// Share of an innovation that a cell's spread and its variance take over when it is far outside both.
 const SURPRISE_GAIN: f32 = 0.3;
 /// Squared number of standard deviations beyond which a height surprises.
-const SURPRISE_GATE: f32 = 16.0;
+const SURPRISE_GATE: f32 = 25.0;
 /// Share by which spread and top of plants follow smaller values: a scan may see one side of a cell only, and
 /// rays also hit plants below their top.
 const SINK_GAIN: f32 = 0.05;
@@ -93,10 +94,27 @@ impl CellState {
         self.evidence.iter().any(|&n| n > 0.0)
     }
 
-    /// Probability of each class; zeros where nothing was seen.
-    pub fn class_probability(&self) -> [f32; TerrainClass::COUNT] {
-        let total: f32 = self.evidence.iter().sum();
-        if total > 0.0 { self.evidence.map(|n| n / total) } else { [0.0; TerrainClass::COUNT] }
+    /// Probability of each class, each cell having shown `open_prior` points of open ground before the first;
+    /// zeros where nothing was seen.
+    pub fn class_probability(&self, open_prior: f32) -> [f32; TerrainClass::COUNT] {
+        if !self.was_hit() {
+            return [0.0; TerrainClass::COUNT];
+        }
+        let mut evidence = self.evidence;
+        evidence[TerrainClass::Open as usize] += open_prior;
+        let total: f32 = evidence.iter().sum();
+        evidence.map(|n| n / total)
+    }
+
+    /// Whether more plants and obstacles than ground were seen.
+    fn is_covered(&self) -> bool {
+        let [open, loose, vegetation, obstacle] = self.evidence;
+        vegetation + obstacle > open + loose
+    }
+
+    fn forget_ground(&mut self) {
+        (self.ground, self.ground_m) = (Ground::Unseen, f32::NAN);
+        (self.variance_m2, self.spread_m2) = (f32::INFINITY, 0.0);
     }
 
     /// Takes in the points that one scan left in this cell. `reference_m` is the height of the ground here
@@ -108,14 +126,26 @@ impl CellState {
         let touching = points.iter().filter(touching);
         let highest_m = touching.clone().fold(f32::NEG_INFINITY, |high, p| high.max(p.height_m));
         self.fade_obstacle(highest_m, config);
-        let rigid = RigidStatistics::of(touching.clone().filter(|p| p.is_rigid()));
-        let is_wall = rigid.span_m() > config.wall_span_m;
+        let rigid = touching.clone().filter(|p| p.is_rigid());
+        let statistics = RigidStatistics::of(rigid.clone());
+        let is_wall = statistics.span_m() > config.wall_span_m;
         for point in touching {
             self.take_evidence(point, is_wall);
         }
         self.cap_evidence(config.evidence_cap);
-        if !is_wall && rigid.n > 0.0 {
-            self.fuse_ground(&rigid, config);
+        if is_wall {
+            return;
+        }
+        if self.is_covered() {
+            // Where plants or obstacles prevail, a point named as ground is ground only at their foot.
+            let foot_m = self.lowest_m;
+            if self.ground == Ground::Seen && self.ground_m - self.margin_m(config) > foot_m {
+                self.forget_ground();
+            }
+            let is_foot = |p: &&CellPoint| p.height_m <= foot_m + 2.0 * p.variance_m2.sqrt();
+            self.fuse_ground(&RigidStatistics::of(rigid.filter(is_foot)), config);
+        } else {
+            self.fuse_ground(&statistics, config);
         }
     }
 
@@ -185,14 +215,11 @@ impl CellState {
         }
     }
 
-    /// Follows the variance between a scan's points: up at once, down slowly, since a scan may see one side only.
-    fn learn_spread(&mut self, rigid: &RigidStatistics) {
-        let change_m2 = rigid.excess_m2() - self.spread_m2;
-        self.spread_m2 += change_m2 * if change_m2 > 0.0 { SURPRISE_GAIN } else { SINK_GAIN };
-    }
-
     /// Kalman update with the mean of a scan's ground points.
     fn fuse_ground(&mut self, rigid: &RigidStatistics, config: &ElevationConfig) {
+        if rigid.n < 1.0 {
+            return;
+        }
         let shared_m2 = (config.scan_noise_m * config.scan_noise_m) as f32;
         if self.ground != Ground::Seen {
             self.ground = Ground::Seen;
@@ -202,80 +229,27 @@ impl CellState {
             self.ceiling_m = f32::INFINITY;
             return;
         }
-        self.learn_spread(rigid);
         let innovation_m = rigid.mean_m() - self.ground_m;
-        let mut noise_m2 = (rigid.noise_m2() + self.spread_m2) / rigid.n + shared_m2;
-        let surprise_m2 = innovation_m * innovation_m - SURPRISE_GATE * (self.variance_m2 + noise_m2);
-        if surprise_m2 > 0.0 {
-            // Either the cell holds several heights, or the ground is not where it was: take half of each.
-            self.spread_m2 += SURPRISE_GAIN * surprise_m2;
-            self.variance_m2 += SURPRISE_GAIN * surprise_m2;
-            noise_m2 += SURPRISE_GAIN * surprise_m2;
-        }
+        self.learn_spread(innovation_m * innovation_m, rigid, shared_m2);
+        let noise_m2 = (rigid.noise_m2() + self.spread_m2) / rigid.n + shared_m2;
         let gain = self.variance_m2 / (self.variance_m2 + noise_m2);
         self.ground_m += gain * innovation_m;
         self.variance_m2 *= 1.0 - gain;
     }
-}
 
-/// Sums over the ground points of one cell and scan.
-struct RigidStatistics {
-    n: f32,
-    first_m: f32,
-    sum_m: f32,
-    sum_m2: f32,
-    variance_sum_m2: f32,
-    lowest_m: f32,
-    highest_m: f32,
-}
-
-impl RigidStatistics {
-    fn of<'a>(points: impl Iterator<Item = &'a CellPoint>) -> Self {
-        let mut all = Self {
-            n: 0.0,
-            first_m: f32::NAN,
-            sum_m: 0.0,
-            sum_m2: 0.0,
-            variance_sum_m2: 0.0,
-            lowest_m: f32::INFINITY,
-            highest_m: f32::NEG_INFINITY,
-        };
-        for point in points {
-            if all.n == 0.0 {
-                all.first_m = point.height_m;
-            }
-            // Relative to the first point, so that the squares keep their digits.
-            let relative_m = point.height_m - all.first_m;
-            all.n += 1.0;
-            all.sum_m += relative_m;
-            all.sum_m2 += relative_m * relative_m;
-            all.variance_sum_m2 += point.variance_m2;
-            all.lowest_m = all.lowest_m.min(point.height_m);
-            all.highest_m = all.highest_m.max(point.height_m);
+    /// Follows the variance of heights within the cell: between the points of a scan, and between scans once one
+    /// surprised. Up fast, down slowly, since a scan may see one side of the cell only. A surprise may also
+    /// mean that the ground is not where it was, so the mean becomes uncertain too.
+    fn learn_spread(&mut self, squared_innovation_m2: f32, rigid: &RigidStatistics, shared_m2: f32) {
+        let sensor_m2 = self.variance_m2 + rigid.noise_m2() / rigid.n + shared_m2;
+        let is_surprise = squared_innovation_m2 > SURPRISE_GATE * (sensor_m2 + self.spread_m2 / rigid.n);
+        let between_scans_m2 =
+            if is_surprise || self.spread_m2 > 0.0 { squared_innovation_m2 - sensor_m2 } else { 0.0 };
+        let seen_m2 = rigid.excess_m2().max(between_scans_m2);
+        let is_fast = is_surprise || rigid.excess_m2() > self.spread_m2;
+        self.spread_m2 += (seen_m2 - self.spread_m2) * if is_fast { SURPRISE_GAIN } else { SINK_GAIN };
+        if is_surprise {
+            self.variance_m2 += SURPRISE_GAIN * between_scans_m2;
         }
-        all
-    }
-
-    fn mean_m(&self) -> f32 {
-        self.first_m + self.sum_m / self.n
-    }
-
-    fn span_m(&self) -> f32 {
-        if self.n > 0.0 { self.highest_m - self.lowest_m } else { 0.0 }
-    }
-
-    /// Mean sensor variance of one point.
-    fn noise_m2(&self) -> f32 {
-        self.variance_sum_m2 / self.n
-    }
-
-    /// Variance between the points beyond what sensor noise explains (two standard errors of a sample variance).
-    fn excess_m2(&self) -> f32 {
-        if self.n < 2.0 {
-            return 0.0;
-        }
-        let sample_m2 = (self.sum_m2 - self.sum_m * self.sum_m / self.n).max(0.0) / (self.n - 1.0);
-        let explained_m2 = self.noise_m2() * (1.0 + 2.0 * (2.0 / (self.n - 1.0)).sqrt());
-        (sample_m2 - explained_m2).max(0.0)
     }
 }

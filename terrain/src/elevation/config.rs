@@ -25,6 +25,11 @@ pub struct ElevationConfig {
     pub fading_m2ps: f64,
     /// Points a class's evidence is remembered for: older ones fade beyond it, > 0.
     pub evidence_cap: f32,
+    /// Points of open ground that a cell counts as having shown before its first: with one, a single point
+    /// named wrongly makes no obstacle.
+    pub open_prior: f32,
+    /// Points closer to the ray origin than this are the vehicle itself [m]; 0 = the sensor sees none of it.
+    pub own_body_m: f64,
     /// Points that hang higher than this above the ground do not touch the vehicle [m], > 0.
     pub clearance_m: f32,
     /// Rigid points of one cell that span more than this are a wall or a trunk [m], > 0. On a cell that is
@@ -39,7 +44,8 @@ pub struct ElevationConfig {
     pub visibility_margin_m: f32,
     /// Scans that must contradict a height, none confirming it, before it is forgotten, > 0.
     pub ghost_scans: u8,
-    /// A change of a height below this is not published [m]; 0 = every change is.
+    /// A change of a height below this is not published [m], nor are changes of a variance by less than a fifth
+    /// or of a probability by less than a twentieth; 0 = every change is.
     pub publish_step_m: f32,
 }
 
@@ -55,6 +61,8 @@ impl Default for ElevationConfig {
             scan_noise_m: 0.005,
             fading_m2ps: 1e-5,
             evidence_cap: 30.0,
+            open_prior: 1.0,
+            own_body_m: 0.0,
             clearance_m: 2.5,
             wall_span_m: 0.8,
             hidden_ground_std_m: 0.15,
@@ -79,6 +87,27 @@ pub struct ElevationConfigError {
 }
 
 impl ElevationConfig {
+    /// The defaults with every length that has to do with the machine scaled from a vehicle of 3.4 m to one of
+    /// `length_m`; resolution and window stay.
+    pub fn scaled_to(length_m: f64) -> Self {
+        let default = Self::default();
+        let scale = length_m / 3.4;
+        let scaled = |default_m: f32| (f64::from(default_m) * scale) as f32;
+        Self {
+            recentre_m: default.recentre_m * scale,
+            noise_floor_m: default.noise_floor_m * scale,
+            scan_noise_m: default.scan_noise_m * scale,
+            fading_m2ps: default.fading_m2ps * scale * scale,
+            clearance_m: scaled(default.clearance_m),
+            wall_span_m: scaled(default.wall_span_m),
+            hidden_ground_std_m: scaled(default.hidden_ground_std_m),
+            gap_radius_m: default.gap_radius_m * scale,
+            visibility_margin_m: scaled(default.visibility_margin_m),
+            publish_step_m: scaled(default.publish_step_m),
+            ..default
+        }
+    }
+
     /// Refuses settings no map can be built from.
     pub fn validate(&self) -> Result<(), ElevationConfigError> {
         let positive = [
@@ -95,6 +124,8 @@ impl ElevationConfig {
         ];
         let not_negative = [
             ("noise_per_range", self.noise_per_range),
+            ("open_prior", f64::from(self.open_prior)),
+            ("own_body_m", self.own_body_m),
             ("scan_noise_m", self.scan_noise_m),
             ("fading_m2ps", self.fading_m2ps),
             ("gap_radius_m", self.gap_radius_m),

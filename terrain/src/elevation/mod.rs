@@ -4,6 +4,7 @@ mod cell;
 mod config;
 mod gaps;
 mod sorting;
+mod statistics;
 mod surfacing;
 mod visibility;
 
@@ -22,6 +23,8 @@ pub struct FuseReport {
     pub n_points: usize,
     /// Points dropped because a coordinate was NaN or infinite.
     pub n_rejected_non_finite: usize,
+    /// Points dropped because they lie on the vehicle itself.
+    pub n_own_body: usize,
     /// Points dropped because they lie outside the window.
     pub n_out_of_window: usize,
     /// Cells whose surface was published anew by this scan, as one bounding rectangle of the window.
@@ -130,6 +133,7 @@ impl ElevationMap {
         let report = FuseReport {
             n_points: scan.points.len(),
             n_rejected_non_finite: self.points.n_rejected_non_finite,
+            n_own_body: self.points.n_own_body,
             n_out_of_window: self.points.n_out_of_window,
             changed: self.changed.within(self.surface.geometry()),
         };

@@ -3,7 +3,7 @@
 use super::ElevationConfig;
 use super::cell::CellPoint;
 use crate::{GridGeometry, Pose, Scan};
-use nalgebra::{Point3, Vector3};
+use nalgebra::Point3;
 
 /// The points of one scan by cell. The buffers are kept from scan to scan.
 #[derive(Clone, Debug, Default)]
@@ -13,6 +13,7 @@ pub(super) struct SortedPoints {
     /// Cells that were hit, in the order of their first point.
     pub hit_cells: Vec<u32>,
     pub n_rejected_non_finite: usize,
+    pub n_own_body: usize,
     pub n_out_of_window: usize,
     /// Points of one cell lie together.
     points: Vec<CellPoint>,
@@ -61,7 +62,7 @@ impl SortedPoints {
         let motion = pose.isometry();
         let origin = motion * Point3::from(scan.origin_m.map(f64::from));
         self.origin_m = [origin.x, origin.y, origin.z];
-        (self.n_rejected_non_finite, self.n_out_of_window) = (0, 0);
+        (self.n_rejected_non_finite, self.n_own_body, self.n_out_of_window) = (0, 0, 0);
         self.placed.clear();
         let ([west_m, south_m], edge_m) = (geometry.south_west_m(), geometry.resolution_m);
         for point in &scan.points {
@@ -70,6 +71,11 @@ impl SortedPoints {
                 continue;
             }
             let position = motion * Point3::from(point.position_m.map(f64::from));
+            let range_m = (position - origin).norm();
+            if range_m < config.own_body_m {
+                self.n_own_body += 1;
+                continue;
+            }
             let Some(cell) = geometry.cell_at(position.x, position.y) else {
                 self.n_out_of_window += 1;
                 continue;
@@ -79,8 +85,7 @@ impl SortedPoints {
                 self.hit_cells.push(cell);
             }
             self.counts[cell as usize] += 1;
-            let ray: Vector3<f64> = position - origin;
-            let std_m = config.noise_floor_m + config.noise_per_range * ray.norm();
+            let std_m = config.noise_floor_m + config.noise_per_range * range_m;
             let variance_m2 = (std_m * std_m) as f32;
             let place = [(position.x - west_m) / edge_m, (position.y - south_m) / edge_m].map(|v| v as f32);
             let height_m = position.z as f32;

@@ -3,7 +3,7 @@
 use super::cell::{CellState, Ground};
 use super::gaps::{Enclosure, Inferred, infer};
 use super::{ElevationConfig, ElevationMap};
-use crate::{CellRegion, GridMap, Knowledge, SurfaceCell};
+use crate::{CellRegion, GridMap, Knowledge, SurfaceCell, TerrainClass};
 
 /// Buffers kept from scan to scan.
 #[derive(Clone, Debug, Default)]
@@ -17,6 +17,8 @@ pub(super) struct Scratch {
 const VARIANCE_SHARE: f32 = 0.2;
 /// A class probability is published anew when it changed by more than this.
 const PROBABILITY_STEP: f32 = 0.05;
+/// Plants less likely than this have no height: a camera errs.
+const PLANT_SHARE: f32 = 0.1;
 /// Share of the visibility margin by which rays may pass below a filled gap: a ditch is worth more care than a
 /// ghost.
 const GAP_MARGIN_SHARE: f32 = 0.25;
@@ -29,7 +31,7 @@ impl ElevationMap {
         let [x, y] = geometry.origin;
         let next = &self.surfacing.next;
         for (index, (published, next)) in self.surface.values_mut().iter_mut().zip(next).enumerate() {
-            if differs(published, next, self.config.publish_step_m) {
+            if differs(published, next, &self.config) {
                 *published = *next;
                 let cell = geometry.cell(index);
                 let place = [x + cell.col as i64, y + cell.row as i64];
@@ -44,7 +46,7 @@ impl Scratch {
     /// obstacles, then small gaps.
     fn draw(&mut self, states: &GridMap<CellState>, config: &ElevationConfig) {
         self.next.clear();
-        self.next.extend(states.values().iter().map(seen_surface));
+        self.next.extend(states.values().iter().map(|state| seen_surface(state, config)));
         let datum_m = self.next.iter().find(|cell| cell.is_known()).map_or(0.0, |cell| cell.height_m);
         self.uncover(states, config, datum_m);
         self.fill_gaps(states, config, datum_m);
@@ -65,9 +67,9 @@ impl Scratch {
                 .or_else(|| lowest_plant(states, &CellRegion::of_cell(cell).grown(radius, geometry), config));
             let Some((height_m, height_variance_m2)) = ground else { continue };
             let height_m = height_m.min(state.lowest_m).min(state.ceiling_m);
-            let vegetation_height_m = (state.vegetation_top_m - height_m).max(0.0);
             let knowledge = Knowledge::Interpolated;
-            let class_probability = state.class_probability();
+            let class_probability = state.class_probability(config.open_prior);
+            let vegetation_height_m = vegetation_height_m(state, height_m, &class_probability);
             let surface = SurfaceCell {
                 height_m,
                 height_variance_m2,
@@ -110,8 +112,8 @@ impl Scratch {
 }
 
 /// The surface of a cell as far as its own points tell.
-fn seen_surface(state: &CellState) -> SurfaceCell {
-    let class_probability = state.class_probability();
+fn seen_surface(state: &CellState, config: &ElevationConfig) -> SurfaceCell {
+    let class_probability = state.class_probability(config.open_prior);
     let knowledge = match state.ground {
         Ground::Unseen => return SurfaceCell { class_probability, ..SurfaceCell::UNKNOWN },
         Ground::Assumed => Knowledge::Interpolated,
@@ -120,10 +122,22 @@ fn seen_surface(state: &CellState) -> SurfaceCell {
     SurfaceCell {
         height_m: state.ground_m,
         height_variance_m2: state.variance_m2 + state.spread_m2,
-        vegetation_height_m: (state.vegetation_top_m - state.ground_m).max(0.0),
+        vegetation_height_m: vegetation_height_m(state, state.ground_m, &class_probability),
         class_probability,
         knowledge,
     }
+}
+
+/// Height of the plants above the ground, zero where next to none were seen.
+fn vegetation_height_m(
+    state: &CellState,
+    ground_m: f32,
+    class_probability: &[f32; TerrainClass::COUNT],
+) -> f32 {
+    if class_probability[TerrainClass::Vegetation as usize] < PLANT_SHARE {
+        return 0.0;
+    }
+    (state.vegetation_top_m - ground_m).max(0.0)
 }
 
 /// Height and variance of the lowest plant or obstacle point among cells: all that is known of the ground in
@@ -137,15 +151,18 @@ fn lowest_plant(
     height_m.is_finite().then_some((height_m, config.hidden_ground_std_m * config.hidden_ground_std_m))
 }
 
-fn differs(published: &SurfaceCell, next: &SurfaceCell, step_m: f32) -> bool {
+fn differs(published: &SurfaceCell, next: &SurfaceCell, config: &ElevationConfig) -> bool {
+    let step_m = config.publish_step_m;
+    let (share, probability_step) =
+        if step_m > 0.0 { (VARIANCE_SHARE, PROBABILITY_STEP) } else { (0.0, 0.0) };
     let moved = |a: f32, b: f32| (a - b).abs() > step_m;
     let variance_m2 = published.height_variance_m2;
     published.knowledge != next.knowledge
         || moved(published.height_m, next.height_m)
         || moved(published.vegetation_height_m, next.vegetation_height_m)
-        || (variance_m2 - next.height_variance_m2).abs() > VARIANCE_SHARE * variance_m2
+        || (variance_m2 - next.height_variance_m2).abs() > share * variance_m2
         || (published.class_probability.iter().zip(&next.class_probability))
-            .any(|(a, b)| (a - b).abs() > PROBABILITY_STEP)
+            .any(|(a, b)| (a - b).abs() > probability_step)
 }
 
 /// Grows the published variances as time passes.

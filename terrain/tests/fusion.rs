@@ -1,0 +1,269 @@
+//! What many noisy points make of one cell: heights, variances, classes, plants, obstacles, bad input.
+
+mod points;
+
+use points::{all_centres, plain_config, plain_map, scan_of};
+use rand::SeedableRng;
+use rand_distr::{Distribution, Normal};
+use rand_xoshiro::Xoshiro256PlusPlus;
+use terrain::TerrainClass::{Loose, Obstacle, Open, Vegetation};
+use terrain::{ElevationConfig, ElevationMap, FuseError, Knowledge, Pose, Scan, SurfaceCell, TerrainClass};
+
+const HERE: Pose = Pose { x_m: 0.0, y_m: 0.0, z_m: 0.0, roll_rad: 0.0, pitch_rad: 0.0, yaw_rad: 0.0 };
+/// Centre of one cell of the plain map.
+const SPOT: [f64; 2] = [0.25, 0.25];
+
+fn at_spot(map: &ElevationMap) -> SurfaceCell {
+    *map.surface().at(SPOT[0], SPOT[1]).unwrap()
+}
+
+fn column(heights_m: &[f64], class: TerrainClass) -> Vec<([f64; 3], TerrainClass)> {
+    heights_m.iter().map(|&z_m| ([SPOT[0], SPOT[1], z_m], class)).collect()
+}
+
+/// Mean squared error and mean published variance after `n_scans` scans of one point per cell, truth 1.5 m.
+fn error_after(n_scans: usize, sigma_m: f64) -> (f64, f64) {
+    let mut map = plain_map(|config| config.noise_floor_m = sigma_m);
+    let mut random = Xoshiro256PlusPlus::seed_from_u64(11);
+    let noise = Normal::new(1.5, sigma_m).unwrap();
+    for _ in 0..n_scans {
+        let points = all_centres().map(|[x, y]| ([x, y, noise.sample(&mut random)], Open));
+        let scan = scan_of(points.collect::<Vec<_>>());
+        map.fuse(&scan, &HERE).unwrap();
+    }
+    let n = map.surface().values().len() as f64;
+    let mean = |f: &dyn Fn(&SurfaceCell) -> f64| map.surface().values().iter().map(f).sum::<f64>() / n;
+    (mean(&|cell| (f64::from(cell.height_m) - 1.5).powi(2)), mean(&|cell| f64::from(cell.height_variance_m2)))
+}
+
+#[test]
+fn the_error_falls_as_one_over_root_n_and_the_variance_says_so() {
+    let sigma_m = 0.05;
+    for n_scans in [1, 4, 16, 64] {
+        let expected_m2 = sigma_m * sigma_m / n_scans as f64;
+        let (error_m2, variance_m2) = error_after(n_scans, sigma_m);
+        // 1600 cells: the mean square has a relative standard error of sqrt(2 / 1600) = 3.5 %; three of them.
+        assert!((error_m2 / expected_m2 - 1.0).abs() < 0.11, "{n_scans} scans: {error_m2} for {expected_m2}");
+        // A surprise beyond four standard deviations, one in 16 000 updates, adds a little.
+        assert!((variance_m2 / expected_m2 - 1.0).abs() < 0.02, "{n_scans} scans: {variance_m2}");
+    }
+}
+
+#[test]
+fn points_of_one_scan_share_the_error_of_its_pose() {
+    let mut map = plain_map(|config| config.scan_noise_m = 0.03);
+    let offsets_m = [-0.02, 0.02, -0.01, 0.01];
+    map.fuse(&scan_of(column(&offsets_m, Open)), &HERE).unwrap();
+    // 0.02^2 / 4 + 0.03^2
+    assert!((at_spot(&map).height_variance_m2 - 1.0e-3).abs() < 1e-7);
+    assert!(at_spot(&map).height_m.abs() < 1e-7);
+}
+
+#[test]
+fn noise_grows_with_range() {
+    let mut map = plain_map(|config| config.noise_per_range = 0.01);
+    map.fuse(&scan_of([([3.25, 4.25, 10.0], Open)]), &HERE).unwrap();
+    // The ray is 5.35 m long, from (0, 0, 10) to (3.25, 4.25, 10): (0.02 + 0.0535)^2
+    let cell = map.surface().at(3.25, 4.25).unwrap();
+    let expected_m2 = (0.02 + 0.01 * 3.25_f32.hypot(4.25)).powi(2);
+    assert!((cell.height_variance_m2 / expected_m2 - 1.0).abs() < 1e-5);
+}
+
+#[test]
+fn a_cell_with_two_heights_says_that_it_is_uncertain() {
+    let mut map = plain_map(|_| {});
+    for i in 0..60 {
+        let z_m = if i % 2 == 0 { 0.0 } else { 0.3 };
+        map.fuse(&scan_of(column(&[z_m], Open)), &HERE).unwrap();
+    }
+    let cell = at_spot(&map);
+    assert!((0.05..0.25).contains(&cell.height_m), "{cell:?}");
+    // Half of the points lie 0.15 m above the mean, half below: standard deviation 0.15 m.
+    assert!((0.08..0.3).contains(&cell.height_variance_m2.sqrt()), "{cell:?}");
+}
+
+#[test]
+fn heights_within_one_scan_count_as_spread() {
+    let mut map = plain_map(|_| {});
+    map.fuse(&scan_of(column(&[0.0, 0.1, 0.2, 0.3, 0.4], Open)), &HERE).unwrap();
+    let cell = at_spot(&map);
+    assert!((cell.height_m - 0.2).abs() < 1e-6);
+    // Sample variance 0.025 m2, mean of five: 0.005 m2 more; sensor noise of 0.0004 m2 explains 2 % of it.
+    assert!((0.025..0.031).contains(&cell.height_variance_m2), "{cell:?}");
+}
+
+#[test]
+fn ground_that_moved_is_followed_within_a_second() {
+    let mut map = plain_map(|_| {});
+    for _ in 0..50 {
+        map.fuse(&scan_of(column(&[0.0], Open)), &HERE).unwrap();
+    }
+    for _ in 0..8 {
+        map.fuse(&scan_of(column(&[0.25], Open)), &HERE).unwrap();
+    }
+    let cell = at_spot(&map);
+    assert!((cell.height_m - 0.25).abs() < 0.05, "{cell:?}");
+    assert!((cell.height_m - 0.25).abs() < 3.0 * cell.height_variance_m2.sqrt());
+}
+
+#[test]
+fn classes_are_counted_beside_one_prior_point_of_open_ground() {
+    let mut map = plain_map(|_| {});
+    let points = [column(&[0.0; 3], Loose), column(&[0.0; 4], Vegetation)].concat();
+    map.fuse(&scan_of(points), &HERE).unwrap();
+    let expected = [1.0 / 8.0, 3.0 / 8.0, 4.0 / 8.0, 0.0];
+    for (p, expected) in at_spot(&map).class_probability.iter().zip(expected) {
+        assert!((p - expected).abs() < 1e-6);
+    }
+    assert_eq!(at_spot(&map).class(), Vegetation);
+}
+
+#[test]
+fn old_evidence_is_forgotten_beyond_the_cap() {
+    let mut map = plain_map(|config| config.evidence_cap = 10.0);
+    map.fuse(&scan_of(column(&[0.0; 100], Loose)), &HERE).unwrap();
+    for _ in 0..7 {
+        map.fuse(&scan_of(column(&[0.0], Open)), &HERE).unwrap();
+    }
+    // Of ten points' worth of loose ground, 10 (10/11)^7 = 5.13 are left; 1 is the prior.
+    let loose = at_spot(&map).class_probability[Loose as usize];
+    assert!((loose - 5.13158 / 11.0).abs() < 1e-4, "{loose}");
+}
+
+#[test]
+fn one_point_named_wrongly_makes_no_obstacle_but_two_do() {
+    let mut map = plain_map(|_| {});
+    map.fuse(&scan_of(column(&[0.4], Obstacle)), &HERE).unwrap();
+    assert_ne!(at_spot(&map).class(), Obstacle);
+    map.fuse(&scan_of(column(&[0.5], Obstacle)), &HERE).unwrap();
+    assert_eq!(at_spot(&map).class(), Obstacle);
+    assert_eq!(at_spot(&map).knowledge, Knowledge::Interpolated);
+    assert!(at_spot(&map).height_m <= 0.4, "the ground is not above the lowest point");
+}
+
+#[test]
+fn plants_stand_on_the_ground_seen_between_them() {
+    let mut map = plain_map(|_| {});
+    for _ in 0..10 {
+        let points = [column(&[0.2, 0.35, 0.5], Vegetation), column(&[0.1], Open)].concat();
+        map.fuse(&scan_of(points), &HERE).unwrap();
+    }
+    let cell = at_spot(&map);
+    assert_eq!(cell.knowledge, Knowledge::Measured);
+    assert!((cell.height_m - 0.1).abs() < 1e-6 && (cell.vegetation_height_m - 0.4).abs() < 0.03, "{cell:?}");
+}
+
+#[test]
+fn a_leaf_named_as_ground_does_not_lift_the_ground() {
+    let mut map = plain_map(|_| {});
+    map.fuse(&scan_of(column(&[0.5], Open)), &HERE).unwrap();
+    for _ in 0..5 {
+        let points = [column(&[0.2, 0.35, 0.5], Vegetation), column(&[0.45], Open)].concat();
+        map.fuse(&scan_of(points), &HERE).unwrap();
+    }
+    let cell = at_spot(&map);
+    assert_eq!(cell.knowledge, Knowledge::Interpolated);
+    assert!((cell.height_m - 0.2).abs() < 1e-6, "{cell:?}");
+}
+
+#[test]
+fn branches_above_the_vehicle_are_left_out() {
+    let mut map = plain_map(|_| {});
+    map.fuse(&scan_of(column(&[0.0, 0.0], Open)), &HERE).unwrap();
+    map.fuse(&scan_of(column(&[2.6, 3.0, 4.0], Vegetation)), &HERE).unwrap();
+    assert_eq!(at_spot(&map).vegetation_height_m, 0.0);
+    assert_eq!(at_spot(&map).class(), Open);
+}
+
+#[test]
+fn a_steep_face_is_an_obstacle_whatever_its_name() {
+    let mut map = plain_map(|_| {});
+    let face: Vec<f64> = (0..20).map(|i| 0.1 * f64::from(i)).collect();
+    map.fuse(&scan_of(column(&face, Open)), &HERE).unwrap();
+    assert_eq!(at_spot(&map).class(), Obstacle);
+    let mut map = plain_map(|_| {});
+    let hump: Vec<f64> = (0..8).map(|i| 0.1 * f64::from(i)).collect();
+    map.fuse(&scan_of(column(&hump, Open)), &HERE).unwrap();
+    assert_eq!(at_spot(&map).class(), Open);
+}
+
+#[test]
+fn bad_points_are_dropped_and_counted() {
+    let mut map = plain_map(|config| config.own_body_m = 1.0);
+    let bad = [
+        ([f64::NAN, 0.0, 0.0], Open),
+        ([0.0, f64::INFINITY, 0.0], Open),
+        ([0.0, 0.0, f64::NEG_INFINITY], Obstacle),
+        ([100.0, 0.0, 0.0], Open),
+        ([0.3, 0.0, 10.5], Obstacle),
+        ([SPOT[0], SPOT[1], 0.7], Open),
+    ];
+    let report = map.fuse(&scan_of(bad), &HERE).unwrap();
+    assert_eq!((report.n_points, report.n_rejected_non_finite), (6, 3));
+    assert_eq!((report.n_out_of_window, report.n_own_body), (1, 1));
+    assert_eq!(map.surface().values().iter().filter(|cell| cell.is_known()).count(), 1);
+    assert!((at_spot(&map).height_m - 0.7).abs() < 1e-6);
+}
+
+#[test]
+fn an_empty_scan_changes_nothing() {
+    let mut map = plain_map(|_| {});
+    map.fuse(&scan_of(column(&[0.3], Open)), &HERE).unwrap();
+    let before = map.surface().values().to_vec();
+    let report = map.fuse(&scan_of([]), &HERE).unwrap();
+    assert_eq!((report.n_points, report.changed), (0, None));
+    assert_eq!(before.iter().filter(|cell| cell.is_known()).count(), 1);
+    for (a, b) in before.iter().zip(map.surface().values()) {
+        assert_eq!(a.height_m.to_bits(), b.height_m.to_bits());
+    }
+}
+
+#[test]
+fn a_pose_or_origin_that_is_no_number_is_refused_and_leaves_the_map_alone() {
+    let mut map = plain_map(|_| {});
+    let scan = scan_of(column(&[0.3], Open));
+    for broken in [
+        Pose { x_m: f64::NAN, ..HERE },
+        Pose { z_m: f64::INFINITY, ..HERE },
+        Pose { yaw_rad: f64::NAN, ..HERE },
+    ] {
+        assert!(matches!(map.fuse(&scan, &broken), Err(FuseError::NonFinitePose { .. })));
+    }
+    let nowhere = Scan { origin_m: [0.0, f32::NAN, 0.0], ..scan };
+    assert!(matches!(map.fuse(&nowhere, &HERE), Err(FuseError::NonFiniteOrigin { .. })));
+    assert!(map.surface().values().iter().all(|cell| !cell.is_known()));
+    assert_eq!(map.take_changed(), None);
+}
+
+#[test]
+fn uncertainty_grows_with_time_and_never_shrinks_for_an_old_scan() {
+    let mut map = plain_map(|config| config.fading_m2ps = 1e-4);
+    let scan = |valid_at_ns, points: Vec<_>| Scan { valid_at_ns, ..scan_of(points) };
+    map.fuse(&scan(1_000_000_000, column(&[0.3], Open)), &HERE).unwrap();
+    map.fuse(&scan(3_500_000_000, vec![]), &HERE).unwrap();
+    // 0.02^2 + 1e-4 x 2.5
+    assert!((at_spot(&map).height_variance_m2 - 6.5e-4).abs() < 1e-8);
+    map.fuse(&scan(2_000_000_000, vec![]), &HERE).unwrap();
+    assert!((at_spot(&map).height_variance_m2 - 6.5e-4).abs() < 1e-8);
+    map.fuse(&scan(4_500_000_000, vec![]), &HERE).unwrap();
+    assert!((at_spot(&map).height_variance_m2 - 7.5e-4).abs() < 1e-8);
+}
+
+#[test]
+fn settings_that_cannot_be_are_refused_with_field_and_number() {
+    let refused = |change: fn(&mut ElevationConfig)| {
+        let mut config = plain_config();
+        change(&mut config);
+        let error = ElevationMap::new(config).unwrap_err();
+        (error.field, error.to_string())
+    };
+    let (field, message) = refused(|c| c.resolution_m = -0.5);
+    assert_eq!(field, "resolution_m");
+    assert!(message.contains("-0.5") && message.contains("> 0"), "{message}");
+    assert_eq!(refused(|c| c.n_rows = 0).0, "n_rows");
+    assert_eq!(refused(|c| c.noise_per_range = f64::NAN).0, "noise_per_range");
+    assert_eq!(refused(|c| c.recentre_m = 0.0).0, "recentre_m");
+    assert_eq!(refused(|c| c.gap_radius_m = f64::INFINITY).0, "gap_radius_m");
+    assert!(ElevationConfig::scaled_to(0.33).validate().is_ok());
+    assert_eq!(ElevationConfig::scaled_to(3.4), ElevationConfig::default());
+}
