@@ -69,6 +69,8 @@ pub trait Lanes: Copy + Send + Sync + 'static {
     fn wrap_turns(self, a: Self::Value) -> Self::Value;
     /// Where a < b.
     fn less(self, a: Self::Value, b: Self::Value) -> Self::Mask;
+    /// Where a > b or either is NaN.
+    fn exceeds(self, a: Self::Value, b: Self::Value) -> Self::Mask;
     /// Where both hold.
     fn and(self, a: Self::Mask, b: Self::Mask) -> Self::Mask;
     /// Where either holds.
@@ -162,6 +164,12 @@ impl<L: Lanes> Real<L> {
     #[inline(always)]
     pub fn less(self, other: Self) -> L::Mask {
         self.0.less(self.1, other.1)
+    }
+
+    /// Where self > limit or is NaN.
+    #[inline(always)]
+    pub fn exceeds(self, limit: Self) -> L::Mask {
+        self.0.exceeds(self.1, limit.1)
     }
 
     /// self + term where the mask holds.

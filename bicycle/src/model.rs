@@ -137,7 +137,7 @@ pub struct Stepper {
     speed_change: Constant,
     steering_change: Constant,
     steering_domain: Constant,
-    unit_m: f64,
+    step_s: f64,
     effects: PreparedEffects,
 }
 
@@ -151,15 +151,14 @@ impl Stepper {
             speed_change: Constant::new(model.limits.acceleration_max_mps2 * step_s),
             steering_change: Constant::new(model.limits.steering_rate_max_radps * step_s),
             steering_domain: Constant::new(STEERING_DOMAIN_RAD),
-            unit_m,
+            step_s,
             effects: PreparedEffects::new(&model.effects, step_s),
         }
     }
 
     /// Changes the unit of length.
     pub fn rescale(&mut self, unit_m: f64) {
-        self.advance = Constant::new(self.advance.value() * self.unit_m / unit_m);
-        self.unit_m = unit_m;
+        self.advance = Constant::new(self.step_s / unit_m);
     }
 
     /// Without the limits on acceleration and steering rate.

@@ -3,7 +3,7 @@
 
 use super::{Constant, Lanes, polynomial};
 use pulp::x86::{V3, V4};
-use pulp::{Simd, b16, cast, f32x8, f32x16, m32x8};
+use pulp::{Simd, b16, cast, f32x8, f32x16, m32x8, u32x8};
 
 macro_rules! arithmetic_of_pulp {
     () => {
@@ -58,6 +58,8 @@ macro_rules! arithmetic_of_pulp {
     };
 }
 
+/// Comparison "not less than or equal", true for NaN, quiet.
+const NOT_LESS_EQUAL: i32 = 22;
 /// Keeps the reciprocal square root away from zero.
 const TINY: Constant = Constant { double: 1e-12, single: 1e-12 };
 const HALF: Constant = Constant { double: 0.5, single: 0.5 };
@@ -87,6 +89,10 @@ impl Lanes for V4 {
         cast!(self.avx512dq._mm512_reduce_ps::<0>(cast!(a)))
     }
     #[inline(always)]
+    fn exceeds(self, a: f32x16, b: f32x16) -> b16 {
+        b16(self.avx512f._mm512_cmp_ps_mask::<NOT_LESS_EQUAL>(cast!(a), cast!(b)))
+    }
+    #[inline(always)]
     fn and(self, a: b16, b: b16) -> b16 {
         b16(a.0 & b.0)
     }
@@ -114,6 +120,11 @@ impl Lanes for V3 {
     #[inline(always)]
     fn wrap_turns(self, a: f32x8) -> f32x8 {
         self.sub(a, cast!(self.avx._mm256_round_ps::<8>(cast!(a))))
+    }
+    #[inline(always)]
+    fn exceeds(self, a: f32x8, b: f32x8) -> m32x8 {
+        let words: u32x8 = cast!(self.avx._mm256_cmp_ps::<NOT_LESS_EQUAL>(cast!(a), cast!(b)));
+        self.greater_than_u32s(words, self.splat_u32s(0))
     }
     #[inline(always)]
     fn and(self, a: m32x8, b: m32x8) -> m32x8 {

@@ -66,6 +66,10 @@ impl Lanes for Portable {
         std::array::from_fn(|i| a[i] < b[i])
     }
     #[inline(always)]
+    fn exceeds(self, a: Pack, b: Pack) -> [bool; 8] {
+        std::array::from_fn(|i| a[i] > b[i] || a[i].is_nan() || b[i].is_nan())
+    }
+    #[inline(always)]
     fn and(self, a: [bool; 8], b: [bool; 8]) -> [bool; 8] {
         std::array::from_fn(|i| a[i] & b[i])
     }

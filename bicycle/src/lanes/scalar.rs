@@ -44,6 +44,9 @@ impl Lanes for Scalar {
     fn less(self, a: f64, b: f64) -> bool {
         a < b
     }
+    fn exceeds(self, a: f64, b: f64) -> bool {
+        !matches!(a.partial_cmp(&b), Some(std::cmp::Ordering::Less | std::cmp::Ordering::Equal))
+    }
     fn and(self, a: bool, b: bool) -> bool {
         a && b
     }

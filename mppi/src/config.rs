@@ -1,0 +1,311 @@
+//! What a user can set, with its ranges. Costs are in seconds: of everything that is weighed, one second more on the
+//! way is the unit.
+
+use crate::kernel::{CHUNK, Isa, Machine};
+use crate::rollout::MAX_SLOTS;
+use bicycle::ModelError;
+use serde::{Deserialize, Serialize};
+
+/// Configuration of a [`crate::Controller`]. The default is what `surefoot drive` uses.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Config {
+    /// Sampled futures per iteration; a multiple of 64.
+    pub n_rollouts: usize,
+    /// Steps of the horizon; at least 2.
+    pub n_steps: usize,
+    /// Length of a step [s].
+    pub step_s: f64,
+    /// Times that sampling and averaging are repeated per cycle.
+    pub n_iterations: usize,
+    /// Threads that share the rollouts, the calling one among them. The result does not depend on it.
+    pub n_threads: usize,
+    /// Instruction set; a forced one that the machine lacks is refused.
+    pub isa: Isa,
+    /// How controls are perturbed.
+    pub sampling: Sampling,
+    /// Whether the plan respects the limits on acceleration and steering rate.
+    pub actuation: Actuation,
+    /// How sharply low costs are preferred.
+    pub temperature: Temperature,
+    /// Weight of the control cost of Williams et al. 2017, over the temperature; 1 = information-theoretic MPPI,
+    /// 0 = none [-].
+    pub control_cost: f64,
+    /// What things cost.
+    pub costs: Costs,
+    /// Known delay between a decision and its effect on the actuators: the start of the plan is predicted over it
+    /// with the commands that were already sent [s].
+    pub delay_s: f64,
+    /// How far the commands may run ahead of the measured speed and steering angle, as the time that the limits of
+    /// acceleration and steering rate need for it; 0 = the plan starts exactly at the measured state [s].
+    pub tracking_s: f64,
+    /// Backing up when stuck; needs a reverse gear.
+    pub recovery: Recovery,
+}
+
+/// How controls are perturbed.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Sampling {
+    /// What the noise is added to.
+    pub space: SampleSpace,
+    /// Standard deviation of the speed [m/s], or of the acceleration [m/s2] when sampling rates.
+    pub speed_std: f64,
+    /// Standard deviation of the steering angle [rad], or of the steering rate [rad/s] when sampling rates.
+    pub steering_std: f64,
+    /// Correlation time of the noise; 0 = white [s].
+    pub correlation_s: f64,
+}
+
+/// What the noise is added to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum SampleSpace {
+    /// Speed and steering angle.
+    Controls,
+    /// Their rates, which makes smooth sequences.
+    Rates,
+}
+
+/// Whether the plan respects the limits on acceleration and steering rate.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Actuation {
+    /// Commands act at once (PIETRA, equation 2 as printed).
+    Instant,
+    /// Commands change within the limits, from the measured state on.
+    Limited,
+}
+
+/// How sharply low costs are preferred.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum Temperature {
+    /// Always the same.
+    Fixed {
+        /// Cost difference that makes a factor e [s].
+        temperature_s: f64,
+    },
+    /// Chosen each iteration so that this share of the rollouts counts.
+    EffectiveSampleSize {
+        /// Effective sample size over the number of rollouts, in (0, 1).
+        fraction: f64,
+    },
+}
+
+impl Temperature {
+    /// Coldest that the search may go [s].
+    pub(crate) const LOWEST_S: f32 = 1e-3;
+    /// Hottest that the search may go [s].
+    pub(crate) const HIGHEST_S: f32 = 1e4;
+}
+
+/// What things cost.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Costs {
+    /// Of a metre of distance to the goal, per step until it is reached [s/m]; 0 = time alone counts.
+    pub distance_s_per_m: f64,
+    /// Speed at which the straight line that is left at the end of the horizon is valued [m/s].
+    pub rest_speed_mps: f64,
+    /// Of a step beyond the limits of roll or pitch [s].
+    pub attitude_s: f64,
+    /// Of a step beyond the limit of lateral acceleration [s].
+    pub lateral_s: f64,
+    /// Of a step in reverse [s].
+    pub reverse_s: f64,
+    /// Of a metre of distance across a reference path, squared, per step [s/m2].
+    pub path_across_s_per_m2: f64,
+    /// Of a metre of being behind or ahead on a reference path, squared, per step [s/m2].
+    pub path_along_s_per_m2: f64,
+}
+
+/// Backing up when stuck.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Recovery {
+    /// Stuck means to stay within `progress_m` for this long [s]; infinite = never back up.
+    pub patience_s: f64,
+    /// Distance that counts as progress [m].
+    pub progress_m: f64,
+    /// Distance to back up [m].
+    pub distance_m: f64,
+    /// Longest time to spend on it [s].
+    pub duration_s: f64,
+}
+
+impl Default for Config {
+    fn default() -> Self {
+        Self {
+            n_rollouts: 1024,
+            n_steps: 50,
+            step_s: 0.1,
+            n_iterations: 1,
+            n_threads: 1,
+            isa: Isa::Auto,
+            sampling: Sampling {
+                space: SampleSpace::Rates,
+                speed_std: 1.5,
+                steering_std: 0.6,
+                correlation_s: 0.5,
+            },
+            actuation: Actuation::Limited,
+            temperature: Temperature::EffectiveSampleSize { fraction: 0.05 },
+            control_cost: 0.1,
+            costs: Costs {
+                distance_s_per_m: 0.0,
+                rest_speed_mps: 1.0,
+                attitude_s: 20.0,
+                lateral_s: 20.0,
+                reverse_s: 0.1,
+                path_across_s_per_m2: 0.5,
+                path_along_s_per_m2: 0.1,
+            },
+            delay_s: 0.0,
+            tracking_s: 0.5,
+            recovery: Recovery { patience_s: 4.0, progress_m: 0.3, distance_m: 1.5, duration_s: 4.0 },
+        }
+    }
+}
+
+impl Config {
+    /// The work of the hand-written speed bound: time to goal with latch, attitude limits, white noise on the
+    /// controls, instant actuators, fixed temperature.
+    pub fn bound() -> Self {
+        Self {
+            sampling: Sampling {
+                space: SampleSpace::Controls,
+                speed_std: 1.0,
+                steering_std: 0.2236,
+                correlation_s: 0.0,
+            },
+            actuation: Actuation::Instant,
+            temperature: Temperature::Fixed { temperature_s: 1.0 },
+            control_cost: 1.0,
+            costs: Costs {
+                distance_s_per_m: 1.0,
+                attitude_s: 100.0,
+                lateral_s: 0.0,
+                reverse_s: 0.0,
+                ..Self::default().costs
+            },
+            tracking_s: 0.0,
+            recovery: Recovery { patience_s: f64::INFINITY, ..Self::default().recovery },
+            ..Self::default()
+        }
+    }
+
+    /// Refuses values that make no controller.
+    ///
+    /// # Errors
+    /// The first field that is out of range.
+    pub fn validate(&self) -> Result<(), ConfigError> {
+        let counts = [
+            ("n_rollouts", self.n_rollouts, 1 << 20),
+            ("n_steps", self.n_steps, 1000),
+            ("n_iterations", self.n_iterations, 100),
+            ("n_threads", self.n_threads, 1024),
+        ];
+        for (field, found, most) in counts {
+            let allowed = (1..=most).contains(&found);
+            check(allowed, field, "a whole number >= 1 and not beyond all reason", found as f64)?;
+        }
+        check(
+            self.n_rollouts.is_multiple_of(CHUNK),
+            "n_rollouts",
+            "a multiple of 64",
+            self.n_rollouts as f64,
+        )?;
+        check(self.n_steps >= 2, "n_steps", "at least 2", self.n_steps as f64)?;
+        self.validate_numbers()?;
+        if Machine::find(self.isa).is_none() {
+            return Err(ConfigError::IsaAbsent { isa: self.isa });
+        }
+        Ok(())
+    }
+
+    fn validate_numbers(&self) -> Result<(), ConfigError> {
+        let (costs, recovery) = (&self.costs, &self.recovery);
+        let positive = [
+            ("step_s", self.step_s),
+            ("sampling.speed_std", self.sampling.speed_std),
+            ("sampling.steering_std", self.sampling.steering_std),
+            ("costs.rest_speed_mps", costs.rest_speed_mps),
+            ("recovery.progress_m", recovery.progress_m),
+            ("recovery.distance_m", recovery.distance_m),
+            ("recovery.duration_s", recovery.duration_s),
+        ];
+        for (field, found) in positive {
+            check(found.is_finite() && found > 0.0, field, "a finite number > 0", found)?;
+        }
+        let not_negative = [
+            ("sampling.correlation_s", self.sampling.correlation_s),
+            ("control_cost", self.control_cost),
+            ("costs.distance_s_per_m", costs.distance_s_per_m),
+            ("costs.attitude_s", costs.attitude_s),
+            ("costs.lateral_s", costs.lateral_s),
+            ("costs.reverse_s", costs.reverse_s),
+            ("costs.path_across_s_per_m2", costs.path_across_s_per_m2),
+            ("costs.path_along_s_per_m2", costs.path_along_s_per_m2),
+            ("delay_s", self.delay_s),
+            ("tracking_s", self.tracking_s),
+        ];
+        for (field, found) in not_negative {
+            check(found.is_finite() && found >= 0.0, field, "a finite number >= 0", found)?;
+        }
+        check(recovery.patience_s > 0.0, "recovery.patience_s", "a number > 0 or inf", recovery.patience_s)?;
+        check(self.delay_s <= 2.0, "delay_s", "at most 2 s", self.delay_s)?;
+        match self.temperature {
+            Temperature::Fixed { temperature_s: found } => {
+                let allowed = found.is_finite() && found > 0.0;
+                check(allowed, "temperature.fixed.temperature_s", "a finite number > 0", found)
+            }
+            Temperature::EffectiveSampleSize { fraction: found } => {
+                let allowed = found > 0.0 && found < 1.0;
+                check(allowed, "temperature.effective_sample_size.fraction", "a number in (0, 1)", found)
+            }
+        }
+    }
+}
+
+fn check(allowed: bool, field: &'static str, expected: &'static str, found: f64) -> Result<(), ConfigError> {
+    if allowed { Ok(()) } else { Err(ConfigError::Field { field, expected, found }) }
+}
+
+/// Why there is no controller.
+#[derive(Debug, thiserror::Error)]
+pub enum ConfigError {
+    /// A value is out of range.
+    #[error("{field}: expected {expected}, found {found}")]
+    Field {
+        /// Dotted path of the field.
+        field: &'static str,
+        /// The range that would do.
+        expected: &'static str,
+        /// The value that was given.
+        found: f64,
+    },
+    /// The forced instruction set is not there.
+    #[error("isa: this machine has no {isa:?}; use auto or portable")]
+    IsaAbsent {
+        /// What was asked for.
+        isa: Isa,
+    },
+    /// The model of the vehicle cannot be.
+    #[error("model: {0}")]
+    Model(#[from] ModelError),
+    /// The effects carry more from step to step than the rollouts have room for.
+    #[error(
+        "model: effects remember {found} numbers per rollout at step_s = {step_s}, at most {MAX_SLOTS} fit; \
+             use longer steps or shorter delays"
+    )]
+    EffectMemory {
+        /// What they need.
+        found: usize,
+        /// Length of a step [s].
+        step_s: f64,
+    },
+    /// The system refused a thread.
+    #[error("n_threads: the system refused a thread: {0}")]
+    Threads(#[from] std::io::Error),
+}

@@ -1,0 +1,63 @@
+//! Whether a plan may be driven: looked at in f64, step by step, over the distance in which the vehicle could stop.
+
+use crate::sampling::Control;
+use bicycle::{Command, GroundSample, Limits, State, Stepper};
+use traversability::{Risk, RiskMapView};
+
+/// Rolls single control sequences over the map with the reference model.
+pub(crate) struct Judge<'a> {
+    /// The model in metres.
+    pub(crate) stepper: &'a Stepper,
+    pub(crate) limits: &'a Limits,
+    pub(crate) map: RiskMapView<'a>,
+}
+
+impl Judge<'_> {
+    /// The state after one step.
+    pub(crate) fn step(&self, state: &State, command: Command, memory: &mut [f64], t: usize) -> State {
+        let risk = self.risk(state);
+        let cell = self.map.geometry.cell_at(state.x_m, state.y_m);
+        let ground = cell.map(|cell| self.map.ground[self.map.geometry.index(cell)]).unwrap_or_default();
+        let sample = GroundSample {
+            linear_traction: f64::from(risk.linear_traction),
+            angular_traction: f64::from(risk.angular_traction),
+            gradient: ground.gradient.map(f64::from),
+            class: f64::from(ground.class),
+        };
+        self.stepper.step_state(state, command, &sample, memory, t)
+    }
+
+    fn risk(&self, state: &State) -> Risk {
+        self.map.risk_at(state.x_m, state.y_m, state.yaw_rad)
+    }
+
+    /// Whether the controls lead over a limit of attitude. A vehicle that stands beyond a limit may leave: its first
+    /// poses count only when they are worse than where it stands.
+    pub(crate) fn breaks_limits(
+        &self,
+        start: &State,
+        controls: impl Iterator<Item = Control>,
+        memory: &mut [f64],
+    ) -> bool {
+        let start_risk = self.risk(start);
+        let mut is_leaving = self.is_tilted(start_risk);
+        let mut state = *start;
+        for (t, [speed_mps, steering_rad]) in controls.enumerate() {
+            state = self.step(&state, Command { speed_mps, steering_rad }, memory, t);
+            let risk = self.risk(&state);
+            let is_worse = risk.roll_rad > start_risk.roll_rad || risk.pitch_rad > start_risk.pitch_rad;
+            if self.is_tilted(risk) && (!is_leaving || is_worse) {
+                return true;
+            }
+            is_leaving = is_leaving && self.is_tilted(risk);
+        }
+        false
+    }
+
+    /// A number that is not finite is beyond every limit.
+    fn is_tilted(&self, risk: Risk) -> bool {
+        let within = f64::from(risk.roll_rad) <= self.limits.roll_max_rad
+            && f64::from(risk.pitch_rad) <= self.limits.pitch_max_rad;
+        !within
+    }
+}

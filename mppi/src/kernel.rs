@@ -1,0 +1,186 @@
+//! What the inner loops need of a machine beyond [`Lanes`]: bits, loads, stores and table lookups, and the choice of
+//! the instruction set at run time.
+//!
+//! Two modules below hold the crate's `unsafe`: [`lookup`] reads tables at indices that it has clamped itself, and
+//! [`workers`] lends a borrowed job to threads that outlive it.
+
+mod avx2;
+mod avx512;
+pub(crate) mod functions;
+#[allow(unsafe_code)]
+mod lookup;
+mod portable;
+#[allow(unsafe_code)]
+pub(crate) mod workers;
+
+use bicycle::lanes::{Lanes, Portable, Real};
+use serde::{Deserialize, Serialize};
+use traversability::{Ground, Risk};
+
+/// Rollouts that are stored side by side and handed to a thread together.
+pub(crate) const CHUNK: usize = 64;
+
+/// One number for every rollout of a chunk.
+#[derive(Clone, Copy, Debug)]
+#[repr(C, align(64))]
+pub(crate) struct Row(pub(crate) [f32; CHUNK]);
+
+impl Row {
+    pub(crate) const ZERO: Self = Self([0.0; CHUNK]);
+}
+
+/// Instructions of the inner loops.
+pub(crate) trait Kernel: Lanes {
+    /// A pack of 32-bit words.
+    type Bits: Copy;
+    /// Packs that the rollout keeps in flight to hide latency.
+    const IN_FLIGHT: usize;
+
+    /// The pack that starts at `offset` of a row; panics beyond the row.
+    fn load(self, row: &Row, offset: usize) -> Self::Value;
+    /// Writes a pack to a row from `offset` on; panics beyond the row.
+    fn store(self, row: &mut Row, offset: usize, value: Self::Value);
+    /// The first `WIDTH` of these sixteen values.
+    fn load_lanes(self, values: &[f32; 16]) -> Self::Value;
+    /// Writes a pack into sixteen values from `offset` on; panics beyond them.
+    fn store_lanes(self, values: &mut [f32; 16], offset: usize, value: Self::Value);
+    /// first, first + 1, ... in the lanes.
+    fn count_from(self, first: u32) -> Self::Bits;
+    /// The same word in every lane.
+    fn word(self, value: u32) -> Self::Bits;
+    /// a + b, wrapping.
+    fn add_bits(self, a: Self::Bits, b: Self::Bits) -> Self::Bits;
+    /// a b, wrapping.
+    fn mul_bits(self, a: Self::Bits, b: Self::Bits) -> Self::Bits;
+    /// a ^ b.
+    fn xor_bits(self, a: Self::Bits, b: Self::Bits) -> Self::Bits;
+    /// a | b.
+    fn or_bits(self, a: Self::Bits, b: Self::Bits) -> Self::Bits;
+    /// a & b.
+    fn and_bits(self, a: Self::Bits, b: Self::Bits) -> Self::Bits;
+    /// a << N.
+    fn shl<const N: u32>(self, a: Self::Bits) -> Self::Bits;
+    /// a >> N, zeros enter.
+    fn shr<const N: u32>(self, a: Self::Bits) -> Self::Bits;
+    /// The words as f32 bit patterns.
+    fn as_value(self, bits: Self::Bits) -> Self::Value;
+    /// The f32 bit patterns as words.
+    fn as_bits(self, value: Self::Value) -> Self::Bits;
+    /// Towards zero; NaN and what does not fit give some word.
+    fn truncate(self, value: Self::Value) -> Self::Bits;
+    /// Signed words as numbers.
+    fn convert(self, bits: Self::Bits) -> Self::Value;
+    /// Linear traction, angular traction, roll, pitch at these indices; beyond the table, of its last entry.
+    fn risks(self, table: &[Risk], indices: Self::Bits) -> [Self::Value; 4];
+    /// Entries at these indices; beyond the table, the last one.
+    fn gather(self, table: &[f32], indices: Self::Bits) -> Self::Value;
+    /// The words; beyond the first `WIDTH`, anything.
+    fn words(self, bits: Self::Bits) -> [u32; 16];
+    /// Sum of the lanes, the upper half added to the lower until one is left.
+    fn sum(self, value: Self::Value) -> f32;
+    /// Smallest of the lanes.
+    fn smallest(self, value: Self::Value) -> f32;
+
+    /// Gradient east, gradient north and class at these indices; beyond the table, of its last entry.
+    #[inline(always)]
+    fn grounds(self, table: &[Ground], indices: Self::Bits) -> [Self::Value; 3] {
+        let rows = lookup::grounds(table, self.words(indices));
+        [0, 1, 2].map(|column| self.load_lanes(&rows.map(|row| row[column])))
+    }
+
+    /// Exponent and mantissa less one: value = 2^exponent (1 + rest), for normal value > 0.
+    #[inline(always)]
+    fn split(self, value: Self::Value) -> (Self::Value, Self::Value) {
+        let bits = self.as_bits(value);
+        let exponent = Real(self, self.convert(self.shr::<23>(bits))) - self.real(127.0);
+        let mantissa = self.or_bits(self.and_bits(bits, self.word(0x007f_ffff)), self.word(0x3f80_0000));
+        (exponent.1, (Real(self, self.as_value(mantissa)) - self.real(1.0)).1)
+    }
+
+    /// a <<< N, bits that leave enter on the right; N + M must be 32.
+    #[inline(always)]
+    fn rotate<const N: u32, const M: u32>(self, a: Self::Bits) -> Self::Bits {
+        self.or_bits(self.shl::<N>(a), self.shr::<M>(a))
+    }
+}
+
+/// Which instructions the controller uses.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Isa {
+    /// The best that the machine has.
+    #[default]
+    Auto,
+    /// AVX-512 (F, BW, CD, DQ, VL).
+    Avx512,
+    /// AVX2 with FMA.
+    Avx2,
+    /// What every machine of this architecture has.
+    Portable,
+}
+
+/// A piece of work written for any instruction set.
+pub(crate) trait Work {
+    type Output;
+    fn run<K: Kernel>(self, kernel: K) -> Self::Output;
+}
+
+/// An instruction set that is known to be there.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Machine {
+    #[cfg(target_arch = "x86_64")]
+    Avx512(pulp::x86::V4),
+    #[cfg(target_arch = "x86_64")]
+    Avx2(pulp::x86::V3),
+    Portable,
+}
+
+#[cfg(target_arch = "x86_64")]
+struct Vectorized<K, W>(K, W);
+
+#[cfg(target_arch = "x86_64")]
+impl<K: Kernel, W: Work> pulp::NullaryFnOnce for Vectorized<K, W> {
+    type Output = W::Output;
+    #[inline(always)]
+    fn call(self) -> W::Output {
+        self.1.run(self.0)
+    }
+}
+
+impl Machine {
+    /// The machine's form of the wish; `None` when it lacks the instructions.
+    pub(crate) fn find(isa: Isa) -> Option<Self> {
+        match isa {
+            Isa::Auto => Self::find(Isa::Avx512).or_else(|| Self::find(Isa::Avx2)).or(Some(Self::Portable)),
+            #[cfg(target_arch = "x86_64")]
+            Isa::Avx512 => pulp::x86::V4::try_new().map(Self::Avx512),
+            #[cfg(target_arch = "x86_64")]
+            Isa::Avx2 => pulp::x86::V3::try_new().map(Self::Avx2),
+            Isa::Portable => Some(Self::Portable),
+            #[cfg(not(target_arch = "x86_64"))]
+            _ => None,
+        }
+    }
+
+    pub(crate) fn isa(self) -> Isa {
+        match self {
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx512(_) => Isa::Avx512,
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx2(_) => Isa::Avx2,
+            Self::Portable => Isa::Portable,
+        }
+    }
+
+    /// Runs the work with these instructions.
+    #[inline]
+    pub(crate) fn run<W: Work>(self, work: W) -> W::Output {
+        match self {
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx512(kernel) => kernel.vectorize(Vectorized(kernel, work)),
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx2(kernel) => kernel.vectorize(Vectorized(kernel, work)),
+            Self::Portable => work.run(Portable),
+        }
+    }
+}

@@ -1,0 +1,178 @@
+//! What the controller is asked to do and what it is told.
+
+use crate::cost_to_go::CostToGoView;
+use crate::kernel::Kernel;
+use bicycle::State;
+use bicycle::lanes::Real;
+use traversability::{GridGeometry, RiskMapView};
+
+/// One cycle's input.
+#[derive(Clone, Copy, Debug)]
+pub struct Input<'a> {
+    /// Measured state.
+    pub state: State,
+    /// Time since the previous decision; 0 on the first [s].
+    pub elapsed_s: f64,
+    /// Risk and ground around the vehicle.
+    pub map: RiskMapView<'a>,
+    /// What to do.
+    pub objective: Objective<'a>,
+    /// Number of the cycle; together with the seed it keys the noise.
+    pub cycle: u64,
+}
+
+/// What to do.
+#[derive(Clone, Copy, Debug)]
+pub enum Objective<'a> {
+    /// Reach a point.
+    Goal {
+        /// The point in the map frame [m].
+        goal_m: [f64; 2],
+        /// Distance at which it counts as reached [m].
+        tolerance_m: f64,
+        /// How the rest of the way is valued at the end of the horizon.
+        terminal: Terminal<'a>,
+    },
+    /// Follow a path.
+    Path(ReferencePath<'a>),
+}
+
+/// How the rest of the way is valued at the end of the horizon.
+#[derive(Clone, Copy, Debug)]
+pub enum Terminal<'a> {
+    /// The straight line at the configured rest speed.
+    StraightLine,
+    /// The time over the known map.
+    CostToGo(CostToGoView<'a>),
+}
+
+/// A polyline to follow.
+#[derive(Clone, Copy, Debug)]
+pub struct ReferencePath<'a> {
+    /// Corners in the map frame [m]; at least two.
+    pub points_m: &'a [[f64; 2]],
+    /// Speed along it [m/s].
+    pub speed_mps: f64,
+    /// Distance from the last corner at which the end counts as reached [m].
+    pub tolerance_m: f64,
+}
+
+impl Objective<'_> {
+    /// The point to reach in the end and how near counts; `None` for numbers or a path that make no objective.
+    pub(crate) fn end(&self) -> Option<([f64; 2], f64)> {
+        let (end_m, tolerance_m) = match *self {
+            Self::Goal { goal_m, tolerance_m, .. } => (goal_m, tolerance_m),
+            Self::Path(path) if path.is_usable() => (*path.points_m.last()?, path.tolerance_m),
+            Self::Path(_) => return None,
+        };
+        let finite = end_m[0].is_finite() && end_m[1].is_finite() && tolerance_m.is_finite();
+        finite.then_some((end_m, tolerance_m))
+    }
+}
+
+/// Where the reference is at the end of one step, in cells, and what the distance from it costs.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct ReferenceStep {
+    pub(crate) x_cells: f64,
+    pub(crate) y_cells: f64,
+    pub(crate) tangent: [f64; 2],
+    /// Of a cell along the path, squared [s].
+    pub(crate) along_s: f64,
+    /// Of a cell across the path, squared [s].
+    pub(crate) across_s: f64,
+}
+
+impl ReferencePath<'_> {
+    /// Length along the path of its point nearest to `at_m` [m].
+    pub(crate) fn project(&self, at_m: [f64; 2]) -> f64 {
+        let mut best = (f64::INFINITY, 0.0);
+        let mut passed_m = 0.0;
+        for ends in self.points_m.windows(2) {
+            let (along, length_m) = direction(ends[0], ends[1]);
+            let from = [at_m[0] - ends[0][0], at_m[1] - ends[0][1]];
+            let foot_m = (from[0] * along[0] + from[1] * along[1]).clamp(0.0, length_m);
+            let distance_m = (from[0] - foot_m * along[0]).hypot(from[1] - foot_m * along[1]);
+            if distance_m < best.0 {
+                best = (distance_m, passed_m + foot_m);
+            }
+            passed_m += length_m;
+        }
+        best.1
+    }
+
+    /// Point and direction at a length along the path; beyond its end, the end.
+    pub(crate) fn at(&self, length_m: f64) -> ([f64; 2], [f64; 2]) {
+        let mut left_m = length_m.max(0.0);
+        let mut end = (self.points_m[0], [1.0, 0.0]);
+        for ends in self.points_m.windows(2) {
+            let (along, segment_m) = direction(ends[0], ends[1]);
+            let step_m = left_m.min(segment_m);
+            end = ([ends[0][0] + step_m * along[0], ends[0][1] + step_m * along[1]], along);
+            if left_m <= segment_m {
+                return end;
+            }
+            left_m -= segment_m;
+        }
+        end
+    }
+
+    pub(crate) fn is_usable(&self) -> bool {
+        let finite = self.points_m.iter().flatten().all(|value| value.is_finite());
+        self.points_m.len() >= 2 && finite && self.speed_mps.is_finite() && self.tolerance_m.is_finite()
+    }
+}
+
+/// Unit vector and length from one point to another.
+fn direction(from_m: [f64; 2], to_m: [f64; 2]) -> ([f64; 2], f64) {
+    let (dx, dy) = (to_m[0] - from_m[0], to_m[1] - from_m[1]);
+    let length_m = dx.hypot(dy);
+    if length_m > 0.0 { ([dx / length_m, dy / length_m], length_m) } else { ([1.0, 0.0], 0.0) }
+}
+
+/// A cost-to-go field seen from another grid's cells.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct TerminalField<'a> {
+    seconds: &'a [f32],
+    n_rows: usize,
+    n_cols: usize,
+    /// Cells of the field per cell of the map.
+    scale: f64,
+    /// Of the field's first cell centre, in cells of the field.
+    offset: [f64; 2],
+}
+
+impl<'a> TerminalField<'a> {
+    /// `None` when the field has less than two rows or columns, or not the length that its geometry says.
+    pub(crate) fn new(view: CostToGoView<'a>, map: &GridGeometry) -> Option<Self> {
+        let GridGeometry { n_rows, n_cols, resolution_m, .. } = view.geometry;
+        let (map_corner, corner) = (map.south_west_m(), view.geometry.south_west_m());
+        let offset = [0, 1].map(|axis| (map_corner[axis] - corner[axis]) / resolution_m - 0.5);
+        let usable = n_rows >= 2 && n_cols >= 2 && view.seconds.len() == n_rows * n_cols;
+        let scale = map.resolution_m / resolution_m;
+        usable.then_some(Self { seconds: view.seconds, n_rows, n_cols, scale, offset })
+    }
+
+    /// Time to go, interpolated between cell centres; beyond the field, that of its rim [s].
+    #[inline(always)]
+    pub(crate) fn seconds<K: Kernel>(&self, x_cells: Real<K>, y_cells: Real<K>) -> Real<K> {
+        let kernel = x_cells.0;
+        let place = |cells: Real<K>, axis: usize, n: usize| {
+            let place = cells.mul_add(kernel.real(self.scale), kernel.real(self.offset[axis]));
+            let place = place.clamp(kernel.real(0.0), kernel.real((n - 1) as f64));
+            let whole = kernel.truncate(place.min(kernel.real((n - 2) as f64)).1);
+            (whole, place - Real(kernel, kernel.convert(whole)))
+        };
+        let (col, east) = place(x_cells, 0, self.n_cols);
+        let (row, north) = place(y_cells, 1, self.n_rows);
+        let corner = kernel.add_bits(kernel.mul_bits(row, kernel.word(self.n_cols as u32)), col);
+        let at = |further: usize| {
+            let index = kernel.add_bits(corner, kernel.word(further as u32));
+            Real(kernel, kernel.gather(self.seconds, index))
+        };
+        let (south_west, south_east) = (at(0), at(1));
+        let (north_west, north_east) = (at(self.n_cols), at(self.n_cols + 1));
+        let south = (south_east - south_west).mul_add(east, south_west);
+        let upper = (north_east - north_west).mul_add(east, north_west);
+        (upper - south).mul_add(north, south)
+    }
+}

@@ -1,0 +1,116 @@
+//! Noticing that the vehicle is stuck, and backing up for a while.
+//!
+//! No clock: time comes in as the time between two decisions.
+
+use crate::config::Recovery;
+use bicycle::State;
+
+/// What the controller should do.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Mode {
+    /// Go for the objective.
+    Onward,
+    /// Drive backwards, towards this point [m].
+    BackUp { target_m: [f64; 2] },
+}
+
+/// Watches progress.
+#[derive(Clone, Debug)]
+pub(crate) struct Watch {
+    config: Recovery,
+    mode: Mode,
+    /// Where progress was last made, or backing up began [m]; none before the first look.
+    anchor_m: Option<[f64; 2]>,
+    /// Since then [s].
+    waited_s: f64,
+}
+
+impl Watch {
+    pub(crate) fn new(config: Recovery) -> Self {
+        Self { config, mode: Mode::Onward, anchor_m: None, waited_s: 0.0 }
+    }
+
+    /// Forgets what was; to be called when the vehicle is not meant to move.
+    pub(crate) fn reset(&mut self) {
+        (self.mode, self.anchor_m, self.waited_s) = (Mode::Onward, None, 0.0);
+    }
+
+    /// Looks at a vehicle that is meant to move.
+    pub(crate) fn observe(&mut self, state: &State, elapsed_s: f64) -> Mode {
+        let here_m = [state.x_m, state.y_m];
+        let anchor_m = *self.anchor_m.get_or_insert(here_m);
+        let moved_m = (here_m[0] - anchor_m[0]).hypot(here_m[1] - anchor_m[1]);
+        self.waited_s += elapsed_s;
+        match self.mode {
+            Mode::Onward if moved_m >= self.config.progress_m => self.begin(Mode::Onward, here_m),
+            Mode::Onward if self.waited_s >= self.config.patience_s => {
+                let back_m = self.config.distance_m;
+                let target_m =
+                    [here_m[0] - back_m * state.yaw_rad.cos(), here_m[1] - back_m * state.yaw_rad.sin()];
+                self.begin(Mode::BackUp { target_m }, here_m);
+            }
+            Mode::BackUp { .. }
+                if moved_m >= self.config.distance_m || self.waited_s >= self.config.duration_s =>
+            {
+                self.begin(Mode::Onward, here_m);
+            }
+            _ => {}
+        }
+        self.mode
+    }
+
+    fn begin(&mut self, mode: Mode, here_m: [f64; 2]) {
+        (self.mode, self.anchor_m, self.waited_s) = (mode, Some(here_m), 0.0);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const CONFIG: Recovery = Recovery { patience_s: 3.0, progress_m: 0.5, distance_m: 1.0, duration_s: 2.0 };
+
+    fn at(x_m: f64) -> State {
+        State { x_m, ..State::default() }
+    }
+
+    #[test]
+    fn a_vehicle_at_half_a_metre_per_second_is_never_stuck() {
+        let mut watch = Watch::new(CONFIG);
+        // Progress of 0.5 m takes 1 s of the 3 s of patience.
+        for k in 0..200 {
+            assert_eq!(watch.observe(&at(0.05 * f64::from(k)), 0.1), Mode::Onward);
+        }
+    }
+
+    #[test]
+    fn a_standing_vehicle_backs_up_after_its_patience_and_goes_on_after_the_duration() {
+        let mut watch = Watch::new(CONFIG);
+        let modes: Vec<bool> =
+            (0..80).map(|_| matches!(watch.observe(&at(0.0), 0.1), Mode::BackUp { .. })).collect();
+        // 30 looks of 0.1 s are the patience; 20 more are the duration; then patience again.
+        assert!(modes[..29].iter().all(|&back| !back));
+        assert!(modes[31..49].iter().all(|&back| back));
+        assert!(modes[51..79].iter().all(|&back| !back));
+    }
+
+    #[test]
+    fn backing_up_aims_behind_the_vehicle_and_ends_with_the_distance() {
+        let mut watch = Watch::new(CONFIG);
+        let standing = State { x_m: 2.0, yaw_rad: std::f64::consts::FRAC_PI_2, ..State::default() };
+        let mut mode = Mode::Onward;
+        for _ in 0..32 {
+            mode = watch.observe(&standing, 0.1);
+        }
+        let Mode::BackUp { target_m } = mode else { panic!("stuck for longer than the patience") };
+        assert!((target_m[0] - 2.0).abs() < 1e-12 && (target_m[1] + 1.0).abs() < 1e-12);
+        let moved = State { y_m: -1.01, ..standing };
+        assert_eq!(watch.observe(&moved, 0.1), Mode::Onward);
+    }
+
+    #[test]
+    fn endless_patience_never_backs_up() {
+        let mut watch = Watch::new(Recovery { patience_s: f64::INFINITY, ..CONFIG });
+        assert!((0..1000).all(|_| watch.observe(&at(0.0), 10.0) == Mode::Onward));
+    }
+}

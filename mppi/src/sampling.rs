@@ -1,0 +1,160 @@
+//! The perturbed control sequences.
+//!
+//! Noise is white or a stationary first-order Gauss-Markov sequence, on the controls or on their rates; the sampled
+//! controls are brought within the limits before they are used, so that what is rolled out is what is averaged.
+//! Rollout 0 is the nominal sequence itself.
+
+use crate::chunk::Chunk;
+use crate::diagnostics::CostTerm;
+use crate::kernel::functions::Generator;
+use crate::kernel::{CHUNK, Kernel, Work};
+use bicycle::lanes::Real;
+
+/// Speed and steering angle.
+pub(crate) type Control = [f32; 2];
+
+/// What the samples of one step are made of.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct SampleStep {
+    /// Nominal control.
+    pub(crate) nominal: Control,
+    /// Where the noise is added: the nominal control, or for rates its change in this step.
+    pub(crate) base: Control,
+    /// Standard deviation of what is new in the noise of this step.
+    pub(crate) innovation: Control,
+    /// Cost of a unit of deviation from the nominal control [s].
+    pub(crate) gradient: Control,
+}
+
+/// Everything that the sampling of one iteration needs.
+#[derive(Clone, Copy)]
+pub(crate) struct Sampler<'a> {
+    pub(crate) steps: &'a [SampleStep],
+    /// Share of the noise that stays from step to step.
+    pub(crate) kept_noise: Control,
+    /// 1 when the noise is on rates, 0 when it is on controls.
+    pub(crate) kept_control: f32,
+    /// Bounds of the controls.
+    pub(crate) low: Control,
+    pub(crate) high: Control,
+    /// Largest change in a step; infinite when the actuators are taken to be instant.
+    pub(crate) change: Control,
+    /// Control before the first step.
+    pub(crate) start: Control,
+    pub(crate) key: [u32; 4],
+}
+
+impl Sampler<'_> {
+    /// Whether every step can be sampled for itself.
+    fn is_independent(&self) -> bool {
+        self.kept_noise == [0.0; 2] && self.kept_control == 0.0 && self.change == [f32::INFINITY; 2]
+    }
+}
+
+/// Samples the controls of chunk number `index`.
+pub(crate) struct Sample<'a> {
+    pub(crate) sampler: &'a Sampler<'a>,
+    pub(crate) index: usize,
+    pub(crate) chunk: &'a mut Chunk,
+}
+
+impl Work for Sample<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn run<K: Kernel>(self, kernel: K) {
+        for first in (0..CHUNK).step_by(K::WIDTH) {
+            let number = (self.index * CHUNK + first) as u32;
+            let generator = Generator::new(kernel, self.sampler.key, number);
+            if self.sampler.is_independent() {
+                sample_pack::<K, true>(generator, self.sampler, self.chunk, first);
+            } else {
+                sample_pack::<K, false>(generator, self.sampler, self.chunk, first);
+            }
+        }
+        if self.index == 0 {
+            plant_nominal(self.sampler, self.chunk);
+        }
+    }
+}
+
+#[inline(always)]
+fn sample_pack<K: Kernel, const INDEPENDENT: bool>(
+    mut generator: Generator<K>,
+    sampler: &Sampler<'_>,
+    chunk: &mut Chunk,
+    first: usize,
+) {
+    let kernel = generator.kernel();
+    let all = |values: Control| values.map(|value| kernel.real(f64::from(value)));
+    let (low, high, change) = (all(sampler.low), all(sampler.high), all(sampler.change));
+    let (kept_noise, kept_control) = (all(sampler.kept_noise), kernel.real(f64::from(sampler.kept_control)));
+    let mut noise = [kernel.real(0.0); 2];
+    let mut control = all(sampler.start);
+    let mut cost = kernel.real(0.0);
+    for (step, rows) in sampler.steps.iter().zip(&mut chunk.controls) {
+        let fresh = generator.normals();
+        let (base, nominal) = (all(step.base), all(step.nominal));
+        let (innovation, gradient) = (all(step.innovation), all(step.gradient));
+        for c in 0..2 {
+            let sampled = if INDEPENDENT {
+                fresh[c].mul_add(innovation[c], base[c])
+            } else {
+                noise[c] = noise[c].mul_add(kept_noise[c], fresh[c] * innovation[c]);
+                let wished = control[c].mul_add(kept_control, base[c] + noise[c]);
+                wished.clamp(control[c] - change[c], control[c] + change[c])
+            };
+            control[c] = sampled.clamp(low[c], high[c]);
+            cost = (control[c] - nominal[c]).mul_add(gradient[c], cost);
+            kernel.store(&mut rows[c], first, control[c].1);
+        }
+    }
+    kernel.store(&mut chunk.terms[CostTerm::Control as usize], first, cost.1);
+}
+
+/// Puts the unperturbed sequence in the place of the first rollout.
+fn plant_nominal(sampler: &Sampler<'_>, chunk: &mut Chunk) {
+    let mut control = sampler.start;
+    let mut cost = 0.0;
+    for (step, rows) in sampler.steps.iter().zip(&mut chunk.controls) {
+        for c in 0..2 {
+            let reachable = [control[c] - sampler.change[c], control[c] + sampler.change[c]];
+            let wished = step.nominal[c].max(reachable[0]).min(reachable[1]);
+            control[c] = wished.max(sampler.low[c]).min(sampler.high[c]);
+            cost += (control[c] - step.nominal[c]) * step.gradient[c];
+            rows[c].0[0] = control[c];
+        }
+    }
+    chunk.terms[CostTerm::Control as usize].0[0] = cost;
+}
+
+/// Adds the weighted controls of a chunk.
+pub(crate) struct Accumulate<'a> {
+    pub(crate) chunk: &'a mut Chunk,
+}
+
+impl Work for Accumulate<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn run<K: Kernel>(self, kernel: K) {
+        let Chunk { controls, weights, sums, is_negligible, .. } = self.chunk;
+        *is_negligible = weights.0.iter().all(|&weight| weight == 0.0);
+        if *is_negligible {
+            return;
+        }
+        for (rows, sums) in controls.iter().zip(sums) {
+            for (row, sum) in rows.iter().zip(sums) {
+                for half in (0..16).step_by(K::WIDTH) {
+                    let product = |first: usize| {
+                        Real(kernel, kernel.load(weights, first)) * Real(kernel, kernel.load(row, first))
+                    };
+                    let mut total = product(half);
+                    for first in (half + 16..CHUNK).step_by(16) {
+                        let weight = Real(kernel, kernel.load(weights, first));
+                        total = weight.mul_add(Real(kernel, kernel.load(row, first)), total);
+                    }
+                    kernel.store_lanes(sum, half, total.1);
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,114 @@
+//! From costs to weights: the information-theoretic soft minimum (Williams et al. 2017) and its temperature.
+
+use crate::chunk::Chunk;
+use crate::config::Temperature;
+use crate::kernel::functions::exp_of_negative;
+use crate::kernel::{CHUNK, Kernel, Row, Work};
+use bicycle::lanes::Real;
+
+/// Costs above this count as not finite.
+const WORST_COST_S: f64 = 1e30;
+/// Halvings of the search for the temperature: the effective sample size is then met within one rollout in 1000.
+const N_HALVINGS: usize = 14;
+/// The search spans this factor around the last temperature.
+const SEARCH_FACTOR: f32 = 64.0;
+
+/// What the weights of an iteration came to.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct WeightSummary {
+    /// Least cost of all rollouts [s].
+    pub(crate) baseline_s: f32,
+    /// Sum of the weights exp((baseline - cost) / temperature).
+    pub(crate) normalizer: f32,
+    /// (sum w)^2 / sum w^2.
+    pub(crate) effective_sample_size: f32,
+    /// Temperature that was used [s].
+    pub(crate) temperature_s: f32,
+    /// Rollouts without a finite cost; they have no weight.
+    pub(crate) n_non_finite: usize,
+}
+
+impl WeightSummary {
+    /// -T ln(mean exp(-cost / T)) over `n` rollouts [s].
+    pub(crate) fn free_energy_s(&self, n: usize) -> f32 {
+        self.baseline_s - self.temperature_s * (self.normalizer / n as f32).ln()
+    }
+}
+
+/// Weighs all rollouts; `last_s` is the temperature to search from.
+pub(crate) struct Weigh<'a> {
+    pub(crate) chunks: &'a mut [Chunk],
+    pub(crate) temperature: Temperature,
+    pub(crate) last_s: f32,
+}
+
+impl Work for Weigh<'_> {
+    type Output = WeightSummary;
+    #[inline(always)]
+    fn run<K: Kernel>(self, kernel: K) -> WeightSummary {
+        let mut n_non_finite = 0;
+        let mut least = kernel.real(f64::from(f32::MAX));
+        for chunk in self.chunks.iter_mut() {
+            n_non_finite += quarantine(&mut chunk.costs);
+            for first in (0..CHUNK).step_by(K::WIDTH) {
+                least = least.min(Real(kernel, kernel.load(&chunk.costs, first)));
+            }
+        }
+        let baseline_s = kernel.smallest(least.1);
+        let temperature_s = match self.temperature {
+            Temperature::Fixed { temperature_s } => temperature_s as f32,
+            Temperature::EffectiveSampleSize { fraction } => {
+                let wanted = fraction as f32 * (self.chunks.len() * CHUNK) as f32;
+                search(kernel, self.chunks, baseline_s, (wanted, self.last_s))
+            }
+        };
+        let (normalizer, effective_sample_size) = weigh_all(kernel, self.chunks, baseline_s, temperature_s);
+        WeightSummary { baseline_s, normalizer, effective_sample_size, temperature_s, n_non_finite }
+    }
+}
+
+/// Replaces costs that are not finite by the worst finite one; counts them.
+#[inline(always)]
+fn quarantine(costs: &mut Row) -> usize {
+    let mut n = 0;
+    for cost in &mut costs.0 {
+        let broken = cost.is_nan() || cost.abs() > WORST_COST_S as f32;
+        n += usize::from(broken);
+        *cost = if broken { f32::MAX } else { *cost };
+    }
+    n
+}
+
+/// Fills in the weights; their sum and the effective sample size.
+#[inline(always)]
+fn weigh_all<K: Kernel>(kernel: K, chunks: &mut [Chunk], baseline_s: f32, temperature_s: f32) -> (f32, f32) {
+    let (baseline, inverse) =
+        (kernel.real(f64::from(baseline_s)), kernel.real(1.0 / f64::from(temperature_s)));
+    let (mut sum, mut squares) = (kernel.real(0.0), kernel.real(0.0));
+    for chunk in chunks {
+        for first in (0..CHUNK).step_by(K::WIDTH) {
+            let cost = Real(kernel, kernel.load(&chunk.costs, first));
+            let weight = exp_of_negative((baseline - cost) * inverse);
+            (sum, squares) = (sum + weight, weight.mul_add(weight, squares));
+            kernel.store(&mut chunk.weights, first, weight.1);
+        }
+    }
+    let sum = kernel.sum(sum.1);
+    (sum, sum * sum / kernel.sum(squares.1))
+}
+
+/// The temperature at which the effective sample size is the wanted one; it grows with the temperature, so its
+/// logarithm is halved towards it.
+#[inline(always)]
+fn search<K: Kernel>(kernel: K, chunks: &mut [Chunk], baseline_s: f32, (wanted, last_s): (f32, f32)) -> f32 {
+    let (mut low, mut high) = (last_s / SEARCH_FACTOR, last_s * SEARCH_FACTOR);
+    for _ in 0..N_HALVINGS {
+        let middle = (low * high).sqrt();
+        if weigh_all(kernel, chunks, baseline_s, middle).1 < wanted {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    (low * high).sqrt().clamp(Temperature::LOWEST_S, Temperature::HIGHEST_S)
+}
