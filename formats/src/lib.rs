@@ -4,13 +4,19 @@
 //! written whole or not at all.
 
 mod config;
+mod drive_log_csv;
 mod elevation;
 mod recording;
+mod results;
 mod vehicle;
 
 pub use config::{ConfigError, ConfigText};
+pub use drive_log_csv::{
+    DriveLogFile, DriveLogFileError, OtherColumn, read_drive_log_csv, write_drive_log_csv,
+};
 pub use elevation::{
     ElevationError, ElevationFile, ElevationLayers, PngScale, read_elevation, read_elevation_png,
 };
 pub use recording::{DriveRecorder, McapDriveLog, McapReadError, RecordError, read_drive_log_mcap};
+pub use results::{OutputError, config_hash, prepare_out_dir, write_bytes_atomic, write_json_atomic};
 pub use vehicle::{parse_vehicle, read_vehicle, shipped_vehicle_names, shipped_vehicle_text};

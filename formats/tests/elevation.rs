@@ -1,4 +1,5 @@
 //! Elevation files: the real ones, and small ones written by other libraries.
+#![allow(clippy::unwrap_used, reason = "a test stops at the first surprise")]
 
 use std::io::Write as _;
 use std::path::{Path, PathBuf};

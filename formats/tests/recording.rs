@@ -1,4 +1,5 @@
 //! Recordings, read back with another library.
+#![allow(clippy::unwrap_used, reason = "a test stops at the first surprise")]
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
