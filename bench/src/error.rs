@@ -15,6 +15,12 @@ pub enum BenchError {
     /// The risk map cannot be made.
     #[error(transparent)]
     Prior(#[from] physics_prior::PriorMapError),
+    /// The cost-to-go field cannot be made.
+    #[error(transparent)]
+    CostToGo(#[from] mppi::CostToGoError),
+    /// The controller refused its settings.
+    #[error(transparent)]
+    Controller(#[from] mppi::ConfigError),
     /// The system refused the threads.
     #[error("threads: {0}")]
     Threads(#[from] rayon::ThreadPoolBuildError),
