@@ -38,7 +38,7 @@ impl Constant {
 
 /// Arithmetic on packs of numbers. A value of this type proves that the machine has the instructions.
 ///
-/// `min` and `max` return their second operand when the first is NaN, on every implementation.
+/// `min` and `max` return their second operand when either is NaN, on every implementation.
 pub trait Lanes: Copy + Send + Sync + 'static {
     /// A pack of numbers.
     type Value: Copy + Send + Sync;
@@ -59,11 +59,11 @@ pub trait Lanes: Copy + Send + Sync + 'static {
     fn div(self, a: Self::Value, b: Self::Value) -> Self::Value;
     /// a b + c, rounded once where the machine can.
     fn mul_add(self, a: Self::Value, b: Self::Value, c: Self::Value) -> Self::Value;
-    /// Smaller of both; `b` where `a` is NaN.
+    /// Smaller of both; `b` where either is NaN.
     fn min(self, a: Self::Value, b: Self::Value) -> Self::Value;
-    /// Larger of both; `b` where `a` is NaN.
+    /// Larger of both; `b` where either is NaN.
     fn max(self, a: Self::Value, b: Self::Value) -> Self::Value;
-    /// Square root; of a tiny or negative number, a small number >= 0. Relative error below 1e-6.
+    /// Square root; of a tiny or negative number, a small number >= 0; of NaN, NaN. Relative error below 1e-6.
     fn sqrt(self, a: Self::Value) -> Self::Value;
     /// An angle in turns brought to [-1/2, 1/2] by whole turns; |a| < 4 million.
     fn wrap_turns(self, a: Self::Value) -> Self::Value;
@@ -111,13 +111,13 @@ impl<L: Lanes> Real<L> {
         Self(self.0, self.0.mul_add(self.1, by.1, plus.1))
     }
 
-    /// Smaller of both; `other` where self is NaN.
+    /// Smaller of both; `other` where either is NaN.
     #[inline(always)]
     pub fn min(self, other: Self) -> Self {
         Self(self.0, self.0.min(self.1, other.1))
     }
 
-    /// Larger of both; `other` where self is NaN.
+    /// Larger of both; `other` where either is NaN.
     #[inline(always)]
     pub fn max(self, other: Self) -> Self {
         Self(self.0, self.0.max(self.1, other.1))

@@ -49,6 +49,8 @@ pub struct Controller {
     history: History,
     watch: Watch,
     reference: Vec<ReferenceStep>,
+    /// Whether there is no plan yet.
+    is_fresh: bool,
     /// What the effects remember at the start of the rollouts.
     pub(crate) slots: [f32; MAX_SLOTS],
     /// Where the last rollouts started.
@@ -85,6 +87,7 @@ impl Controller {
             history: History::new(),
             watch: Watch::new(config.recovery),
             reference: vec![ReferenceStep::default(); config.n_steps],
+            is_fresh: true,
             slots: [0.0; MAX_SLOTS],
             start: State::default(),
             temperature_s: 1.0,
@@ -98,7 +101,7 @@ impl Controller {
 
     /// Forgets plan, history and progress.
     pub fn reset(&mut self) {
-        self.plan.nominal.fill([0.0; 2]);
+        self.is_fresh = true;
         self.history = History::new();
         self.watch.reset();
         self.temperature_s = 1.0;
@@ -156,6 +159,9 @@ impl Controller {
         let mode = self.watch.observe(&input.state, input.elapsed_s);
         self.start = self.predict_start(input);
         self.recall_slots();
+        if std::mem::take(&mut self.is_fresh) {
+            self.plan.hold([self.start.speed_mps as f32, self.start.steering_rad as f32]);
+        }
         self.cell_stepper.rescale(input.map.geometry.resolution_m);
         let task = self.task(input, mode);
         let mut summary = WeightSummary::default();
@@ -386,7 +392,7 @@ impl Controller {
     fn judge(&mut self, input: &Input<'_>, summary: &WeightSummary) -> Decision {
         let finite = self.plan.nominal.iter().flatten().all(|value| value.is_finite());
         if summary.n_non_finite == self.config.n_rollouts || !finite {
-            self.plan.nominal.fill([0.0; 2]);
+            self.is_fresh = true;
             return Decision::Stop(StopReason::NonFiniteResult);
         }
         let judge = Judge { stepper: &self.stepper, limits: &self.model.limits, map: input.map };
@@ -434,13 +440,11 @@ impl Controller {
             Decision::Drive(command) => self.history.send(command),
             Decision::Hold(_) => {
                 self.watch.reset();
-                self.plan.stop();
-                self.history.send(self.plan.command(0));
+                self.is_fresh = true;
+                self.history.send(standing(&input.state));
             }
             Decision::Stop(_) => {
-                let steering = input.state.steering_rad as f32;
-                let steering_rad = if steering.is_finite() { steering } else { 0.0 };
-                self.history.send(Command { speed_mps: 0.0, steering_rad });
+                self.history.send(standing(&input.state));
             }
         }
     }
@@ -470,6 +474,12 @@ fn grid<'a>(map: &RiskMapView<'a>) -> Grid<'a> {
         risks: map.risks,
         ground: map.ground,
     }
+}
+
+/// What stops a vehicle: no speed, the wheels as they are.
+fn standing(state: &State) -> Command {
+    let steering_rad = if state.steering_rad.is_finite() { state.steering_rad as f32 } else { 0.0 };
+    Command { speed_mps: 0.0, steering_rad }
 }
 
 /// The state a share of the way from one to the other; yaw the short way round.

@@ -12,6 +12,7 @@ mod kernel;
 mod objective;
 mod plan;
 mod recovery;
+mod replay;
 mod rollout;
 mod sampling;
 mod summary;
@@ -23,3 +24,4 @@ pub use cost_to_go::{CostToGo, CostToGoConfig, CostToGoError, CostToGoView, Neig
 pub use diagnostics::{CostTerm, Diagnostics};
 pub use kernel::Isa;
 pub use objective::{Input, Objective, ReferencePath, Terminal};
+pub use replay::Rollout;

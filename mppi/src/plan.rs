@@ -53,6 +53,11 @@ impl Plan {
         self.nominal.fill([0.0, steering_rad]);
     }
 
+    /// The same control for the whole horizon.
+    pub(crate) fn hold(&mut self, control: Control) {
+        self.nominal.fill(control);
+    }
+
     /// The command of a step.
     pub(crate) fn command(&self, t: usize) -> Command {
         Command { speed_mps: self.nominal[t][0], steering_rad: self.nominal[t][1] }

@@ -81,7 +81,7 @@ impl Lanes for V4 {
 
     #[inline(always)]
     fn sqrt(self, a: f32x16) -> f32x16 {
-        let x = self.max(a, self.constant(TINY));
+        let x = self.max(self.constant(TINY), a);
         refined_sqrt(self, x, cast!(self.avx512f._mm512_rsqrt14_ps(cast!(x))))
     }
     #[inline(always)]
@@ -114,7 +114,7 @@ impl Lanes for V3 {
 
     #[inline(always)]
     fn sqrt(self, a: f32x8) -> f32x8 {
-        let x = self.max(a, self.constant(TINY));
+        let x = self.max(self.constant(TINY), a);
         refined_sqrt(self, x, cast!(self.avx._mm256_rsqrt_ps(cast!(x))))
     }
     #[inline(always)]

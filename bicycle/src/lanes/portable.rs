@@ -55,7 +55,7 @@ impl Lanes for Portable {
     }
     #[inline(always)]
     fn sqrt(self, a: Pack) -> Pack {
-        a.map(|a| if a > 0.0 { a.sqrt() } else { 0.0 })
+        a.map(|a| if a <= 0.0 { 0.0 } else { a.sqrt() })
     }
     #[inline(always)]
     fn wrap_turns(self, a: Pack) -> Pack {

@@ -36,7 +36,7 @@ impl Lanes for Scalar {
         if a > b { a } else { b }
     }
     fn sqrt(self, a: f64) -> f64 {
-        a.max(0.0).sqrt()
+        if a <= 0.0 { 0.0 } else { a.sqrt() }
     }
     fn wrap_turns(self, a: f64) -> f64 {
         a - a.round_ties_even()

@@ -1,0 +1,55 @@
+//! Trajectories of the last decision, computed only when somebody asks.
+
+use crate::controller::Controller;
+use crate::judgement::Judge;
+use crate::sampling::Control;
+use bicycle::{Command, State};
+use traversability::RiskMapView;
+
+/// One sampled future.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Rollout {
+    /// Its cost [s].
+    pub cost_s: f32,
+    /// Its states, the start first.
+    pub states: Vec<State>,
+}
+
+impl Controller {
+    /// The commands of the plan, one per step, the one just decided first.
+    pub fn plan(&self) -> impl ExactSizeIterator<Item = Command> + '_ {
+        self.plan.nominal.iter().map(|&[speed_mps, steering_rad]| Command { speed_mps, steering_rad })
+    }
+
+    /// Where the plan leads over `map`, the predicted start first.
+    pub fn nominal_trajectory(&self, map: RiskMapView<'_>) -> Vec<State> {
+        self.trajectory(map, self.plan.nominal.iter().copied())
+    }
+
+    /// The `n` cheapest rollouts of the last cycle over `map`, the cheapest first.
+    pub fn best_rollouts(&self, n: usize, map: RiskMapView<'_>) -> Vec<Rollout> {
+        let mut order: Vec<(f32, usize, usize)> = Vec::new();
+        for (index, chunk) in self.chunks.iter().enumerate() {
+            order.extend(chunk.costs.0.iter().enumerate().map(|(lane, &cost_s)| (cost_s, index, lane)));
+        }
+        order.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let rollout = |&(cost_s, index, lane): &(f32, usize, usize)| {
+            let controls = self.chunks[index].controls.iter();
+            let states = self.trajectory(map, controls.map(|rows| [rows[0].0[lane], rows[1].0[lane]]));
+            Rollout { cost_s, states }
+        };
+        order.iter().take(n).map(rollout).collect()
+    }
+
+    fn trajectory(&self, map: RiskMapView<'_>, controls: impl Iterator<Item = Control>) -> Vec<State> {
+        let judge = Judge { stepper: &self.stepper, limits: &self.model.limits, map };
+        let mut memory = self.slots.map(f64::from);
+        let mut state = self.start;
+        let mut states = vec![state];
+        for (t, [speed_mps, steering_rad]) in controls.enumerate() {
+            state = judge.step(&state, Command { speed_mps, steering_rad }, &mut memory, t);
+            states.push(state);
+        }
+        states
+    }
+}

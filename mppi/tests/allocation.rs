@@ -1,0 +1,65 @@
+//! A decision allocates nothing, whatever is switched on.
+
+mod fixture;
+
+use bicycle::effect::{SpeedLag, SteerDelay};
+use bicycle::{Decision, Effect, State};
+use mppi::{Config, Controller, CostToGo, CostToGoConfig, Input, Objective, Terminal};
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+struct Counting;
+
+static N_ALLOCATIONS: AtomicUsize = AtomicUsize::new(0);
+
+// SAFETY: every call goes to the system's allocator as it came; counting touches no memory of it.
+#[allow(unsafe_code, reason = "an allocator can be counted only by being one")]
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        N_ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
+        // SAFETY: the caller's promise is passed on.
+        unsafe { System.alloc(layout) }
+    }
+    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        // SAFETY: the caller's promise is passed on.
+        unsafe { System.dealloc(pointer, layout) }
+    }
+}
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
+
+/// One test, because other tests of this process would be counted too.
+#[test]
+fn a_decision_allocates_nothing() {
+    let mut with_effects = fixture::model();
+    with_effects.effects = vec![
+        Effect::SteerDelay(SteerDelay { delay_s: 0.25 }),
+        Effect::SpeedLag(SpeedLag { time_constant_s: 0.3 }),
+    ];
+    let delayed = Config { delay_s: 0.15, n_iterations: 2, n_threads: 3, ..Config::default() };
+    let cases = [
+        (Config::bound(), fixture::model()),
+        (Config::default(), fixture::model()),
+        (Config { n_threads: 2, ..Config::default() }, with_effects.clone()),
+        (delayed, with_effects),
+    ];
+    let map = fixture::rough(3);
+    for (config, model) in cases {
+        let mut field = CostToGo::new(CostToGoConfig::default(), &model.limits, 160, 160).unwrap();
+        field.update(map.view(), [15.0, 10.0]).unwrap();
+        let mut controller = Controller::new(config, model, 1).unwrap();
+        let mut n_drives = 0;
+        let mut decide = |cycle: u64| {
+            let terminal = Terminal::CostToGo(field.view());
+            let objective = Objective::Goal { goal_m: [15.0, 10.0], tolerance_m: 0.5, terminal };
+            let input = Input { state: State::default(), elapsed_s: 0.1, map: map.view(), objective, cycle };
+            n_drives += usize::from(matches!(controller.decide(&input), Decision::Drive(_)));
+        };
+        decide(0);
+        let before = N_ALLOCATIONS.load(Ordering::Relaxed);
+        (1..50).for_each(&mut decide);
+        assert_eq!(N_ALLOCATIONS.load(Ordering::Relaxed) - before, 0);
+        assert!(n_drives > 10, "decisions that stop early prove nothing: {n_drives} of 50 drove");
+    }
+}

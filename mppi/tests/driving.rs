@@ -1,0 +1,250 @@
+//! What the controller does with a vehicle: closed forms on level ground, and the ways in which ground can be bad.
+
+mod fixture;
+
+use bicycle::{Command, Decision, HoldReason, Limits, Model, State, StopReason};
+use fixture::{STEP_S, block, cell, drive, goal, level, model};
+use mppi::{
+    Config, Controller, CostToGo, CostToGoConfig, Input, Objective, Recovery, ReferencePath, Rollout,
+    Terminal,
+};
+use traversability::Risk;
+
+fn smooth() -> Config {
+    Config::default()
+}
+
+fn standing() -> State {
+    State::default()
+}
+
+/// 9.5 m to the goal's rim at 2 m/s, 1 s of acceleration at 2 m/s2 on the way: 4.75 + 0.5 s are the least.
+#[test]
+fn a_straight_drive_takes_little_more_than_the_least_time() {
+    let drive = drive(&smooth(), &model(), &level(), goal([10.0, 0.0]), (standing(), 120));
+    assert_eq!(drive.decisions.last(), Some(&Decision::Hold(HoldReason::AtGoal)));
+    let time_s = (drive.states.len() - 1) as f64 * STEP_S;
+    assert!((5.25..6.8).contains(&time_s), "{time_s} s");
+    assert!(drive.states.iter().all(|state| state.y_m.abs() < 0.7));
+}
+
+/// Half the traction, half the speed.
+#[test]
+fn half_the_traction_takes_twice_the_time() {
+    let risk = Risk { linear_traction: 0.5, ..Risk::NONE };
+    let mut map = level();
+    map.arrays_mut().0.fill(risk);
+    map.close_border();
+    let drive = drive(&smooth(), &model(), &map, goal([10.0, 0.0]), (standing(), 200));
+    let time_s = (drive.states.len() - 1) as f64 * STEP_S;
+    assert!((9.5 + 0.5..13.0).contains(&time_s), "{time_s} s");
+}
+
+#[test]
+fn commands_keep_the_limits_of_the_actuators_from_the_measured_state_on() {
+    let map = level();
+    let config = Config { tracking_s: 0.0, ..smooth() };
+    let start = State { speed_mps: 0.7, steering_rad: -0.2, ..standing() };
+    let drive = drive(&config, &model(), &map, goal([3.0, 8.0]), (start, 60));
+    let mut before = [0.7, -0.2];
+    for decision in &drive.decisions {
+        let Decision::Drive(Command { speed_mps, steering_rad }) = *decision else { continue };
+        // 2 m/s2 and 1 rad/s over 0.1 s.
+        assert!((f64::from(speed_mps) - before[0]).abs() < 0.2 + 1e-5);
+        assert!((f64::from(steering_rad) - before[1]).abs() < 0.1 + 1e-5);
+        assert!((-1.0..=2.0).contains(&speed_mps) && steering_rad.abs() <= 0.5);
+        before = [f64::from(speed_mps), f64::from(steering_rad)];
+    }
+}
+
+#[test]
+fn a_blocked_stripe_is_driven_around() {
+    let mut map = level();
+    let blocked = |x_m: f64, y_m: f64| (4.0..5.0).contains(&x_m) && y_m.abs() < 2.0;
+    block(&mut map, blocked);
+    let drive = drive(&smooth(), &model(), &map, goal([10.0, 0.0]), (standing(), 200));
+    assert_eq!(drive.decisions.last(), Some(&Decision::Hold(HoldReason::AtGoal)));
+    let touched = |state: &State| map.view().risk(cell(&map, state.x_m, state.y_m), 0).roll_rad > 1.0;
+    assert!(!drive.states.iter().any(touched));
+}
+
+/// A wall of 24 m before the goal: the straight line leads into it, the field leads around.
+#[test]
+fn the_cost_to_go_field_leads_around_what_the_horizon_cannot_see() {
+    let mut map = level();
+    block(&mut map, |x_m, y_m| (5.0..6.0).contains(&x_m) && (-12.0..12.0).contains(&y_m));
+    let mut field = CostToGo::new(CostToGoConfig::default(), &model().limits, 160, 160).unwrap();
+    field.update(map.view(), [10.0, 0.0]).unwrap();
+    let terminal = Terminal::CostToGo(field.view());
+    let objective = Objective::Goal { goal_m: [10.0, 0.0], tolerance_m: 0.5, terminal };
+    let drive = drive(&smooth(), &model(), &map, objective, (standing(), 500));
+    assert_eq!(drive.decisions.last(), Some(&Decision::Hold(HoldReason::AtGoal)));
+}
+
+#[test]
+fn a_goal_close_behind_is_reached_in_reverse_only_with_the_gear() {
+    let run = |reverse_speed_max_mps: f64| {
+        let limits = Limits { reverse_speed_max_mps, ..model().limits };
+        let model = Model { limits, ..model() };
+        drive(&smooth(), &model, &level(), goal([-3.0, 0.0]), (standing(), 80))
+    };
+    let with = run(1.0);
+    assert_eq!(with.decisions.last(), Some(&Decision::Hold(HoldReason::AtGoal)));
+    assert!(with.states.iter().any(|state| state.speed_mps < -0.3));
+    assert!(run(0.0).states.iter().all(|state| state.speed_mps >= 0.0));
+}
+
+/// Half a metre of ground without traction lies before the vehicle; it can only come free backwards, and does so
+/// when its patience ends, though driving on looks no worse on the map that it is given.
+#[test]
+fn a_stuck_vehicle_backs_up() {
+    let recovery = Recovery { patience_s: 1.0, progress_m: 0.3, distance_m: 1.0, duration_s: 3.0 };
+    let config = Config { recovery, ..smooth() };
+    let map = level();
+    let mut controller = Controller::new(config, model(), 5).unwrap();
+    let mut backed_up = 0;
+    for cycle in 0..30 {
+        // The wheels turn as they are asked to, but the vehicle stays.
+        let input = Input {
+            state: standing(),
+            elapsed_s: if cycle == 0 { 0.0 } else { STEP_S },
+            map: map.view(),
+            objective: goal([10.0, 0.0]),
+            cycle,
+        };
+        let decision = controller.decide(&input);
+        let is_recovering = controller.diagnostics().is_recovering;
+        if cycle != 10 {
+            assert_eq!(is_recovering, cycle > 10, "patience ends with the tenth or eleventh cycle");
+        }
+        if let Decision::Drive(command) = decision {
+            backed_up += usize::from(is_recovering && command.speed_mps < 0.0);
+        }
+    }
+    assert!(backed_up > 10, "{backed_up}");
+}
+
+#[test]
+fn a_vehicle_within_an_obstacle_is_let_out() {
+    let mut map = level();
+    block(&mut map, |x_m, y_m| x_m.abs() < 1.0 && y_m.abs() < 1.0);
+    let drive = drive(&smooth(), &model(), &map, goal([8.0, 0.0]), (standing(), 150));
+    assert_eq!(drive.decisions.last(), Some(&Decision::Hold(HoldReason::AtGoal)));
+}
+
+#[test]
+fn a_vehicle_walled_in_at_arm_s_length_stops() {
+    let mut map = level();
+    // Blocked from 0.5 m on all around: from 2 m/s at 2 m/s2 it takes 1 m to stop.
+    block(&mut map, |x_m, y_m| x_m.hypot(y_m) > 0.5);
+    let mut controller = Controller::new(smooth(), model(), 5).unwrap();
+    let state = State { speed_mps: 2.0, ..standing() };
+    let objective = goal([8.0, 0.0]);
+    let input = Input { state, elapsed_s: 0.0, map: map.view(), objective, cycle: 0 };
+    assert_eq!(controller.decide(&input), Decision::Stop(StopReason::NoFeasibleRollout));
+}
+
+#[test]
+fn no_rollout_passes_the_border() {
+    let map = level();
+    let config = Config { n_steps: 100, ..smooth() };
+    let mut controller = Controller::new(config, model(), 5).unwrap();
+    // Two metres from the east border of the 40 m map, headed for a goal far beyond.
+    let state = State { x_m: 18.0, speed_mps: 2.0, ..standing() };
+    let input = Input { state, elapsed_s: 0.0, map: map.view(), objective: goal([99.0, 0.0]), cycle: 0 };
+    controller.decide(&input);
+    let rollouts = controller.best_rollouts(1024, map.view());
+    let furthest_m = |rollout: &Rollout| rollout.states.iter().map(|state| state.x_m).fold(0.0, f64::max);
+    // A step of 0.2 m from the last inner cell reaches into the ring from 19.75 m on, and there it ends.
+    assert!(rollouts.iter().all(|rollout| furthest_m(rollout) < 19.95 + 1e-6));
+    assert!(rollouts.iter().filter(|rollout| furthest_m(rollout) > 19.75).count() > 100);
+}
+
+#[test]
+fn lateral_acceleration_is_kept_at_speed() {
+    let limits = Limits {
+        speed_max_mps: 6.0,
+        lateral_acceleration_max_mps2: 1.0,
+        acceleration_max_mps2: 4.0,
+        ..model().limits
+    };
+    let model = Model { limits, ..model() };
+    let start = State { speed_mps: 4.0, ..standing() };
+    let drive = drive(&smooth(), &model, &level(), goal([6.0, 9.0]), (start, 120));
+    assert_eq!(drive.decisions.last(), Some(&Decision::Hold(HoldReason::AtGoal)));
+    for state in &drive.states {
+        let lateral_mps2 = state.speed_mps.powi(2) * state.steering_rad.tan() / 2.0;
+        assert!(lateral_mps2.abs() < 1.3, "{lateral_mps2} m/s2");
+    }
+}
+
+#[test]
+fn a_path_is_followed_to_its_end() {
+    let points_m: Vec<[f64; 2]> =
+        (0..=60).map(|i| f64::from(i) * 0.2).map(|x_m| [x_m, 1.5 * (x_m / 2.5).sin()]).collect();
+    let path = ReferencePath { points_m: &points_m, speed_mps: 1.2, tolerance_m: 0.4 };
+    let start = State { yaw_rad: 0.54, ..standing() };
+    let drive = drive(&smooth(), &model(), &level(), Objective::Path(path), (start, 300));
+    assert_eq!(drive.decisions.last(), Some(&Decision::Hold(HoldReason::AtGoal)));
+    let across_m = |state: &State| (state.y_m - 1.5 * (state.x_m / 2.5).sin()).abs();
+    let worst_m = drive.states.iter().map(across_m).fold(0.0, f64::max);
+    assert!(worst_m < 0.5, "{worst_m} m off the path");
+}
+
+#[test]
+fn what_cannot_be_planned_with_stops_or_holds() {
+    let map = level();
+    let mut controller = Controller::new(smooth(), model(), 5).unwrap();
+    let mut decide = |state: State, objective: Objective<'_>, map: traversability::RiskMapView<'_>| {
+        controller.decide(&Input { state, elapsed_s: 0.1, map, objective, cycle: 0 })
+    };
+    let ahead = goal([5.0, 0.0]);
+    let broken = State { yaw_rad: f64::NAN, ..standing() };
+    assert_eq!(decide(broken, ahead, map.view()), Decision::Stop(StopReason::NonFiniteInput));
+    let nowhere = goal([f64::INFINITY, 0.0]);
+    assert_eq!(decide(standing(), nowhere, map.view()), Decision::Stop(StopReason::NonFiniteInput));
+    let outside = State { x_m: 30.0, ..standing() };
+    assert_eq!(decide(outside, ahead, map.view()), Decision::Stop(StopReason::OutsideMap));
+    let arrived = State { x_m: 4.6, ..standing() };
+    assert_eq!(decide(arrived, ahead, map.view()), Decision::Hold(HoldReason::AtGoal));
+    let mut empty = map.view();
+    (empty.risks, empty.ground) = (&[], &[]);
+    assert_eq!(decide(standing(), ahead, empty), Decision::Hold(HoldReason::NoMap));
+    assert!(matches!(decide(standing(), ahead, map.view()), Decision::Drive(_)), "and recovers");
+}
+
+#[test]
+fn broken_numbers_in_the_map_are_quarantined() {
+    let mut map = level();
+    let geometry = *map.geometry();
+    let n_yaws = map.view().n_yaws;
+    for (index, risks) in map.arrays_mut().0.chunks_exact_mut(n_yaws).enumerate() {
+        // Everything north of y = 1 m is broken.
+        if geometry.centre_m(geometry.cell(index))[1] > 1.0 {
+            risks.fill(Risk { linear_traction: f32::NAN, ..Risk::NONE });
+        }
+    }
+    let mut controller = Controller::new(smooth(), model(), 5).unwrap();
+    let input =
+        Input { state: standing(), elapsed_s: 0.0, map: map.view(), objective: goal([8.0, 0.0]), cycle: 0 };
+    assert!(matches!(controller.decide(&input), Decision::Drive(_)));
+    let diagnostics = controller.diagnostics();
+    assert!(diagnostics.n_non_finite > 0 && diagnostics.n_non_finite < 1024);
+    assert!(diagnostics.mean_terms_s.iter().all(|term| term.is_finite()));
+    map.arrays_mut().0.fill(Risk { angular_traction: f32::NAN, ..Risk::NONE });
+    let input =
+        Input { state: standing(), elapsed_s: 0.0, map: map.view(), objective: goal([8.0, 0.0]), cycle: 1 };
+    assert_eq!(controller.decide(&input), Decision::Stop(StopReason::NonFiniteResult));
+}
+
+/// Unknown attitude is not level ground.
+#[test]
+fn an_attitude_that_is_not_a_number_counts_as_too_steep() {
+    let mut map = level();
+    map.arrays_mut().0.fill(Risk { roll_rad: f32::NAN, ..Risk::NONE });
+    let mut controller = Controller::new(smooth(), model(), 5).unwrap();
+    let input =
+        Input { state: standing(), elapsed_s: 0.0, map: map.view(), objective: goal([8.0, 0.0]), cycle: 0 };
+    controller.decide(&input);
+    assert_eq!(controller.diagnostics().n_feasible, 0);
+}
