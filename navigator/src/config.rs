@@ -1,0 +1,114 @@
+//! Settings of the whole pipeline, and the ones that fit a machine.
+
+use bicycle::Vehicle;
+use mppi::CostToGoConfig;
+use physics_prior::PriorConfig;
+use serde::{Deserialize, Serialize};
+use terrain::ElevationConfig;
+
+use crate::GuardConfig;
+
+/// Settings of the pipeline. A file gives only what differs from [`Config::for_vehicle`].
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Config {
+    /// Semantic elevation map.
+    pub elevation: ElevationConfig,
+    /// Window of the risk map.
+    pub risk_map: RiskMapConfig,
+    /// Physics prior.
+    pub prior: PriorConfig,
+    /// Field of least time to the goal.
+    pub cost_to_go: CostToGoConfig,
+    /// Controller.
+    pub controller: mppi::Config,
+    /// What may enter.
+    pub guard: GuardConfig,
+}
+
+/// Window of the risk map; its cells are whole multiples of the elevation map's.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RiskMapConfig {
+    /// Elevation cells along the edge of a risk cell.
+    pub elevation_cells: usize,
+    /// Rows of the window.
+    pub n_rows: usize,
+    /// Columns of the window.
+    pub n_cols: usize,
+    /// Yaw bins.
+    pub n_yaws: usize,
+    /// The window follows the vehicle once it is this far from the centre [m].
+    pub recentre_m: f64,
+}
+
+impl Config {
+    /// Settings that fit a vehicle: a window of at most 128 cells a side that holds twice the controller's horizon
+    /// if cells between a ninth and two fifths of the vehicle's width can do that.
+    pub fn for_vehicle(vehicle: &Vehicle) -> Self {
+        let controller = mppi::Config::default();
+        let horizon_s = controller.n_steps as f64 * controller.step_s;
+        let horizon_m = vehicle.limits.speed_max_mps * horizon_s;
+        // Twice the horizon to either side sees around an obstacle at its end.
+        let window_m = (4.0 * horizon_m).max(8.0 * vehicle.geometry.length_m);
+        let (finest_m, coarsest_m) = (vehicle.geometry.width_m / 9.0, vehicle.geometry.width_m / 2.5);
+        let risk_m = round_to_two_digits((window_m / 128.0).clamp(finest_m, coarsest_m));
+        let n = ((window_m / risk_m).ceil() as usize).min(128);
+        // The ground under a footprint at the border must be inside the elevation window, and so must its drift.
+        let margin_m = vehicle.geometry.length_m + 2.0 * risk_m;
+        let elevation_n = n + 2 * (margin_m / risk_m).ceil() as usize;
+        Self {
+            elevation: ElevationConfig {
+                resolution_m: risk_m,
+                n_rows: elevation_n,
+                n_cols: elevation_n,
+                recentre_m: 4.0 * risk_m,
+                ..ElevationConfig::default()
+            },
+            risk_map: RiskMapConfig {
+                elevation_cells: 1,
+                n_rows: n,
+                n_cols: n,
+                n_yaws: 16,
+                recentre_m: 4.0 * risk_m,
+            },
+            prior: PriorConfig::for_vehicle(&vehicle.geometry),
+            cost_to_go: CostToGoConfig::default(),
+            controller,
+            guard: GuardConfig::default(),
+        }
+    }
+
+    /// Edge of a risk cell [m].
+    pub fn risk_resolution_m(&self) -> f64 {
+        self.elevation.resolution_m * self.risk_map.elevation_cells as f64
+    }
+
+    /// The first field of this crate's own that is out of range: name, what would do, value.
+    pub(crate) fn first_invalid(&self) -> Option<(&'static str, &'static str, f64)> {
+        let counts = [
+            ("risk_map.elevation_cells", self.risk_map.elevation_cells, 1),
+            ("risk_map.n_rows", self.risk_map.n_rows, 3),
+            ("risk_map.n_cols", self.risk_map.n_cols, 3),
+            ("risk_map.n_yaws", self.risk_map.n_yaws, 1),
+        ];
+        let too_few = counts.into_iter().find(|(_, found, least)| found < least);
+        let recentre_m = self.risk_map.recentre_m;
+        too_few
+            .map(|(field, found, least)| {
+                (field, if least == 1 { "at least 1" } else { "at least 3" }, found as f64)
+            })
+            .or((!(recentre_m.is_finite() && recentre_m > 0.0)).then_some((
+                "risk_map.recentre_m",
+                "a finite number > 0",
+                recentre_m,
+            )))
+            .or(self.guard.first_invalid().map(|(field, found)| (field, "a finite number > 0", found)))
+    }
+}
+
+/// Limits that keep a cell size readable: 0.1944 becomes 0.19.
+fn round_to_two_digits(length_m: f64) -> f64 {
+    let scale = 10f64.powi(1 - length_m.log10().floor() as i32);
+    (length_m * scale).round() / scale
+}
