@@ -1,85 +1,85 @@
-//! The place where results go, tried out before the work so that nobody drives for nothing.
+//! Where the results of a drive go, tried out before the work so that nobody drives for nothing.
 
-use std::fs::{self, File};
-use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
+use formats::prepare_out_dir;
+
 use crate::UsageError;
+use crate::arguments::DriveArguments;
 
 /// Room that must be free beforehand: the recording of a long drive takes less [bytes].
-const ROOM_NEEDED_BYTES: usize = 32 << 20;
+const RECORDING_ROOM_BYTES: u64 = 64 << 20;
+/// The same for a lone JSON file [bytes].
+const JSON_ROOM_BYTES: u64 = 1 << 16;
 
-/// A folder that exists, can be written and has room.
-#[derive(Clone, Debug)]
-pub struct OutputFolder {
-    path: PathBuf,
+/// The files of one drive, in folders that exist and can be written.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct OutputFiles {
+    /// `drive.png`.
+    pub picture: PathBuf,
+    /// `drive.mcap`.
+    pub recording: PathBuf,
+    /// `summary.json`, and the file of `--json` if one was asked for.
+    pub summaries: Vec<PathBuf>,
 }
 
-impl OutputFolder {
-    /// Makes the folder where it is missing and tries it out.
+impl OutputFiles {
+    /// Makes the folders where they are missing and tries them out.
     ///
     /// # Errors
-    /// The folder cannot be made or written, or has no room for a recording.
-    pub fn prepare(path: &Path) -> Result<Self, UsageError> {
-        let refuse = |error: io::Error| refuse("--out", path, &error);
-        fs::create_dir_all(path).map_err(refuse)?;
-        try_out(path, ROOM_NEEDED_BYTES).map_err(refuse)?;
-        Ok(Self { path: path.to_owned() })
-    }
-
-    /// Path of a file in the folder.
-    pub fn file(&self, name: &str) -> PathBuf {
-        self.path.join(name)
+    /// A folder cannot be made or written, has no room, or `--json` names a folder.
+    pub fn prepare(arguments: &DriveArguments) -> Result<Self, UsageError> {
+        let file = |name: &str| arguments.out.join(name);
+        try_out("--out", &arguments.out, RECORDING_ROOM_BYTES)?;
+        let mut summaries = vec![file("summary.json")];
+        if let Some(json) = &arguments.json {
+            prepare_json(json)?;
+            summaries.push(json.clone());
+        }
+        Ok(Self { picture: file("drive.png"), recording: file("drive.mcap"), summaries })
     }
 }
 
-/// Tries out the folder that a result file shall lie in; the file itself stays as it is.
+/// Tries out the place of a `--json` file; what stands there is kept until the result replaces it.
 ///
 /// # Errors
-/// The path is a folder, or the folder it lies in is missing or cannot be written.
-pub fn check_file(option: &str, path: &Path) -> Result<(), UsageError> {
+/// The path is a folder, or the folder it lies in cannot be made or written.
+pub fn prepare_json(path: &Path) -> Result<(), UsageError> {
     if path.is_dir() {
-        return Err(UsageError(format!("{option}: expected a file, found the folder {}", path.display())));
+        return Err(UsageError(format!("--json: expected a file, found the folder {}", path.display())));
     }
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
-    try_out(folder.unwrap_or(Path::new(".")), 4096).map_err(|error| refuse(option, path, &error))
+    try_out("--json", folder.unwrap_or(Path::new(".")), JSON_ROOM_BYTES)
 }
 
-fn refuse(option: &str, path: &Path, error: &io::Error) -> UsageError {
-    UsageError(format!("{option}: expected a place that can be written, found {}: {error}", path.display()))
-}
-
-/// Writes a file of the given size and removes it again.
-fn try_out(folder: &Path, n_bytes: usize) -> io::Result<()> {
-    let path = folder.join(format!(".surefoot-{}", std::process::id()));
-    let written = fill(&path, n_bytes);
-    let removed = fs::remove_file(&path);
-    written.and(removed)
-}
-
-/// A full disk may show only when the bytes really go there, hence the sync.
-fn fill(path: &Path, n_bytes: usize) -> io::Result<()> {
-    let mut file = File::create(path)?;
-    let block = vec![0x5a_u8; 1 << 16];
-    let mut left = n_bytes;
-    while left > 0 {
-        let now = left.min(block.len());
-        file.write_all(&block[..now])?;
-        left -= now;
-    }
-    file.sync_data()
+fn try_out(option: &str, folder: &Path, room_bytes: u64) -> Result<(), UsageError> {
+    prepare_out_dir(folder, room_bytes)
+        .map_err(|error| UsageError(format!("{option}: {}", UsageError::from_input(error))))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::arguments::{Arguments, Command};
+    use clap::Parser;
+    use std::fs;
+
+    fn prepare(words: &[&str]) -> Result<OutputFiles, UsageError> {
+        let words = ["surefoot", "drive"].iter().chain(words);
+        match Arguments::try_parse_from(words).unwrap().command {
+            Command::Drive(drive) => OutputFiles::prepare(&drive),
+            Command::Bench { .. } => unreachable!("the words say drive"),
+        }
+    }
 
     #[test]
     fn folder_is_made_and_left_empty() {
         let parent = tempfile::tempdir().unwrap();
-        let folder = OutputFolder::prepare(&parent.path().join("a/b")).unwrap();
-        assert_eq!(fs::read_dir(parent.path().join("a/b")).unwrap().count(), 0);
-        assert_eq!(folder.file("drive.png"), parent.path().join("a/b/drive.png"));
+        let out = parent.path().join("a/b");
+        let files = prepare(&["--out", out.to_str().unwrap()]).unwrap();
+        assert_eq!(fs::read_dir(&out).unwrap().count(), 0);
+        assert_eq!(files.picture, out.join("drive.png"));
+        assert_eq!(files.summaries, [out.join("summary.json")]);
     }
 
     #[test]
@@ -87,18 +87,17 @@ mod tests {
         let parent = tempfile::tempdir().unwrap();
         let path = parent.path().join("taken");
         fs::write(&path, "").unwrap();
-        let error = OutputFolder::prepare(&path).unwrap_err();
-        assert!(error.0.starts_with("--out: expected") && error.0.contains("taken"), "{error}");
+        let told = prepare(&["--out", path.to_str().unwrap()]).unwrap_err().0;
+        assert!(told.starts_with("--out: ") && told.contains("taken: expected a folder"), "{told}");
     }
 
     #[test]
-    fn json_in_a_missing_folder_is_told_and_an_old_file_is_kept() {
+    fn json_that_is_a_folder_is_told_and_an_old_file_is_kept() {
         let parent = tempfile::tempdir().unwrap();
-        assert!(check_file("--json", &parent.path().join("missing/s.json")).is_err());
-        assert!(check_file("--json", parent.path()).is_err());
+        assert!(prepare_json(parent.path()).unwrap_err().0.starts_with("--json: expected a file"));
         let path = parent.path().join("s.json");
         fs::write(&path, "old").unwrap();
-        check_file("--json", &path).unwrap();
+        prepare_json(&path).unwrap();
         assert_eq!(fs::read_to_string(&path).unwrap(), "old");
         assert_eq!(fs::read_dir(parent.path()).unwrap().count(), 1);
     }

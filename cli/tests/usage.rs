@@ -1,5 +1,7 @@
 //! What a user meets before any work is done: help that teaches, and one line for every mistake.
 
+#![allow(clippy::expect_used, reason = "helpers of tests may fail as tests do")]
+
 use assert_cmd::Command;
 
 fn surefoot(words: &[&str]) -> std::process::Output {

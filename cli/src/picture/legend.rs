@@ -1,0 +1,160 @@
+//! The column beside the map: what colours and marks mean.
+
+use super::axes::{Range, number};
+use super::canvas::{Anchor, Canvas, Point, Rect, Stroke, TextStyle};
+use super::colour::{Ramp, Rgb};
+use super::{DrivePicture, map};
+
+/// Height of the whole column [px].
+pub(super) const HEIGHT: f64 = 560.0;
+
+const BAR_HEIGHT: f64 = 190.0;
+const BAR_WIDTH: f64 = 24.0;
+const ROW: f64 = 34.0;
+const TEXT: TextStyle = TextStyle::new(17, Anchor::Start);
+
+pub(super) fn draw(picture: &DrivePicture<'_>, (x, y): Point, canvas: &mut Canvas) {
+    let mut bar_x = x;
+    if !picture.driven.is_empty() {
+        let scale_mps = map::speed_scale_mps(picture);
+        let bar = ColourBar { title: ["speed", "[m/s]"], low: 0.0, high: scale_mps, ramp: Ramp::SPEED };
+        bar.draw((bar_x, y), canvas);
+        bar_x += 130.0;
+    }
+    if let Some(risk) = &picture.risk {
+        let bar = ColourBar {
+            title: split_label(risk.label),
+            low: f64::from(risk.harmless),
+            high: f64::from(risk.worst),
+            ramp: Ramp::RISK,
+        };
+        bar.draw((bar_x, y), canvas);
+    }
+    let bars_height = if bar_x > x || picture.risk.is_some() { BAR_HEIGHT + 76.0 } else { 0.0 };
+    for (row, entry) in entries(picture).into_iter().enumerate() {
+        let centre = (x + 14.0, y + bars_height + 10.0 + ROW * row as f64);
+        entry.draw(centre, canvas);
+    }
+}
+
+/// A ramp with its values.
+struct ColourBar<'a> {
+    title: [&'a str; 2],
+    low: f64,
+    high: f64,
+    ramp: Ramp,
+}
+
+impl ColourBar<'_> {
+    fn draw(&self, (x, y): Point, canvas: &mut Canvas) {
+        canvas.text((x, y + 14.0), self.title[0], TEXT.bold());
+        canvas.text((x, y + 36.0), self.title[1], TEXT.coloured(Rgb::INK_SOFT));
+        let bar = Rect { x, y: y + 50.0, width: BAR_WIDTH, height: BAR_HEIGHT };
+        for step in 0..BAR_HEIGHT as u32 {
+            let share = 1.0 - (f64::from(step) + 0.5) / BAR_HEIGHT;
+            let row = Rect { y: bar.y + f64::from(step), height: 1.0, ..bar };
+            canvas.rect(row, self.ramp.at(share as f32), 1.0);
+        }
+        canvas.frame(bar, Stroke::solid(Rgb::INK_SOFT, 1.5));
+        let values = Range { low: self.low.min(self.high), high: self.low.max(self.high) };
+        let (ticks, decimals) = values.ticks(5.0);
+        for value in ticks {
+            let y = bar.bottom() - (value - self.low) / (self.high - self.low) * BAR_HEIGHT;
+            canvas.line((bar.right(), y), (bar.right() + 5.0, y), Stroke::solid(Rgb::INK_SOFT, 1.5));
+            let place = (bar.right() + 10.0, y + 6.0);
+            canvas.text(place, &number(value, decimals), TextStyle::new(15, Anchor::Start));
+        }
+    }
+}
+
+/// "name [unit]" as two lines.
+fn split_label(label: &str) -> [&str; 2] {
+    match label.rfind('[') {
+        Some(at) => [label[..at].trim_end(), &label[at..]],
+        None => [label, ""],
+    }
+}
+
+/// One mark and its meaning.
+struct Entry {
+    mark: Mark,
+    meaning: &'static str,
+}
+
+enum Mark {
+    Swatch(Rgb),
+    Driven,
+    Planned,
+    Footprint,
+    Start,
+    Goal,
+    Failure,
+}
+
+fn entries(picture: &DrivePicture<'_>) -> Vec<Entry> {
+    let patches = picture.world.patches.values();
+    let vegetation = patches.iter().any(|patch| patch.vegetation_height_m > 0.0);
+    let obstacles = patches.iter().any(|patch| patch.class == terrain::TerrainClass::Obstacle);
+    let driven = !picture.driven.is_empty();
+    let soft = Ramp::GROUND.at(0.5).blend(Rgb::VEGETATION, 0.6);
+    let unseen = Ramp::GROUND.at(0.5).blend(Rgb::UNSEEN, 0.62);
+    [
+        (vegetation, Mark::Swatch(soft), "plants, denser = higher"),
+        (obstacles, Mark::Swatch(Rgb::OBSTACLE), "obstacle"),
+        (picture.known.is_some(), Mark::Swatch(unseen), "never seen"),
+        (driven, Mark::Driven, "driven, by speed"),
+        (!picture.planned.is_empty(), Mark::Planned, "planned"),
+        (driven, Mark::Footprint, "vehicle"),
+        (true, Mark::Start, "start"),
+        (true, Mark::Goal, "goal and tolerance"),
+        (driven && picture.failure.is_some(), Mark::Failure, "end of the drive"),
+    ]
+    .into_iter()
+    .filter_map(|(shown, mark, meaning)| shown.then_some(Entry { mark, meaning }))
+    .collect()
+}
+
+impl Entry {
+    fn draw(&self, centre: Point, canvas: &mut Canvas) {
+        let (x, y) = centre;
+        let ends = [(x - 15.0, y), (x + 15.0, y)];
+        let plate = Rect { x: x - 14.0, y: y - 9.0, width: 28.0, height: 18.0 };
+        match self.mark {
+            Mark::Swatch(colour) => {
+                canvas.rect(plate, colour, 1.0);
+                canvas.frame(plate, Stroke::solid(Rgb::INK_SOFT, 1.0));
+            }
+            Mark::Driven => draw_driven_sample(ends, canvas),
+            Mark::Planned => map::planned_line(&ends, canvas),
+            Mark::Footprint => {
+                let (left, top, right, bottom) = (plate.x, plate.y, plate.right(), plate.bottom());
+                let corners = [(left, bottom), (right, bottom), (right, top), (left, top), (left, bottom)];
+                map::footprint_mark(&corners, canvas);
+            }
+            Mark::Start => map::start_marker(centre, canvas),
+            Mark::Goal => map::goal_marker(centre, canvas),
+            Mark::Failure => map::failure_marker(centre, canvas),
+        }
+        canvas.text((x + 32.0, y + 6.0), self.meaning, TEXT);
+    }
+}
+
+fn draw_driven_sample([from, to]: [Point; 2], canvas: &mut Canvas) {
+    canvas.line(from, to, Stroke::solid(Rgb::INK, 9.0));
+    for step in 0..10 {
+        let at = |i: u32| from.0 + (to.0 - from.0) * f64::from(i) / 10.0;
+        let colour = Ramp::SPEED.at(step as f32 / 9.0);
+        canvas.line((at(step), from.1), (at(step + 1), from.1), Stroke::solid(colour, 5.0));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn unit_goes_to_the_second_line() {
+        assert_eq!(split_label("worst traction [-]"), ["worst traction", "[-]"]);
+        assert_eq!(split_label("risk"), ["risk", ""]);
+    }
+}

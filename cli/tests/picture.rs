@@ -1,0 +1,182 @@
+//! Whole pages of drives that never happened, on worlds that ship with the project. The files stay in the target
+//! folder, to be looked at.
+
+#![allow(clippy::expect_used, reason = "helpers of tests may fail as tests do")]
+
+use std::path::PathBuf;
+
+use bicycle::Vehicle;
+use cli::picture::{DrivePicture, PathSample, RiskLayer, draw_drive};
+use scenarios::{
+    ARENA_GOAL_M, ARENA_START, ArenaConfig, RockFieldConfig, RockMap, Split, World, arena, rock_field,
+};
+use terrain::GridMap;
+
+fn vehicle(name: &str) -> Vehicle {
+    formats::read_vehicle(name).expect("the vehicle ships")
+}
+
+fn page(name: &str) -> PathBuf {
+    PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(name)
+}
+
+/// A way from `start` to `goal` that swings to both sides, with the attitude that the ground gives.
+fn swinging_path(
+    world: &World,
+    start: [f64; 2],
+    goal: [f64; 2],
+    swing_m: f64,
+    speed_mps: f64,
+) -> Vec<PathSample> {
+    let [dx, dy] = [goal[0] - start[0], goal[1] - start[1]];
+    let length_m = dx.hypot(dy);
+    let along = [dx / length_m, dy / length_m];
+    let n = 400;
+    let place = |share: f64| {
+        let side_m = swing_m * (share * 9.0).sin() * (share * std::f64::consts::PI).sin();
+        let ahead_m = share * length_m;
+        [start[0] + along[0] * ahead_m - along[1] * side_m, start[1] + along[1] * ahead_m + along[0] * side_m]
+    };
+    let mut time_s = 0.0;
+    (0..n)
+        .map(|i| {
+            let share = f64::from(i) / f64::from(n);
+            let [x_m, y_m] = place(share);
+            let [next_x_m, next_y_m] = place(share + 0.5 / f64::from(n));
+            let yaw_rad = (next_y_m - y_m).atan2(next_x_m - x_m);
+            let [east, north] = world.gradient(x_m, y_m);
+            let speed_mps = speed_mps * (1.0 - 0.5 * (share * 20.0).sin().powi(2));
+            time_s += length_m / f64::from(n) / speed_mps;
+            let roll_rad = (north * yaw_rad.cos() - east * yaw_rad.sin()).atan();
+            let pitch_rad = -(east * yaw_rad.cos() + north * yaw_rad.sin()).atan();
+            PathSample { time_s, x_m, y_m, yaw_rad, speed_mps, roll_rad, pitch_rad }
+        })
+        .collect()
+}
+
+/// Steepness as risk, known within `reach_m` of the path.
+fn risk_near(world: &World, path: &[PathSample], reach_m: f64) -> (GridMap<f32>, GridMap<bool>) {
+    let geometry = *world.geometry();
+    let mut known = GridMap::filled(geometry, false);
+    let mut risk = GridMap::filled(geometry, f32::NAN);
+    for index in 0..geometry.n_cells() {
+        let cell = geometry.cell(index);
+        let [x_m, y_m] = geometry.centre_m(cell);
+        if path.iter().step_by(8).any(|sample| (sample.x_m - x_m).hypot(sample.y_m - y_m) < reach_m) {
+            let [east, north] = world.gradient(x_m, y_m);
+            known[cell] = true;
+            risk[cell] = (1.0 - east.hypot(north)).max(0.0) as f32;
+        }
+    }
+    (risk, known)
+}
+
+/// Width and height from a PNG file's header.
+fn png_size(path: &PathBuf) -> [u32; 2] {
+    let bytes = std::fs::read(path).expect("the page was written");
+    assert_eq!(&bytes[..8], b"\x89PNG\r\n\x1a\n");
+    let number = |at: usize| u32::from_be_bytes(bytes[at..at + 4].try_into().expect("four bytes"));
+    [number(16), number(20)]
+}
+
+#[test]
+fn rock_field_with_everything_on_it() {
+    let (start_m, goal_m) = ([5.0, 22.0], [45.0, 27.0]);
+    let map = RockMap { seed: 1, split: Split::Test, index: 0 };
+    let world = rock_field(&RockFieldConfig::default(), map, &[start_m, goal_m]).expect("a field");
+    let vehicle = vehicle("pietra_full_size");
+    let driven = swinging_path(&world, start_m, goal_m, 4.0, 1.0);
+    let (risk, known) = risk_near(&world, &driven, 9.0);
+    let picture = DrivePicture {
+        title: "Goal reached in 52.4 s",
+        subtitles: &["rocks, seed 1 · pietra_full_size · physics, alpha 0.6 · 44.1 m driven".to_owned()],
+        world: &world,
+        risk: Some(RiskLayer { values: &risk, label: "worst traction [-]", harmless: 1.0, worst: 0.0 }),
+        known: Some(&known),
+        driven: &driven,
+        planned: &[start_m, goal_m],
+        start_m,
+        goal_m,
+        goal_radius_m: 1.0,
+        failure: None,
+        vehicle: &vehicle,
+    };
+    let path = page("rock_field.png");
+    draw_drive(&picture, &path).expect("a page");
+    let [width, height] = png_size(&path);
+    assert_eq!(width, 1600);
+    assert!((900..1700).contains(&height), "{height}");
+}
+
+#[test]
+fn arena_with_a_failure() {
+    let world = arena(&ArenaConfig { bush_height_m: 0.3, ..ArenaConfig::default() }).expect("a hall");
+    let vehicle = vehicle("rc_car");
+    let start_m = [ARENA_START[0], ARENA_START[1]];
+    let mut driven = swinging_path(&world, start_m, ARENA_GOAL_M, 1.0, 0.7);
+    driven.truncate(230);
+    let (risk, known) = risk_near(&world, &driven, 2.0);
+    let picture = DrivePicture {
+        title: "Stuck after 9.1 s, 4.0 m left",
+        subtitles: &[
+            "arena with bushes of 0.3 m · rc_car · nominal".to_owned(),
+            "under 0.1 m in 5 s".to_owned(),
+        ],
+        world: &world,
+        risk: Some(RiskLayer { values: &risk, label: "worst traction [-]", harmless: 1.0, worst: 0.0 }),
+        known: Some(&known),
+        driven: &driven,
+        planned: &[],
+        start_m,
+        goal_m: ARENA_GOAL_M,
+        goal_radius_m: 0.3,
+        failure: Some("stuck"),
+        vehicle: &vehicle,
+    };
+    let path = page("arena.png");
+    draw_drive(&picture, &path).expect("a page");
+    assert_eq!(png_size(&path)[0], 1600);
+}
+
+#[test]
+fn drive_that_never_moved_still_has_a_map() {
+    let world = arena(&ArenaConfig::default()).expect("a hall");
+    let picture = DrivePicture {
+        title: "Stopped before the start",
+        subtitles: &[],
+        world: &world,
+        risk: None,
+        known: None,
+        driven: &[],
+        planned: &[],
+        start_m: [ARENA_START[0], ARENA_START[1]],
+        goal_m: ARENA_GOAL_M,
+        goal_radius_m: 0.3,
+        failure: Some("stopped"),
+        vehicle: &vehicle("rc_car"),
+    };
+    let path = page("never_moved.png");
+    draw_drive(&picture, &path).expect("a page");
+    assert_eq!(png_size(&path)[0], 1600);
+}
+
+#[test]
+fn folder_in_place_of_the_file_is_told() {
+    let world = arena(&ArenaConfig::default()).expect("a hall");
+    let picture = DrivePicture {
+        title: "",
+        subtitles: &[],
+        world: &world,
+        risk: None,
+        known: None,
+        driven: &[],
+        planned: &[],
+        start_m: [1.0, 1.0],
+        goal_m: [2.0, 2.0],
+        goal_radius_m: 0.3,
+        failure: None,
+        vehicle: &vehicle("rc_car"),
+    };
+    let error = draw_drive(&picture, &page(".")).expect_err("a folder is no file");
+    assert!(error.to_string().contains("expected a file that can be written"), "{error}");
+}
