@@ -10,7 +10,10 @@ pub(super) struct CellPoint {
     /// Columns, rows from the window's south-west corner [cells].
     pub place: [f32; 2],
     pub height_m: f32,
+    /// Variance of the error that is the point's own [m2].
     pub variance_m2: f32,
+    /// Variance of the error that it shares with the scan's other points [m2].
+    pub shared_m2: f32,
     pub class: TerrainClass,
 }
 
@@ -143,9 +146,9 @@ impl CellState {
                 self.forget_ground();
             }
             let is_foot = |p: &&CellPoint| p.height_m <= foot_m + 2.0 * p.variance_m2.sqrt();
-            self.fuse_ground(&RigidStatistics::of(rigid.filter(is_foot)), config);
+            self.fuse_ground(&RigidStatistics::of(rigid.filter(is_foot)));
         } else {
-            self.fuse_ground(&statistics, config);
+            self.fuse_ground(&statistics);
         }
     }
 
@@ -216,11 +219,11 @@ impl CellState {
     }
 
     /// Kalman update with the mean of a scan's ground points.
-    fn fuse_ground(&mut self, rigid: &RigidStatistics, config: &ElevationConfig) {
+    fn fuse_ground(&mut self, rigid: &RigidStatistics) {
         if rigid.n < 1.0 {
             return;
         }
-        let shared_m2 = (config.scan_noise_m * config.scan_noise_m) as f32;
+        let shared_m2 = rigid.shared_m2();
         if self.ground != Ground::Seen {
             self.ground = Ground::Seen;
             self.ground_m = rigid.mean_m();
@@ -230,7 +233,7 @@ impl CellState {
             return;
         }
         let innovation_m = rigid.mean_m() - self.ground_m;
-        self.learn_spread(innovation_m * innovation_m, rigid, shared_m2);
+        self.learn_spread(innovation_m * innovation_m, rigid);
         let noise_m2 = (rigid.noise_m2() + self.spread_m2) / rigid.n + shared_m2;
         let gain = self.variance_m2 / (self.variance_m2 + noise_m2);
         self.ground_m += gain * innovation_m;
@@ -240,8 +243,8 @@ impl CellState {
     /// Follows the variance of heights within the cell: between the points of a scan, and between scans once one
     /// surprised. Up fast, down slowly, since a scan may see one side of the cell only. A surprise may also
     /// mean that the ground is not where it was, so the mean becomes uncertain too.
-    fn learn_spread(&mut self, squared_innovation_m2: f32, rigid: &RigidStatistics, shared_m2: f32) {
-        let sensor_m2 = self.variance_m2 + rigid.noise_m2() / rigid.n + shared_m2;
+    fn learn_spread(&mut self, squared_innovation_m2: f32, rigid: &RigidStatistics) {
+        let sensor_m2 = self.variance_m2 + rigid.noise_m2() / rigid.n + rigid.shared_m2();
         let is_surprise = squared_innovation_m2 > SURPRISE_GATE * (sensor_m2 + self.spread_m2 / rigid.n);
         let between_scans_m2 =
             if is_surprise || self.spread_m2 > 0.0 { squared_innovation_m2 - sensor_m2 } else { 0.0 };

@@ -21,6 +21,8 @@ pub struct ElevationConfig {
     pub noise_per_range: f64,
     /// Standard deviation of the height error that all points of a scan share (pose error) [m].
     pub scan_noise_m: f64,
+    /// Standard deviation of the tilt that all points of a scan share (attitude error) [rad].
+    pub scan_tilt_rad: f64,
     /// Growth of a height's variance while nothing is seen of it [m2/s].
     pub fading_m2ps: f64,
     /// Points a class's evidence is remembered for: older ones fade beyond it, > 0.
@@ -59,6 +61,7 @@ impl Default for ElevationConfig {
             noise_floor_m: 0.02,
             noise_per_range: 0.002,
             scan_noise_m: 0.005,
+            scan_tilt_rad: 0.002,
             fading_m2ps: 1e-5,
             evidence_cap: 30.0,
             open_prior: 1.0,
@@ -127,6 +130,7 @@ impl ElevationConfig {
             ("open_prior", f64::from(self.open_prior)),
             ("own_body_m", self.own_body_m),
             ("scan_noise_m", self.scan_noise_m),
+            ("scan_tilt_rad", self.scan_tilt_rad),
             ("fading_m2ps", self.fading_m2ps),
             ("gap_radius_m", self.gap_radius_m),
             ("publish_step_m", f64::from(self.publish_step_m)),

@@ -86,10 +86,12 @@ impl SortedPoints {
             }
             self.counts[cell as usize] += 1;
             let std_m = config.noise_floor_m + config.noise_per_range * range_m;
-            let variance_m2 = (std_m * std_m) as f32;
+            let shared_m = config.scan_noise_m + config.scan_tilt_rad * range_m;
+            let [variance_m2, shared_m2] = [std_m, shared_m].map(|std_m| (std_m * std_m) as f32);
             let place = [(position.x - west_m) / edge_m, (position.y - south_m) / edge_m].map(|v| v as f32);
             let height_m = position.z as f32;
-            self.placed.push((cell, CellPoint { place, height_m, variance_m2, class: point.class }));
+            self.placed
+                .push((cell, CellPoint { place, height_m, variance_m2, shared_m2, class: point.class }));
         }
     }
 }

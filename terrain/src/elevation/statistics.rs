@@ -9,6 +9,7 @@ pub(super) struct RigidStatistics {
     sum_m: f32,
     sum_m2: f32,
     variance_sum_m2: f32,
+    shared_sum_m2: f32,
     lowest_m: f32,
     highest_m: f32,
     second_highest_m: f32,
@@ -23,6 +24,7 @@ impl RigidStatistics {
             sum_m: 0.0,
             sum_m2: 0.0,
             variance_sum_m2: 0.0,
+            shared_sum_m2: 0.0,
             lowest_m: f32::INFINITY,
             highest_m: f32::NEG_INFINITY,
             second_highest_m: f32::NEG_INFINITY,
@@ -37,6 +39,7 @@ impl RigidStatistics {
             all.sum_m += relative_m;
             all.sum_m2 += relative_m * relative_m;
             all.variance_sum_m2 += point.variance_m2;
+            all.shared_sum_m2 += point.shared_m2;
             all.lowest_m = all.lowest_m.min(point.height_m);
             all.second_highest_m = all.second_highest_m.max(point.height_m.min(all.highest_m));
             all.highest_m = all.highest_m.max(point.height_m);
@@ -52,6 +55,11 @@ impl RigidStatistics {
     /// From the lowest point to the second highest, so that one point named wrongly builds no wall.
     pub fn span_m(&self) -> f32 {
         (self.second_highest_m - self.lowest_m).max(0.0)
+    }
+
+    /// Mean variance of the error that the points share.
+    pub fn shared_m2(&self) -> f32 {
+        self.shared_sum_m2 / self.n
     }
 
     /// Mean sensor variance of one point.

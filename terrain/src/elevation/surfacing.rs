@@ -94,9 +94,10 @@ impl Scratch {
                 continue;
             }
             let inferred = infer(&self.next, geometry, geometry.cell(index), radius, datum_m);
-            let Some(Inferred { surface, seen_m2 }) = inferred else { continue };
-            let tolerance_m = GAP_MARGIN_SHARE * config.visibility_margin_m + 2.0 * seen_m2.sqrt();
+            let Some(Inferred { mut surface, seen_m2 }) = inferred else { continue };
+            let tolerance_m = GAP_MARGIN_SHARE * config.visibility_margin_m + seen_m2.sqrt();
             if surface.height_m <= state.ceiling_m + tolerance_m {
+                surface.height_m = surface.height_m.min(state.ceiling_m);
                 self.inferred.push((index as u32, surface));
             }
         }

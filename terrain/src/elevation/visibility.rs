@@ -4,10 +4,8 @@ use super::ElevationConfig;
 use super::sorting::SortedPoints;
 use crate::GridGeometry;
 
-/// Standard deviations of a ray's height that its bound stays on the safe side.
-const RAY_SAFETY: f64 = 2.0;
-
-/// For each cell, the lowest height at which a ray of the last scan passed [m]; +inf where none did.
+/// For each cell, the lowest height at which a ray of the last scan passed, one standard deviation of the pose's
+/// error on the safe side [m]; +inf where none did.
 #[derive(Clone, Debug, Default)]
 pub(super) struct RayFloor {
     pub floors_m: Vec<f32>,
@@ -29,7 +27,7 @@ impl RayFloor {
         let [x_m, y_m, z_m] = points.origin_m;
         let start = [(x_m - west_m) / geometry.resolution_m, (y_m - south_m) / geometry.resolution_m]
             .map(|place| place as f32);
-        let start_m = (z_m + RAY_SAFETY * config.scan_noise_m) as f32;
+        let start_m = (z_m + config.scan_noise_m) as f32;
         for &cell in &points.hit_cells {
             let Some(lowest) = points.in_cell(cell).iter().min_by(|a, b| a.height_m.total_cmp(&b.height_m))
             else {
@@ -37,7 +35,7 @@ impl RayFloor {
             };
             let [col, row] = lowest.place;
             let length_m = f64::from((col - start[0]).hypot(row - start[1])) * geometry.resolution_m;
-            let slack_m = RAY_SAFETY * (config.scan_noise_m + config.noise_per_range * length_m);
+            let slack_m = config.scan_noise_m + config.scan_tilt_rad * length_m;
             let ray = Ray {
                 start: [start[0], start[1], start_m],
                 end: [col, row, lowest.height_m + slack_m as f32],

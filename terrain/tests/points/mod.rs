@@ -21,6 +21,7 @@ pub fn plain_config() -> ElevationConfig {
         noise_floor_m: 0.02,
         noise_per_range: 0.0,
         scan_noise_m: 0.0,
+        scan_tilt_rad: 0.0,
         fading_m2ps: 0.0,
         gap_radius_m: 1.0,
         publish_step_m: 0.0,
