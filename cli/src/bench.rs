@@ -1,12 +1,51 @@
 //! `surefoot bench`: what was asked, handed to the benchmarks, and their result shown and written.
 
-use crate::WorkFailed;
-use crate::arguments::{BenchControlArguments, BenchPriorMapArguments};
+use ::bench::{BenchError, control, prior_map};
+use serde::Serialize;
 
-pub(crate) fn control(_arguments: &BenchControlArguments) -> anyhow::Result<()> {
-    Err(WorkFailed("bench control: this build carries no benchmark of the controller".to_owned()).into())
+use crate::arguments::{BenchControlArguments, BenchPriorMapArguments, BenchWork};
+use crate::{UsageError, output};
+
+pub(crate) fn run_control(arguments: &BenchControlArguments) -> anyhow::Result<()> {
+    let json = arguments.json.as_deref();
+    json.map_or(Ok(()), output::prepare_json)?;
+    let report = control::measure(control::Request {
+        n_threads: arguments.n_threads(),
+        n_updates: arguments.updates,
+        work: match arguments.work {
+            BenchWork::Bound => control::Work::Bound,
+            BenchWork::Effects => control::Work::Effects,
+            BenchWork::Drive => control::Work::Drive,
+        },
+        isa: arguments.isa.into(),
+    })
+    .map_err(told)?;
+    show(&report, json)
 }
 
-pub(crate) fn prior_map(_arguments: &BenchPriorMapArguments) -> anyhow::Result<()> {
-    Err(WorkFailed("bench prior-map: this build carries no benchmark of the risk map".to_owned()).into())
+pub(crate) fn run_prior_map(arguments: &BenchPriorMapArguments) -> anyhow::Result<()> {
+    let json = arguments.json.as_deref();
+    json.map_or(Ok(()), output::prepare_json)?;
+    let request = prior_map::Request { n_threads: arguments.n_threads(), n_updates: arguments.updates };
+    let report = prior_map::measure(request).map_err(told)?;
+    show(&report, json)
+}
+
+/// An instruction set that the machine lacks is the user's choice; all else is not.
+fn told(error: BenchError) -> anyhow::Error {
+    match error {
+        BenchError::Controller(refused @ mppi::ConfigError::IsaAbsent { .. }) => {
+            UsageError::from_input(refused).into()
+        }
+        other => other.into(),
+    }
+}
+
+/// JSON on standard output, and in the file if one was asked for.
+fn show(report: &impl Serialize, json: Option<&std::path::Path>) -> anyhow::Result<()> {
+    println!("{}", serde_json::to_string_pretty(report)?);
+    if let Some(path) = json {
+        formats::write_json_atomic(path, report)?;
+    }
+    Ok(())
 }

@@ -40,8 +40,8 @@ pub fn run() -> ExitCode {
 fn dispatch(command: Command) -> anyhow::Result<()> {
     match command {
         Command::Drive(drive) => drive::run(&drive),
-        Command::Bench { command: BenchCommand::Control(control) } => bench::control(&control),
-        Command::Bench { command: BenchCommand::PriorMap(prior_map) } => bench::prior_map(&prior_map),
+        Command::Bench { command: BenchCommand::Control(control) } => bench::run_control(&control),
+        Command::Bench { command: BenchCommand::PriorMap(prior_map) } => bench::run_prior_map(&prior_map),
     }
 }
 

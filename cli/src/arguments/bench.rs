@@ -94,8 +94,10 @@ Measures the risk map of the physics prior over 81 x 96 cells and 13 yaws: built
 after one contiguous block of 2 % of the cells has changed.";
 
 const CONTROL_AFTER_HELP: &str = "\
-Prints, and with --json writes:
-  {\"threads\", \"updates\", \"ms\": {\"min\", \"median\", \"p99\"}, \"split_ms\": {\"noise\", \"rollout\", \"update\"}}
+Prints JSON, and with --json writes it to a file too:
+  threads, updates, config, isa
+  ms        min, median, p99 of an update
+  split_ms  medians of its parts: noise, rollout, update
 
 Examples:
   surefoot bench control --threads 1

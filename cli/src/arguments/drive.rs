@@ -172,6 +172,17 @@ pub enum InstructionSet {
     Portable,
 }
 
+impl From<InstructionSet> for mppi::Isa {
+    fn from(asked: InstructionSet) -> Self {
+        match asked {
+            InstructionSet::Auto => Self::Auto,
+            InstructionSet::Avx512 => Self::Avx512,
+            InstructionSet::Avx2 => Self::Avx2,
+            InstructionSet::Portable => Self::Portable,
+        }
+    }
+}
+
 pub(super) const LONG_ABOUT: &str = "\
 Drives a simulated vehicle over rough ground to a goal, in closed loop.
 
