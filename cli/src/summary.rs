@@ -246,6 +246,9 @@ mod tests {
         let ms = Milliseconds::from_samples(&samples);
         assert_eq!(ms, Some(Milliseconds { p50: 100.0, p99: 198.0, max: 200.0 }));
         assert_eq!(Milliseconds::from_samples(&[7.0]), Some(Milliseconds { p50: 7.0, p99: 7.0, max: 7.0 }));
+        // Rank ceil(0.5 * 3) = 2, ceil(0.99 * 3) = 3.
+        let three = Milliseconds { p50: 2.0, p99: 3.0, max: 3.0 };
+        assert_eq!(Milliseconds::from_samples(&[3.0, 1.0, 2.0]), Some(three));
         assert_eq!(Milliseconds::from_samples(&[]), None);
     }
 

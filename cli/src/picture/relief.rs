@@ -227,6 +227,18 @@ mod tests {
     }
 
     #[test]
+    fn slopes_of_a_plane_are_its_gradient_in_the_map_frame() {
+        let frame = Rect { x: 0.0, y: 0.0, width: 30.0, height: 20.0 };
+        let axes = Axes { frame, x: Range { low: 5.0, high: 8.0 }, y: Range { low: -1.0, high: 1.0 } };
+        let raster = Raster { axes: &axes, width: 30, height: 20 };
+        let heights = raster.sampled(|x_m, y_m| (0.3 * x_m - 0.2 * y_m) as f32);
+        for index in [0, 29, 315, 599] {
+            let [east, north] = raster.slope(&heights, index, 2);
+            assert!((east - 0.3).abs() < 1e-4 && (north + 0.2).abs() < 1e-4, "{index}: {east}, {north}");
+        }
+    }
+
+    #[test]
     fn bilinear_height_reproduces_a_plane_and_holds_it_at_the_border() {
         let geometry = GridGeometry { resolution_m: 0.5, origin: [-4, 6], n_rows: 5, n_cols: 7 };
         let plane = |[x_m, y_m]: [f64; 2]| (0.3 * x_m - 0.2 * y_m + 1.0) as f32;
