@@ -5,6 +5,7 @@ use std::ops::Range;
 use std::path::Path;
 
 use serde::de::DeserializeOwned;
+use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 /// A configuration file that cannot be used. Every message is one line.
@@ -77,13 +78,13 @@ impl ConfigText {
         toml::from_str(&self.text).map_err(|error| {
             let span = error.span().unwrap_or_default();
             let refusal = Refusal::from_message(error.message());
-            let mut path = path_of(document.get_ref(), &span);
-            if let Some(key) = &refusal.key
-                && path.last() != Some(key)
-            {
-                path.push(key.clone());
-            }
-            self.field_error(&span, path.join("."), refusal.expected, refusal.found)
+            let place = path_of(document.get_ref(), &span);
+            let path = match refusal.key {
+                Some(key) if place.is_empty() => key,
+                Some(key) if place != key && !place.ends_with(&format!(".{key}")) => format!("{place}.{key}"),
+                _ => place,
+            };
+            self.field_error(&span, path, refusal.expected, refusal.found)
         })
     }
 
@@ -137,34 +138,50 @@ impl Refusal {
 }
 
 /// Path of the deepest key whose key or value covers a place; empty for the document itself.
-fn path_of(table: &DeTable<'_>, place: &Range<usize>) -> Vec<String> {
+fn path_of(table: &DeTable<'_>, place: &Range<usize>) -> String {
     let covers = |span: Range<usize>| !place.is_empty() && span.start <= place.start && place.end <= span.end;
-    let mut best = Vec::new();
+    let mut best = String::new();
     for (key, value) in table {
-        let mut path = value.get_ref().as_table().map(|inner| path_of(inner, place)).unwrap_or_default();
-        let here = !path.is_empty() || covers(key.span()) || covers(value.span());
-        if here && path.len() + 1 > best.len() {
-            path.insert(0, key.get_ref().to_string());
-            best = path;
+        let inner = path_in(value, place);
+        if inner.is_some() || covers(key.span()) || covers(value.span()) {
+            best = format!("{}{}", key.get_ref(), inner.unwrap_or_default());
         }
     }
     best
 }
 
-/// Where the deepest existing part of a dotted path stands; an index in brackets is left out.
+/// What follows a key in the path to a place within its value: `.key` or `[index]` and so on.
+fn path_in(value: &Spanned<DeValue<'_>>, place: &Range<usize>) -> Option<String> {
+    match value.get_ref() {
+        DeValue::Table(inner) => {
+            Some(path_of(inner, place)).filter(|path| !path.is_empty()).map(|path| format!(".{path}"))
+        }
+        DeValue::Array(items) => items.iter().enumerate().find_map(|(index, item)| {
+            let span = item.span();
+            let here = !place.is_empty() && span.start <= place.start && place.end <= span.end;
+            let inner = path_in(item, place);
+            (here || inner.is_some()).then(|| format!("[{index}]{}", inner.unwrap_or_default()))
+        }),
+        _ => None,
+    }
+}
+
+/// Where the deepest existing part of a dotted path with indices stands.
 fn span_of(table: &DeTable<'_>, field: &str) -> Range<usize> {
     let (first, rest) = field.split_once('.').unwrap_or((field, ""));
-    let name = first.split('[').next().unwrap_or(first);
-    let Some((key, value)) = table.iter().find(|(key, _)| key.get_ref() == name) else {
+    let mut parts = first.split(['[', ']']).filter(|part| !part.is_empty());
+    let name = parts.next().unwrap_or_default();
+    let Some((key, mut value)) = table.iter().find(|(key, _)| key.get_ref() == name) else {
         return 0..0;
     };
-    match value.get_ref() {
-        DeValue::Table(inner) if !rest.is_empty() => {
-            let span = span_of(inner, rest);
-            if span == (0..0) { key.span() } else { span }
-        }
-        _ => key.span(),
+    let mut span = key.span();
+    for index in parts {
+        let DeValue::Array(items) = value.get_ref() else { return span };
+        let Some(item) = index.parse::<usize>().ok().and_then(|index| items.get(index)) else { return span };
+        (value, span) = (item, item.span());
     }
+    let inner = value.get_ref().as_table().map(|inner| span_of(inner, rest));
+    inner.filter(|inner| *inner != (0..0)).unwrap_or(span)
 }
 
 fn one_line(text: &str) -> String {

@@ -19,4 +19,6 @@ pub use elevation::{
 };
 pub use recording::{DriveRecorder, McapDriveLog, McapReadError, RecordError, read_drive_log_mcap};
 pub use results::{OutputError, config_hash, prepare_out_dir, write_bytes_atomic, write_json_atomic};
-pub use vehicle::{parse_vehicle, read_vehicle, shipped_vehicle_names, shipped_vehicle_text};
+pub use vehicle::{
+    parse_model, parse_vehicle, read_model, read_vehicle, shipped_vehicle_names, shipped_vehicle_text,
+};

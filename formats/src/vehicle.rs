@@ -1,8 +1,9 @@
-//! Vehicle descriptions in TOML, and those that ship with the program.
+//! Vehicles and models in TOML, and the vehicles that ship with the program.
 
 use std::path::Path;
 
-use bicycle::Vehicle;
+use bicycle::effect::EffectError;
+use bicycle::{Model, ModelError, Vehicle};
 
 use crate::{ConfigError, ConfigText};
 
@@ -41,6 +42,33 @@ pub fn parse_vehicle(text: &ConfigText) -> Result<Vehicle, ConfigError> {
     match vehicle.validate() {
         Ok(()) => Ok(vehicle),
         Err(error) => Err(text.refuse(error.field, error.expected, error.found)),
+    }
+}
+
+/// What a controller shall believe of its vehicle, from a TOML file with `wheelbase_m`, `[limits]` as in a vehicle's
+/// file, and one `[[effects]]` per effect.
+///
+/// Errors: the file cannot be read, holds an unknown, missing or mistyped key, or a value that no model can have.
+pub fn read_model(path: &Path) -> Result<Model, ConfigError> {
+    parse_model(&ConfigText::read(path)?)
+}
+
+/// A model from a text already read. Errors as [`read_model`].
+pub fn parse_model(text: &ConfigText) -> Result<Model, ConfigError> {
+    let model: Model = text.parse()?;
+    let place =
+        |id: &str| model.effects.iter().rposition(|effect| effect.description().id == id).unwrap_or(0);
+    match model.validate() {
+        Ok(()) => Ok(model),
+        Err(ModelError::Field { field, expected, found }) => Err(text.refuse(field, expected, found)),
+        Err(ModelError::Effect(EffectError { id, parameter, low, high, unit, found })) => {
+            let field = format!("effects[{}].{parameter}", place(id));
+            Err(text.refuse(&field, format_args!("{low} to {high} {unit}"), found))
+        }
+        Err(ModelError::Repeated { id }) => {
+            let field = format!("effects[{}].id", place(id));
+            Err(text.refuse(&field, "each effect once", format_args!("{id} twice")))
+        }
     }
 }
 
@@ -185,6 +213,54 @@ mod tests {
         assert!(
             refuse("track_m = 1.63", "track_m = \"wide\"")
                 .contains("geometry.track_m: expected f64, found string")
+        );
+    }
+
+    /// A model of the rc_car's size; the effects are the caller's.
+    fn model_text(effects: &str) -> ConfigText {
+        let limits = shipped_vehicle_text("rc_car").unwrap().split("[limits]").nth(1).unwrap();
+        let limits = limits.split("\n\n").next().unwrap();
+        ConfigText::new("m.toml", format!("wheelbase_m = 0.18\n[limits]{limits}\n{effects}"))
+    }
+
+    #[test]
+    fn a_model_reads_its_effects() {
+        let vehicle = read_vehicle("rc_car").unwrap();
+        assert_eq!(parse_model(&model_text("")).unwrap(), Model::of(&vehicle));
+        let model =
+            parse_model(&model_text("[[effects]]\nid = \"speed_lag\"\ntime_constant_s = 0.25")).unwrap();
+        assert_eq!(model.effects.len(), 1);
+        assert_eq!(model.effects[0].values()[0], 0.25);
+    }
+
+    #[test]
+    fn a_model_is_refused_with_its_line() {
+        let refuse = |effects: &str| {
+            let message = parse_model(&model_text(effects)).unwrap_err().to_string();
+            // The effects stand below wheelbase, [limits] and its eight lines.
+            let (line, rest) = message.strip_prefix("m.toml:").unwrap().split_once(": ").unwrap();
+            format!("{}: {rest}", line.parse::<usize>().unwrap() - 10)
+        };
+        let lag = "[[effects]]\nid = \"speed_lag\"\ntime_constant_s = ";
+        assert_eq!(
+            refuse(&format!("{lag}-0.5")),
+            "3: effects[0].time_constant_s: expected 0 to 2 s, found -0.5"
+        );
+        assert_eq!(
+            refuse(&format!("{lag}0.5\n{lag}0.25")),
+            "5: effects[1].id: expected each effect once, found speed_lag twice"
+        );
+        assert_eq!(
+            refuse("[[effects]]\nid = \"warp\"").split(", ").next(),
+            Some("2: effects[0].id: expected one of steer_delay")
+        );
+        assert_eq!(
+            refuse(&format!("{lag}0.5\ngain = 1")),
+            "1: effects[0].gain: expected time_constant_s, found an unknown key"
+        );
+        assert_eq!(
+            refuse("[[effects]]\nid = \"speed_lag\""),
+            "1: effects[0].time_constant_s: expected a value, found no such key"
         );
     }
 
