@@ -144,3 +144,109 @@ pub(crate) fn rotated([x, y]: [f64; 2], angle_rad: f64) -> [f64; 2] {
     let (sin, cos) = angle_rad.sin_cos();
     [cos * x - sin * y, sin * x + cos * y]
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+    use std::f64::consts::{FRAC_PI_2, PI, TAU};
+
+    const LAYOUT: WheelLayout = WheelLayout { wheelbase_m: 2.0, track_m: 1.5 };
+    const BODY: Footprint = Footprint { front_m: 2.7, rear_m: 0.7, half_width_m: 0.9 };
+
+    fn close(a: [f64; 2], b: [f64; 2]) -> bool {
+        (a[0] - b[0]).hypot(a[1] - b[1]) < 1e-12
+    }
+
+    #[test]
+    fn wheels_come_in_the_order_front_left_rear_left_rear_right_front_right() {
+        // Heading north: forward is north, left is west.
+        let wheels = LAYOUT.contact_points_m(10.0, 20.0, FRAC_PI_2);
+        let expected = [[9.25, 22.0], [9.25, 20.0], [10.75, 20.0], [10.75, 22.0]];
+        assert!(wheels.iter().zip(expected).all(|(a, b)| close(*a, b)), "{wheels:?}");
+    }
+
+    proptest! {
+        #[test]
+        fn wheels_keep_their_distances_at_every_pose(x in -50.0..50.0_f64, y in -50.0..50.0_f64, yaw in -9.0..9.0_f64) {
+            let [fl, rl, rr, fr] = LAYOUT.contact_points_m(x, y, yaw);
+            let distance = |a: [f64; 2], b: [f64; 2]| (a[0] - b[0]).hypot(a[1] - b[1]);
+            for (d, expected) in [
+                (distance(fl, rl), 2.0), (distance(fr, rr), 2.0), (distance(fl, fr), 1.5), (distance(rl, rr), 1.5),
+                (distance(fl, rr), 2.5), (distance(rl, [x, y]), 0.75), (distance(rr, [x, y]), 0.75),
+            ] {
+                prop_assert!((d - expected).abs() < 1e-9);
+            }
+            // Left of the heading means a positive cross product.
+            let cross = yaw.cos() * (rl[1] - y) - yaw.sin() * (rl[0] - x);
+            prop_assert!((cross - 0.75).abs() < 1e-9);
+        }
+
+        #[test]
+        fn covered_cells_are_those_on_the_inner_side_of_all_four_edges(yaw in -7.0..7.0_f64, resolution in 0.1..0.5_f64) {
+            let turned = YawFootprint::new(&LAYOUT, &BODY, resolution, yaw);
+            let corners = BODY.corners_m(0.0, 0.0, yaw);
+            let reach = (3.0 / resolution).ceil() as i32;
+            for (col, row) in (-reach..=reach).flat_map(|col| (-reach..=reach).map(move |row| (col, row))) {
+                let [x, y] = [f64::from(col) * resolution, f64::from(row) * resolution];
+                // Corners go counter-clockwise; how far the point lies to the left of each edge.
+                let inward = (0..4).map(|i| {
+                    let ([ax, ay], [bx, by]) = (corners[i], corners[(i + 1) % 4]);
+                    ((bx - ax) * (y - ay) - (by - ay) * (x - ax)) / (bx - ax).hypot(by - ay)
+                }).fold(f64::INFINITY, f64::min);
+                if inward.abs() > 1e-9 {
+                    prop_assert_eq!(turned.cells.contains(&[col, row]), inward > 0.0, "{} {}", col, row);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn turning_by_half_a_turn_mirrors_the_cells_through_the_rear_axle() {
+        let forward = YawFootprint::new(&LAYOUT, &BODY, 0.17, 0.4);
+        let backward = YawFootprint::new(&LAYOUT, &BODY, 0.17, 0.4 + PI);
+        let mut mirrored: Vec<_> = backward.cells.iter().map(|[col, row]| [-col, -row]).collect();
+        mirrored.reverse();
+        assert_eq!(forward.cells, mirrored);
+        for (a, b) in forward.wheel_offsets.iter().zip(&backward.wheel_offsets) {
+            assert!((a[0] + b[0]).abs() < 1e-5 && (a[1] + b[1]).abs() < 1e-5);
+        }
+    }
+
+    #[test]
+    fn the_number_of_cells_is_the_area_over_a_cells_area() {
+        for turned in YawFootprint::for_yaw_bins(&LAYOUT, &BODY, 0.05, 13) {
+            let area_m2 = turned.cells.len() as f64 * 0.05 * 0.05;
+            assert!((area_m2 / (3.4 * 1.8) - 1.0).abs() < 0.03, "{area_m2}");
+        }
+    }
+
+    #[test]
+    fn yaw_bins_are_centred_at_odd_halves() {
+        let bins = YawFootprint::for_yaw_bins(&LAYOUT, &BODY, 0.2, 4);
+        let yaws: Vec<f64> = bins.iter().map(|bin| bin.yaw_rad / TAU).collect();
+        assert_eq!(yaws, [0.125, 0.375, 0.625, 0.875]);
+    }
+
+    #[test]
+    fn a_vehicle_smaller_than_a_cell_still_covers_its_own() {
+        let speck = Footprint { front_m: 0.01, rear_m: 0.01, half_width_m: 0.01 };
+        assert_eq!(YawFootprint::new(&LAYOUT, &speck, 0.5, 1.0).cells, [[0, 0]]);
+    }
+
+    #[test]
+    fn the_extent_decides_exactly_whether_a_pose_fits_the_window() {
+        let geometry = GridGeometry { resolution_m: 0.25, origin: [0, 0], n_rows: 30, n_cols: 26 };
+        for turned in YawFootprint::for_yaw_bins(&LAYOUT, &BODY, 0.25, 7) {
+            for index in 0..geometry.n_cells() {
+                let cell = geometry.cell(index);
+                let all_cells = turned.cells_at(cell, &geometry).count() == turned.cells.len();
+                let all_wheels = turned.wheel_offsets.iter().all(|[d_col, d_row]| {
+                    let (col, row) = (cell.col as f32 + d_col, cell.row as f32 + d_row);
+                    col >= 0.0 && row >= 0.0 && col.ceil() < 26.0 && row.ceil() < 30.0
+                });
+                assert_eq!(turned.is_inside(cell, &geometry), all_cells && all_wheels, "{cell:?}");
+            }
+        }
+    }
+}

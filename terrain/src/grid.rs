@@ -148,3 +148,106 @@ impl<T> std::ops::IndexMut<Cell> for GridMap<T> {
         &mut self.values[index]
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn tiny(origin: [i64; 2], n_rows: usize, n_cols: usize) -> GridGeometry {
+        GridGeometry { resolution_m: 0.25, origin, n_rows, n_cols }
+    }
+
+    /// A map whose values are the lattice indices of its cells.
+    fn labelled(geometry: GridGeometry) -> GridMap<[i64; 2]> {
+        let label = |i| {
+            let cell = geometry.cell(i);
+            [geometry.origin[0] + cell.col as i64, geometry.origin[1] + cell.row as i64]
+        };
+        GridMap::from_values(geometry, (0..geometry.n_cells()).map(label).collect()).unwrap()
+    }
+
+    #[test]
+    fn every_cell_of_every_tiny_window_holds_its_centre_and_its_south_west_corner() {
+        for (x, y) in (-3..3).flat_map(|x| (-3..3).map(move |y| (x, y))) {
+            for (n_rows, n_cols) in (1..4).flat_map(|rows| (1..4).map(move |cols| (rows, cols))) {
+                let geometry = tiny([x, y], n_rows, n_cols);
+                for index in 0..geometry.n_cells() {
+                    let cell = geometry.cell(index);
+                    assert_eq!(geometry.index(cell), index);
+                    let [x_m, y_m] = geometry.centre_m(cell);
+                    assert_eq!(x_m, (x as f64 + cell.col as f64 + 0.5) * 0.25);
+                    assert_eq!(geometry.cell_at(x_m, y_m), Some(cell));
+                    // A quarter is exact in binary, so corners are too.
+                    assert_eq!(geometry.cell_at(x_m - 0.125, y_m - 0.125), Some(cell));
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_window_includes_its_south_and_west_edges_only() {
+        let geometry = tiny([-2, -1], 2, 3);
+        assert_eq!(geometry.south_west_m(), [-0.5, -0.25]);
+        assert_eq!(geometry.cell_at(-0.5, -0.25), Some(Cell { row: 0, col: 0 }));
+        assert_eq!(geometry.cell_at(0.25 - 1e-12, 0.25 - 1e-12), Some(Cell { row: 1, col: 2 }));
+        for (x_m, y_m) in [(0.25, 0.0), (0.0, 0.25), (-0.5 - 1e-12, 0.0), (0.0, -0.25 - 1e-12)] {
+            assert_eq!(geometry.cell_at(x_m, y_m), None);
+        }
+    }
+
+    #[test]
+    fn a_point_that_is_no_place_lies_in_no_cell() {
+        for odd in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1e300] {
+            assert_eq!(tiny([0, 0], 2, 2).cell_at(odd, 0.1), None);
+            assert_eq!(tiny([0, 0], 2, 2).cell_at(0.1, odd), None);
+        }
+    }
+
+    #[test]
+    fn rolling_keeps_what_stays_for_every_shift_of_a_tiny_map() {
+        for (x, y) in (-6..=6).flat_map(|x| (-6..=6).map(move |y| (x, y))) {
+            let geometry = tiny([1, -2], 3, 4);
+            let mut map = labelled(geometry);
+            map.roll_to([1 + x, -2 + y], [99, 99]);
+            for (index, value) in map.values().iter().enumerate() {
+                let cell = geometry.cell(index);
+                let place = [1 + x + cell.col as i64, -2 + y + cell.row as i64];
+                let stayed = (1..5).contains(&place[0]) && (-2..1).contains(&place[1]);
+                assert_eq!(*value, if stayed { place } else { [99, 99] }, "shift {x}, {y}, cell {cell:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_map_needs_one_value_per_cell() {
+        assert!(GridMap::from_values(tiny([0, 0], 2, 3), vec![0; 5]).is_none());
+        assert_eq!(labelled(tiny([4, 5], 2, 3)).at(1.3, 1.6), Some(&[5, 6]));
+    }
+
+    proptest! {
+        #[test]
+        fn a_centred_window_has_its_centre_within_half_a_cell(
+            x_m in -1e4..1e4_f64, y_m in -1e4..1e4_f64, n_rows in 1..50_usize, n_cols in 1..50_usize,
+            resolution_m in 0.01..3.0_f64,
+        ) {
+            let geometry = GridGeometry::centred(resolution_m, n_rows, n_cols, x_m, y_m);
+            let [west_m, south_m] = geometry.south_west_m();
+            let half_m = 0.5 * resolution_m * (1.0 + 1e-9);
+            prop_assert!((west_m + 0.5 * n_cols as f64 * resolution_m - x_m).abs() <= half_m);
+            prop_assert!((south_m + 0.5 * n_rows as f64 * resolution_m - y_m).abs() <= half_m);
+        }
+
+        #[test]
+        fn a_point_lies_within_half_a_cell_of_its_cells_centre(x_m in -9.0..9.0_f64, y_m in -9.0..9.0_f64) {
+            let geometry = GridGeometry { resolution_m: 0.3, origin: [-20, -25], n_rows: 45, n_cols: 41 };
+            if let Some(cell) = geometry.cell_at(x_m, y_m) {
+                let [centre_x_m, centre_y_m] = geometry.centre_m(cell);
+                prop_assert!((centre_x_m - x_m).abs() <= 0.15 + 1e-9 && (centre_y_m - y_m).abs() <= 0.15 + 1e-9);
+            } else {
+                let inside = (-6.0..6.3).contains(&x_m) && (-7.5..6.0).contains(&y_m);
+                prop_assert!(!inside);
+            }
+        }
+    }
+}

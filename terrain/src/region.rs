@@ -95,3 +95,56 @@ impl LatticeBounds {
         Some(CellRegion { rows: range(1, geometry.n_rows)?, cols: range(0, geometry.n_cols)? })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn window(origin: [i64; 2]) -> GridGeometry {
+        GridGeometry { resolution_m: 1.0, origin, n_rows: 3, n_cols: 4 }
+    }
+
+    #[test]
+    fn the_entered_cells_of_every_roll_are_included_and_a_plain_roll_adds_no_others() {
+        for (x, y) in (-6..=6).flat_map(|x| (-6..=6).map(move |y| (x, y))) {
+            let (old, new) = (window([0, 0]), window([x, y]));
+            let mut bounds = LatticeBounds::EMPTY;
+            bounds.include_entered(&old, &new);
+            let region = bounds.within(&new);
+            let mut n_entered = 0;
+            for cell in CellRegion::whole(&new).cells() {
+                let [x_m, y_m] = new.centre_m(cell);
+                let entered = old.cell_at(x_m, y_m).is_none();
+                n_entered += usize::from(entered);
+                let included =
+                    region.as_ref().is_some_and(|r| r.rows.contains(&cell.row) && r.cols.contains(&cell.col));
+                assert!(included || !entered, "shift {x}, {y}, cell {cell:?}");
+            }
+            if x == 0 || y == 0 {
+                assert_eq!(region.map_or(0, |r| r.n_cells()), n_entered, "shift {x}, {y}");
+            }
+        }
+    }
+
+    #[test]
+    fn bounds_are_cut_to_the_window() {
+        let mut bounds = LatticeBounds::EMPTY;
+        assert_eq!(bounds.within(&window([0, 0])), None);
+        bounds.include([-5, 1], [1, 9]);
+        assert_eq!(bounds.within(&window([0, 0])), Some(CellRegion { rows: 1..3, cols: 0..2 }));
+        assert_eq!(bounds.within(&window([2, 0])), None);
+        assert_eq!(bounds.within(&window([-9, -9])), None);
+        let mut joined = LatticeBounds::EMPTY;
+        joined.include_bounds(&LatticeBounds::EMPTY);
+        assert_eq!(joined, LatticeBounds::EMPTY);
+        joined.include_bounds(&bounds);
+        assert_eq!(joined, bounds);
+    }
+
+    #[test]
+    fn growing_stops_at_the_border() {
+        let region = CellRegion { rows: 1..2, cols: 3..4 };
+        assert_eq!(region.grown(1, &window([0, 0])), CellRegion { rows: 0..3, cols: 2..4 });
+        assert_eq!(region.grown(9, &window([0, 0])), CellRegion::whole(&window([0, 0])));
+    }
+}
