@@ -3,6 +3,7 @@
 //! Of `bicycle` this crate uses descriptions and the drive log, never the dynamics: the model never grades itself.
 
 mod arena;
+mod episode;
 mod friction;
 mod motion;
 mod plant;
@@ -12,9 +13,15 @@ mod sensor_imu;
 mod sensor_odometry;
 mod sensor_range;
 mod skyline;
+mod task;
+mod truth;
 mod world;
 
 pub use arena::{ARENA_GOAL_M, ARENA_START, ArenaConfig, ArenaError, arena};
+pub use episode::{
+    Episode, EpisodeConfig, EpisodeError, Fault, Observation, Outcome, Rules, SensorFault, TraceRow,
+    drive_log,
+};
 pub use friction::Stribeck;
 pub use motion::Motion;
 pub use plant::{CommandError, Plant, PlantError, WheelState};
@@ -24,4 +31,6 @@ pub use rock_field::{
 pub use sensor_imu::{IMU_PERIOD_NS, Imu, ImuConfig};
 pub use sensor_odometry::{OdometryConfig, OdometrySensor};
 pub use sensor_range::{RangeSensor, RangeSensorConfig, RangeSensorError};
+pub use task::{ROCK_FIELD_DISTANCE_M, Task};
+pub use truth::{Traversability, Truth};
 pub use world::{Bounds, Patch, World, WorldError};

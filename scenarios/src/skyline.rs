@@ -36,8 +36,8 @@ impl Skyline {
     /// `None` once it is beyond the world's border.
     pub(crate) fn free_flight_m(&self, point: &Point3<f64>, direction: &Vector3<f64>) -> Option<f64> {
         let (east_m, north_m) = (point.x - self.south_west_m[0], point.y - self.south_west_m[1]);
-        // A hair's breadth over the tile's edge, so that the next query is in the next tile.
-        let over_m = 1e-6 * self.resolution_m;
+        // Well over the tile's edge, so that rays along an edge get on; a tile's top holds half a cell beyond it.
+        let over_m = 0.4 * self.resolution_m;
         for tiles in [&self.coarse, &self.fine] {
             let (tile, top_m) = tiles.at(east_m, north_m)?;
             let exit_m = tiles.exit_m(tile, [east_m, north_m], direction) + over_m;

@@ -1,0 +1,64 @@
+//! The true traversability of a pose, by statics: how the vehicle stands there, and what slip it takes to move on.
+//!
+//! The plant's dynamics are the reference; this is its quasi-static limit, cheap enough to be asked a million times
+//! for one map, as the upper bound that no learned or assumed traversability can beat.
+
+mod obstacles;
+mod stand;
+mod traction;
+
+use std::sync::Arc;
+
+use bicycle::Vehicle;
+
+use crate::World;
+use obstacles::ObstacleCount;
+use stand::Statics;
+
+/// What the ground does to a vehicle at one pose.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Traversability {
+    /// Achieved horizontal speed over the commanded one, driving forward at the vehicle's top speed, in [0, 1].
+    pub linear_traction: f64,
+    /// Achieved yaw rate over the commanded one, in [0, 1].
+    pub angular_traction: f64,
+    /// Roll, > 0 lifts the left side [rad].
+    pub roll_rad: f64,
+    /// Pitch, > 0 lowers the nose [rad].
+    pub pitch_rad: f64,
+    /// Whether the body or a wheel touches an obstacle or stands in water; traction is zero then.
+    pub is_blocked: bool,
+}
+
+/// A vehicle on the true ground.
+#[derive(Clone, Debug)]
+pub struct Truth {
+    world: Arc<World>,
+    statics: Statics,
+    obstacles: ObstacleCount,
+}
+
+impl Truth {
+    /// Puts a vehicle into a world. The vehicle is taken as validated.
+    pub fn new(vehicle: &Vehicle, world: Arc<World>) -> Self {
+        Self { statics: Statics::new(vehicle), obstacles: ObstacleCount::of(&world), world }
+    }
+
+    /// Traversability with the rear axle's centre above (`x_m`, `y_m`).
+    pub fn traversability(&self, x_m: f64, y_m: f64, yaw_rad: f64) -> Traversability {
+        let stand = self.statics.stand(&self.world, x_m, y_m, yaw_rad);
+        let (pitch_rad, roll_rad) = (stand.pitch_rad(), stand.roll_rad());
+        if self.obstacles.touches(&self.world, &self.statics.vehicle.geometry, [x_m, y_m, yaw_rad]) {
+            let (linear_traction, angular_traction) = (0.0, 0.0);
+            return Traversability {
+                linear_traction,
+                angular_traction,
+                roll_rad,
+                pitch_rad,
+                is_blocked: true,
+            };
+        }
+        let [linear_traction, angular_traction] = self.statics.traction(&stand);
+        Traversability { linear_traction, angular_traction, roll_rad, pitch_rad, is_blocked: false }
+    }
+}

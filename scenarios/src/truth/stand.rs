@@ -1,0 +1,367 @@
+//! How a vehicle stands: equilibrium of the sprung body on four wheels, and on its belly where it hangs up.
+
+use bicycle::{Axle, Vehicle};
+use nalgebra::{Matrix3, Vector3};
+
+use crate::{Patch, World};
+
+/// Acceleration of gravity [m/s2].
+pub(super) const GRAVITY_MPS2: f64 = 9.81;
+
+/// Places along a wheel where the ground is taken, over its radius.
+const STATIONS: [f64; 9] = [-0.95, -0.75, -0.5, -0.25, 0.0, 0.25, 0.5, 0.75, 0.95];
+/// Depth of the rim below the hub at these places, over the radius: sqrt(1 - station^2).
+const RIM: [f64; 9] = [0.312, 0.661, 0.866, 0.968, 1.0, 0.968, 0.866, 0.661, 0.312];
+/// Where the body's underside is compared with the ground: over the wheelbase, and over the width.
+const BELLY_ALONG: [f64; 5] = [0.1, 0.3, 0.5, 0.7, 0.9];
+const BELLY_ACROSS: [f64; 3] = [-0.45, 0.0, 0.45];
+/// Stiffness of the travel stops over that of the spring [-].
+const STOP_RATIO: f64 = 10.0;
+/// Stiffness of the belly over that of a wheel [-].
+const BELLY_RATIO: f64 = 20.0;
+/// A lifted wheel keeps this share of its stiffness, so that the balance stays solvable [-].
+const LIFTED_SHARE: f64 = 1e-3;
+/// Largest sine of roll or pitch: whoever stands steeper has fallen over [-].
+const SINE_MAX: f64 = 0.9;
+
+/// Force of one wheel over the height of the ground at its hub: straight pieces with kinks at the travel's ends.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct WheelSpring {
+    rest_n: f64,
+    stiffness_n_per_m: f64,
+    /// Rise at which the travel ends [m], and the stiffness beyond.
+    stop_m: f64,
+    stop_n_per_m: f64,
+}
+
+/// A vehicle reduced to what statics need. Wheels in the order front left, front right, rear left, rear right.
+#[derive(Clone, Debug)]
+pub(super) struct Statics {
+    pub(super) vehicle: Vehicle,
+    pub(super) weight_n: f64,
+    /// Wheels ahead of the rear axle and left of the middle [m].
+    pub(super) wheel_m: [[f64; 2]; 4],
+    springs: [WheelSpring; 4],
+    /// Anti-roll force per difference of the ground's height between left and right [N/m], front and rear.
+    anti_roll_n_per_m: [f64; 2],
+    cog_ahead_m: f64,
+    cog_height_m: f64,
+    /// Hub above the ground under the static load [m].
+    hub_height_m: f64,
+    underside: Vec<Underside>,
+}
+
+/// The vehicle at rest at a pose.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Stand {
+    /// Height of the rear axle's centre [m].
+    pub axle_m: f64,
+    /// Sine of the pitch.
+    pub pitch_sine: f64,
+    /// Rise of the body's left axis: sin(roll) cos(pitch).
+    pub left_rise: f64,
+    /// Vertical load of each wheel [N].
+    pub load_n: [f64; 4],
+    /// Rise of the ground under each wheel along the heading [-].
+    pub slope: [f64; 4],
+    /// Ground under each wheel.
+    pub patch: [Patch; 4],
+    /// Load on the belly [N], and the ground's rise there along the heading [-].
+    pub belly_n: f64,
+    pub belly_slope: f64,
+}
+
+impl Stand {
+    pub(super) fn pitch_rad(&self) -> f64 {
+        self.pitch_sine.asin()
+    }
+
+    pub(super) fn roll_rad(&self) -> f64 {
+        (self.left_rise / self.pitch_cosine()).clamp(-1.0, 1.0).asin()
+    }
+
+    pub(super) fn pitch_cosine(&self) -> f64 {
+        (1.0 - self.pitch_sine * self.pitch_sine).sqrt()
+    }
+
+    /// Upward share of the body's upward axis: cos(roll) cos(pitch).
+    fn upright(&self) -> f64 {
+        (1.0 - self.pitch_sine * self.pitch_sine - self.left_rise * self.left_rise).max(0.05).sqrt()
+    }
+}
+
+/// A place to ask the ground from: position and heading.
+#[derive(Clone, Copy)]
+struct Place {
+    x_m: f64,
+    y_m: f64,
+    cos: f64,
+    sin: f64,
+}
+
+impl Place {
+    fn at(&self, ahead_m: f64, left_m: f64) -> [f64; 2] {
+        [self.x_m + self.cos * ahead_m - self.sin * left_m, self.y_m + self.sin * ahead_m + self.cos * left_m]
+    }
+}
+
+/// The highest point of the belly's contact with the ground.
+#[derive(Clone, Copy)]
+struct BellyContact {
+    at_m: [f64; 2],
+    /// Height at which the hub plane would just touch [m].
+    touch_m: f64,
+    depth_m: f64,
+}
+
+/// A point of the body's underside.
+#[derive(Clone, Copy, Debug)]
+struct Underside {
+    /// Ahead of the rear axle and left of the middle [m].
+    at_m: [f64; 2],
+    /// Below the hubs' plane [m].
+    below_m: f64,
+}
+
+/// The belly between the axles; what hangs over front and rear ends at hub height, out of the ground's way.
+fn underside(vehicle: &Vehicle, hub_height_m: f64) -> Vec<Underside> {
+    let geometry = &vehicle.geometry;
+    let belly_m = hub_height_m - geometry.ground_clearance_m;
+    let ends = [-geometry.rear_overhang_m, geometry.length_m - geometry.rear_overhang_m];
+    let places = BELLY_ALONG.map(|along| (along * geometry.wheelbase_m, belly_m));
+    let bumpers = ends.map(|ahead_m| (ahead_m, belly_m.min(0.0)));
+    places
+        .into_iter()
+        .chain(bumpers)
+        .flat_map(|(ahead_m, below_m)| {
+            BELLY_ACROSS.map(|across| Underside { at_m: [ahead_m, across * geometry.width_m], below_m })
+        })
+        .collect()
+}
+
+impl WheelSpring {
+    fn new(axle: &Axle, tyre_n_per_m: f64, rest_n: f64) -> Self {
+        let strut = &axle.suspension;
+        let in_series = |strut_n_per_m: f64| strut_n_per_m * tyre_n_per_m / (strut_n_per_m + tyre_n_per_m);
+        Self {
+            rest_n,
+            stiffness_n_per_m: in_series(strut.stiffness_n_per_m),
+            stop_m: strut.travel_m * (1.0 + strut.stiffness_n_per_m / tyre_n_per_m),
+            stop_n_per_m: in_series((1.0 + STOP_RATIO) * strut.stiffness_n_per_m),
+        }
+    }
+
+    /// Force and stiffness when the ground is `rise_m` higher than at rest.
+    #[inline]
+    fn at(&self, rise_m: f64) -> [f64; 2] {
+        let beyond_m = (rise_m - self.stop_m).max(0.0);
+        let force_n =
+            self.rest_n + self.stiffness_n_per_m * (rise_m - beyond_m) + self.stop_n_per_m * beyond_m;
+        if force_n <= 0.0 {
+            return [0.0, LIFTED_SHARE * self.stiffness_n_per_m];
+        }
+        [force_n, if beyond_m > 0.0 { self.stop_n_per_m } else { self.stiffness_n_per_m }]
+    }
+}
+
+impl Statics {
+    pub(super) fn new(vehicle: &Vehicle) -> Self {
+        let (geometry, body, wheel) = (&vehicle.geometry, &vehicle.body, &vehicle.wheel);
+        let wheels_kg = 4.0 * wheel.mass_kg;
+        let mass_kg = body.mass_kg + wheels_kg;
+        let mean = |of_body: f64, of_wheels: f64| (body.mass_kg * of_body + wheels_kg * of_wheels) / mass_kg;
+        let cog_ahead_m = mean(body.cog_ahead_m, 0.5 * geometry.wheelbase_m);
+        let weight_n = mass_kg * GRAVITY_MPS2;
+        let front_n = 0.5 * weight_n * cog_ahead_m / geometry.wheelbase_m;
+        let rear_n = 0.5 * weight_n - front_n;
+        let tyre_n_per_m = vehicle.tyre.radial_stiffness_n_per_m;
+        let front = WheelSpring::new(&vehicle.front, tyre_n_per_m, front_n);
+        let rear = WheelSpring::new(&vehicle.rear, tyre_n_per_m, rear_n);
+        let half_m = 0.5 * geometry.track_m;
+        let hub_height_m = geometry.wheel_radius_m - 0.25 * weight_n / tyre_n_per_m;
+        let anti_roll = |axle: &Axle| axle.anti_roll_nm_per_rad / (geometry.track_m * geometry.track_m);
+        Self {
+            weight_n,
+            wheel_m: [
+                [geometry.wheelbase_m, half_m],
+                [geometry.wheelbase_m, -half_m],
+                [0.0, half_m],
+                [0.0, -half_m],
+            ],
+            springs: [front, front, rear, rear],
+            anti_roll_n_per_m: [anti_roll(&vehicle.front), anti_roll(&vehicle.rear)],
+            cog_ahead_m,
+            cog_height_m: mean(body.cog_height_m, geometry.wheel_radius_m),
+            hub_height_m,
+            underside: underside(vehicle, hub_height_m),
+            vehicle: vehicle.clone(),
+        }
+    }
+
+    /// Static load of the front axle [N].
+    pub(super) fn front_rest_n(&self) -> f64 {
+        2.0 * self.springs[0].rest_n
+    }
+
+    /// Finds the equilibrium with the rear axle's centre above a point of the map.
+    pub(super) fn stand(&self, world: &World, x_m: f64, y_m: f64, yaw_rad: f64) -> Stand {
+        let (sin, cos) = yaw_rad.sin_cos();
+        let place = Place { x_m, y_m, cos, sin };
+        let mut stand = self.first_guess(world, &place);
+        // Where the wheels touch depends on the attitude and the attitude on where they touch: twice suffices.
+        for _ in 0..2 {
+            let ground_m = self.wheels_on_ground(world, &place, &mut stand);
+            self.balance(&ground_m, None, &mut stand);
+            if let Some(belly) = self.belly_contact(world, &place, &stand) {
+                self.balance(&ground_m, Some(&belly), &mut stand);
+                let [x_m, y_m] = place.at(belly.at_m[0], belly.at_m[1]);
+                let [east, north] = world.gradient(x_m, y_m);
+                stand.belly_slope = place.cos * east + place.sin * north;
+            }
+        }
+        stand
+    }
+
+    /// The plane through the ground's heights below the wheels.
+    fn first_guess(&self, world: &World, place: &Place) -> Stand {
+        let height_m = self.wheel_m.map(|[ahead_m, left_m]| {
+            let [x_m, y_m] = place.at(ahead_m, left_m);
+            world.height_m(x_m, y_m)
+        });
+        let geometry = &self.vehicle.geometry;
+        let [front_left, front_right, rear_left, rear_right] = height_m;
+        let pitch = 0.5 * (rear_left + rear_right - front_left - front_right) / geometry.wheelbase_m;
+        let roll = 0.5 * (front_left + rear_left - front_right - rear_right) / geometry.track_m;
+        Stand {
+            axle_m: 0.5 * (rear_left + rear_right) + self.hub_height_m,
+            pitch_sine: pitch / pitch.hypot(1.0),
+            left_rise: roll / roll.hypot(1.0),
+            load_n: self.springs.map(|spring| spring.rest_n),
+            slope: [0.0; 4],
+            patch: [*world.patch(place.x_m, place.y_m); 4],
+            belly_n: 0.0,
+            belly_slope: 0.0,
+        }
+    }
+
+    /// Height of each hub on its ground, unloaded tyre less static deflection, for wheels tilted as `stand` is [m].
+    fn wheels_on_ground(&self, world: &World, place: &Place, stand: &mut Stand) -> [f64; 4] {
+        let upright = stand.upright();
+        let (pitch_cosine, radius_m) = (stand.pitch_cosine(), self.vehicle.geometry.wheel_radius_m);
+        let roll_cosine = upright / pitch_cosine;
+        let roll_sine = stand.left_rise / pitch_cosine;
+        let sunk_m = (radius_m - self.hub_height_m) * upright;
+        std::array::from_fn(|i| {
+            let [ahead_m, left_m] = self.wheel_m[i];
+            // The hub's place, and the foot of a wheel that leans out of the vertical by the roll.
+            let hub_ahead_m = pitch_cosine * ahead_m + roll_sine * stand.pitch_sine * left_m;
+            let foot_left_m = roll_cosine * left_m + roll_sine * radius_m;
+            let contact = self.rim_contact(world, place, [hub_ahead_m, foot_left_m], roll_cosine);
+            stand.slope[i] = contact[1];
+            let [x_m, y_m] = place.at(hub_ahead_m + contact[2], foot_left_m);
+            stand.patch[i] = *world.patch(x_m, y_m);
+            contact[0] - sunk_m
+        })
+    }
+
+    /// Height of the hub of an unloaded wheel on the ground, the ground's rise at the contact, and how far the contact
+    /// is ahead of the hub.
+    fn rim_contact(&self, world: &World, place: &Place, [ahead_m, left_m]: [f64; 2], lean: f64) -> [f64; 3] {
+        let radius_m = self.vehicle.geometry.wheel_radius_m;
+        let side_m = 0.3 * self.vehicle.wheel.width_m;
+        let mut hub_m = [0.0; 9];
+        for (k, hub_m) in hub_m.iter_mut().enumerate() {
+            let station_m = ahead_m + STATIONS[k] * radius_m;
+            let [left, right] = [left_m + side_m, left_m - side_m].map(|left_m| {
+                let [x_m, y_m] = place.at(station_m, left_m);
+                world.height_m(x_m, y_m)
+            });
+            // A tread half on a step is carried by the higher half, but sinks in a little.
+            *hub_m = 0.7 * left.max(right) + 0.3 * left.min(right) + RIM[k] * radius_m * lean;
+        }
+        let best = (0..9).fold(4, |best, k| if hub_m[k] > hub_m[best] { k } else { best });
+        let station = between_stations(&hub_m, best).clamp(-0.95, 0.95);
+        [hub_m[best], station / (1.0 - station * station).sqrt(), station * radius_m]
+    }
+
+    /// Newton's iteration on heave, pitch and roll until springs and gravity balance.
+    fn balance(&self, ground_m: &[f64; 4], belly: Option<&BellyContact>, stand: &mut Stand) {
+        for _ in 0..12 {
+            let upright = stand.upright();
+            let (mut balance, mut stiffness) = (Vector3::zeros(), Matrix3::zeros());
+            let mut push = |at: [f64; 2], [force_n, n_per_m]: [f64; 2]| {
+                let arm = Vector3::new(1.0, at[0], at[1]);
+                balance += arm * force_n;
+                stiffness += arm * Vector3::new(-1.0, at[0], -at[1]).transpose() * (n_per_m * upright);
+                force_n
+            };
+            let rises_m: [f64; 4] =
+                std::array::from_fn(|i| (ground_m[i] - self.plane_m(stand, self.wheel_m[i])) * upright);
+            for i in 0..4 {
+                let (other, sign) = (i ^ 1, if i % 2 == 0 { 1.0 } else { -1.0 });
+                let law = self.springs[i].at(rises_m[i]);
+                let anti_roll_n = self.anti_roll_n_per_m[i / 2] * (rises_m[i & !1] - rises_m[i | 1]) * sign;
+                let carries = law[0] > 0.0 && self.springs[other].at(rises_m[other])[0] > 0.0;
+                let bar_n = if carries { anti_roll_n.max(-law[0]) } else { 0.0 };
+                stand.load_n[i] = push(self.wheel_m[i], [law[0] + bar_n, law[1]]);
+            }
+            stand.belly_n = belly.map_or(0.0, |belly| {
+                let depth_m = (belly.touch_m - self.plane_m(stand, belly.at_m)) * upright;
+                let n_per_m = BELLY_RATIO * self.springs[0].stiffness_n_per_m;
+                push(belly.at_m, if depth_m > 0.0 { [n_per_m * depth_m, n_per_m] } else { [0.0, 0.0] })
+            });
+            // Gravity, and the friction at the contacts that holds the body on the slope.
+            let tipping_nm = self.weight_n * self.cog_height_m;
+            balance -= Vector3::new(
+                self.weight_n * upright,
+                self.weight_n * self.cog_ahead_m * upright + tipping_nm * stand.pitch_sine,
+                -tipping_nm * stand.left_rise,
+            );
+            stiffness[(1, 1)] -= tipping_nm;
+            stiffness[(2, 2)] += tipping_nm;
+            let Some(step) = stiffness.lu().solve(&balance) else { return };
+            stand.axle_m -= step[0];
+            stand.pitch_sine = (stand.pitch_sine - step[1]).clamp(-SINE_MAX, SINE_MAX);
+            stand.left_rise = (stand.left_rise - step[2]).clamp(-SINE_MAX, SINE_MAX);
+            if balance[0].abs() < 1e-3 * self.weight_n && step.norm() < 1e-4 {
+                return;
+            }
+        }
+    }
+
+    /// Height of the hubs' plane above a point of the body [m].
+    #[inline]
+    fn plane_m(&self, stand: &Stand, [ahead_m, left_m]: [f64; 2]) -> f64 {
+        stand.axle_m - ahead_m * stand.pitch_sine + left_m * stand.left_rise
+    }
+
+    /// Where the ground reaches deepest into the body.
+    fn belly_contact(&self, world: &World, place: &Place, stand: &Stand) -> Option<BellyContact> {
+        let upright = stand.upright();
+        let pitch_cosine = stand.pitch_cosine();
+        let mut deepest: Option<BellyContact> = None;
+        for &Underside { at_m, below_m } in &self.underside {
+            let [x_m, y_m] = place.at(at_m[0] * pitch_cosine, at_m[1] * upright / pitch_cosine);
+            let touch_m = world.height_m(x_m, y_m) + below_m * upright;
+            let depth_m = touch_m - self.plane_m(stand, at_m);
+            if depth_m > deepest.map_or(0.0, |deepest| deepest.depth_m) {
+                deepest = Some(BellyContact { at_m, touch_m, depth_m });
+            }
+        }
+        deepest
+    }
+}
+
+/// Place of the maximum of the parabola through a station and its neighbours, over the radius.
+fn between_stations(value: &[f64; 9], best: usize) -> f64 {
+    if best == 0 || best == 8 {
+        return STATIONS[best];
+    }
+    let (before, after) = (STATIONS[best] - STATIONS[best - 1], STATIONS[best + 1] - STATIONS[best]);
+    let (fall_before, fall_after) = (value[best] - value[best - 1], value[best] - value[best + 1]);
+    let curvature = fall_before * after + fall_after * before;
+    if curvature <= 0.0 {
+        return STATIONS[best];
+    }
+    STATIONS[best] + 0.5 * (fall_before * after * after - fall_after * before * before) / curvature
+}

@@ -1,0 +1,272 @@
+//! Outcomes of episodes on constructed grounds, the stepwise interface, faults.
+
+#[allow(dead_code)]
+mod plant_machines;
+
+use std::ops::ControlFlow;
+use std::sync::Arc;
+
+use bicycle::{Column, Command, Decision, HoldReason, StopReason, Vehicle};
+use plant_machines::rc_car;
+use scenarios::{
+    ArenaConfig, Episode, EpisodeConfig, Fault, Observation, OdometryConfig, Outcome, Patch, RockFieldConfig,
+    SensorFault, Stribeck, Task, World, drive_log,
+};
+use terrain::GridGeometry;
+
+const CRUISE: Decision = Decision::Drive(Command { speed_mps: 1.0, steering_rad: 0.0 });
+
+/// A strip of ground 20 m long for the RC car, start at x = 2, goal at x = 18.
+fn strip(height_m: impl Fn(f64) -> f64, patch: impl Fn(f64) -> Patch) -> Task {
+    let geometry = GridGeometry { resolution_m: 0.05, origin: [0, 0], n_rows: 80, n_cols: 400 };
+    let world = World::from_fn("strip", geometry, |x, _| height_m(x), |x, _| patch(x)).unwrap();
+    Task::in_world(Arc::new(world), [2.0, 2.0, 0.0], [18.0, 2.0], 0.2)
+}
+
+fn flat() -> Task {
+    strip(|_| 0.0, |_| Patch::open(Stribeck::ASPHALT))
+}
+
+fn blind(vehicle: &Vehicle) -> EpisodeConfig {
+    EpisodeConfig { range_sensor: None, ..EpisodeConfig::for_vehicle(vehicle) }
+}
+
+fn episode(task: Task) -> Episode {
+    Episode::new(task, &rc_car(), blind(&rc_car()), 1).unwrap()
+}
+
+fn outcome(task: Task, decision: Decision) -> (Outcome, Episode) {
+    let mut episode = episode(task);
+    let outcome = episode.run(|_| decision, |_| ControlFlow::Continue(())).unwrap();
+    (outcome, episode)
+}
+
+#[test]
+fn straight_over_flat_ground_reaches_the_goal_in_distance_over_speed() {
+    let (outcome, episode) = outcome(flat(), CRUISE);
+    assert_eq!(outcome, Outcome::Goal);
+    // 15.8 m at 1 m/s, 0.2 s to get there at 2.5 m/s2, a few per cent of slip.
+    assert!((15.8..17.0).contains(&episode.time_s()), "{}", episode.time_s());
+    assert!((episode.path_length_m() - 15.8).abs() < 0.1, "{}", episode.path_length_m());
+    assert_eq!(episode.trace().len() as u64, episode.n_cycles());
+}
+
+#[test]
+fn starting_at_the_goal_is_being_there() {
+    let task = Task { goal_m: [2.1, 2.0], ..flat() };
+    assert_eq!(episode(task).outcome(), Some(Outcome::Goal));
+}
+
+#[test]
+fn a_command_of_zero_is_stuck_after_five_seconds() {
+    let (outcome, episode) = outcome(flat(), Decision::Drive(Command::default()));
+    assert_eq!(outcome, Outcome::Stuck);
+    assert!((episode.time_s() - 5.0).abs() < 0.11, "{}", episode.time_s());
+}
+
+#[test]
+fn a_hold_is_stuck_too_and_a_stop_is_stopped() {
+    assert_eq!(outcome(flat(), Decision::Hold(HoldReason::NoMap)).0, Outcome::Stuck);
+    let (stopped, episode) = outcome(flat(), Decision::Stop(StopReason::StaleScan));
+    assert_eq!(stopped, Outcome::Stopped);
+    assert!((episode.time_s() - 4.0).abs() < 0.11, "{}", episode.time_s());
+}
+
+#[test]
+fn stops_that_come_and_go_do_not_end_a_drive() {
+    let mut episode = episode(flat());
+    let decide = |observation: &Observation| {
+        let second = observation.valid_at_ns / 1_000_000_000;
+        if second % 4 == 3 { Decision::Stop(StopReason::StaleScan) } else { CRUISE }
+    };
+    let outcome = episode.run(decide, |_| ControlFlow::Continue(())).unwrap();
+    assert_eq!(outcome, Outcome::Goal);
+}
+
+#[test]
+fn driving_up_a_wall_of_45_degrees_breaks_the_limit_and_a_cliff_rolls_over() {
+    // The RC car's pitch limit is 45 degrees; 50 degrees are steeper, and momentum carries it up a step of 0.3 m.
+    let mut vehicle = rc_car();
+    vehicle.limits.pitch_max_rad = 0.4;
+    let ramp = strip(|x| (x - 6.0).clamp(0.0, 3.0) * 0.5, |_| Patch::open(Stribeck::ASPHALT));
+    let mut up = Episode::new(ramp, &vehicle, blind(&vehicle), 1).unwrap();
+    assert_eq!(up.run(|_| CRUISE, |_| ControlFlow::Continue(())).unwrap(), Outcome::AttitudeLimit);
+    // tan(0.46) = 0.5: it broke the limit of 0.4 rad on the slope, front wheels first at x = 6 - 0.18 m.
+    assert!((5.7..6.3).contains(&up.motion().pose.x_m), "{}", up.motion().pose.x_m);
+
+    let cliff = strip(|x| if x < 6.0 { 2.0 } else { 0.0 }, |_| Patch::open(Stribeck::ASPHALT));
+    assert_eq!(outcome(cliff, CRUISE).0, Outcome::RolledOver);
+}
+
+#[test]
+fn a_slope_too_steep_for_the_friction_is_stuck_and_bushes_too_tall_are() {
+    // Ice holds up to 0.4: a slope of 0.5 does not let go up.
+    let icy = strip(
+        |x| (x - 6.0).max(0.0) * 0.5,
+        |x| if x > 5.0 { Patch::open(Stribeck::ICE) } else { Patch::open(Stribeck::ASPHALT) },
+    );
+    assert_eq!(outcome(icy, CRUISE).0, Outcome::Stuck);
+    let bushes = strip(
+        |_| 0.0,
+        |x| {
+            if x > 6.0 { Patch::open(Stribeck::GRASS).overgrown(0.4) } else { Patch::open(Stribeck::ASPHALT) }
+        },
+    );
+    assert_eq!(outcome(bushes, CRUISE).0, Outcome::Stuck);
+}
+
+#[test]
+fn leaving_the_bounds_ends_it_even_where_the_world_goes_on() {
+    let mut task = flat();
+    task.bounds.north_east_m[0] = 10.0;
+    let (outcome, episode) = outcome(task, CRUISE);
+    assert_eq!(outcome, Outcome::OutOfBounds);
+    assert!((episode.motion().pose.x_m - 10.0).abs() < 0.02);
+}
+
+#[test]
+fn circling_runs_out_of_time() {
+    let mut config = blind(&rc_car());
+    config.rules.time_limit_s = 20.0;
+    let mut episode = Episode::new(flat(), &rc_car(), config, 1).unwrap();
+    let circle = Decision::Drive(Command { speed_mps: 0.5, steering_rad: 0.5 });
+    assert_eq!(episode.run(|_| circle, |_| ControlFlow::Continue(())).unwrap(), Outcome::Timeout);
+    assert!((episode.time_s() - 20.0).abs() < 0.006);
+}
+
+#[test]
+fn breaking_off_ends_as_stopped_and_nothing_goes_on_after_the_end() {
+    let mut episode = episode(flat());
+    let until_two_seconds = |episode: &Episode| {
+        if episode.time_s() > 2.0 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    };
+    assert_eq!(episode.run(|_| CRUISE, until_two_seconds).unwrap(), Outcome::Stopped);
+    let time_s = episode.time_s();
+    episode.apply(&CRUISE).unwrap();
+    assert_eq!(episode.time_s(), time_s);
+}
+
+#[test]
+fn a_command_that_is_no_number_is_refused() {
+    let bad = Decision::Drive(Command { speed_mps: f32::NAN, steering_rad: 0.0 });
+    assert!(episode(flat()).apply(&bad).is_err());
+}
+
+#[test]
+fn step_by_step_is_the_same_as_run_and_repeats_bit_for_bit() {
+    let task = || Task::arena(&ArenaConfig::default()).unwrap();
+    let wiggle = |observation: &Observation| {
+        let steering_rad = (0.3 * (observation.valid_at_ns as f64 * 1e-9).sin()) as f32;
+        Decision::Drive(Command { speed_mps: 0.8, steering_rad })
+    };
+    let seen = |run_whole: bool| {
+        let config = EpisodeConfig::for_vehicle(&rc_car());
+        let mut episode = Episode::new(task(), &rc_car(), config, 4).unwrap();
+        let mut observations = Vec::new();
+        if run_whole {
+            let keep = |episode: &Episode| {
+                observations.push(format!("{:?}", episode.observe()));
+                if episode.time_s() > 2.0 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+            };
+            episode.run(wiggle, keep).unwrap();
+        } else {
+            while episode.time_s() <= 2.0 && episode.outcome().is_none() {
+                let decision = wiggle(episode.observe());
+                episode.apply(&decision).unwrap();
+                observations.push(format!("{:?}", episode.observe()));
+            }
+        }
+        (observations, format!("{:?}", episode.trace()))
+    };
+    let whole = seen(true);
+    assert_eq!(whole, seen(false));
+    assert!(whole.0.len() > 20);
+}
+
+#[test]
+fn observations_come_at_their_rates() {
+    let mut episode = Episode::new(flat(), &rc_car(), EpisodeConfig::for_vehicle(&rc_car()), 1).unwrap();
+    assert!(episode.observe().scan.is_some() && episode.observe().imu.is_empty());
+    for cycle in 1..=10_u64 {
+        episode.apply(&CRUISE).unwrap();
+        let Observation { valid_at_ns, odometry, imu, scan } = episode.observe();
+        assert_eq!(*valid_at_ns, cycle * 100_000_000);
+        assert_eq!(odometry.valid_at_ns, *valid_at_ns);
+        assert_eq!(imu.len(), 20);
+        assert_eq!(imu.last().unwrap().valid_at_ns, *valid_at_ns);
+        assert_eq!(scan.is_some(), cycle % 2 == 0);
+        assert!(scan.as_ref().is_none_or(|scan| scan.valid_at_ns == *valid_at_ns));
+    }
+}
+
+/// Observations of three seconds of cruising with a fault from second 1 to second 2.
+fn with_fault(sensor: SensorFault) -> Vec<Observation> {
+    let mut config = EpisodeConfig::for_vehicle(&rc_car());
+    config.odometry = OdometryConfig::PERFECT;
+    config.faults = vec![Fault { sensor, from_s: 1.0, until_s: 2.0 }];
+    let mut episode = Episode::new(flat(), &rc_car(), config, 1).unwrap();
+    let mut observations = Vec::new();
+    for _ in 0..30 {
+        episode.apply(&CRUISE).unwrap();
+        observations.push(episode.observe().clone());
+    }
+    observations
+}
+
+#[test]
+fn faults_come_and_go_on_time() {
+    // Observation k is of time (k + 1) / 10 s: the fault is on for k = 9 to 18.
+    let x_m = |o: &Observation| o.odometry.position_m[0];
+    let jumped = with_fault(SensorFault::PoseJump([1.0, 0.0]));
+    assert!(x_m(&jumped[9]) - x_m(&jumped[8]) > 1.0 && x_m(&jumped[19]) - x_m(&jumped[18]) < -0.8);
+
+    let frozen = with_fault(SensorFault::FrozenOdometry);
+    assert_eq!(x_m(&frozen[9]), x_m(&frozen[18]));
+    assert_eq!(x_m(&frozen[8]), x_m(&frozen[18]));
+    assert!(frozen[18].odometry.valid_at_ns > frozen[9].odometry.valid_at_ns);
+    assert!(frozen[18].odometry.wheel_speed_mps > 0.9);
+    assert!(x_m(&frozen[19]) > x_m(&frozen[18]) + 0.5);
+
+    let silent = with_fault(SensorFault::SilentOdometry);
+    assert_eq!(silent[18].odometry.valid_at_ns, silent[8].odometry.valid_at_ns);
+
+    let n_bad = |o: &Observation| {
+        let scan = o.scan.as_ref().unwrap();
+        scan.points.iter().filter(|p| p.position_m.iter().any(|v| !v.is_finite())).count() * 3
+            / scan.points.len()
+    };
+    let non_finite = with_fault(SensorFault::NonFinitePoints);
+    assert_eq!((n_bad(&non_finite[7]), n_bad(&non_finite[11]), n_bad(&non_finite[21])), (0, 1, 0));
+
+    let empty = with_fault(SensorFault::EmptyScan);
+    assert!(empty[11].scan.as_ref().unwrap().points.is_empty());
+    assert!(with_fault(SensorFault::MissingScan)[11].scan.is_none());
+    assert!(!with_fault(SensorFault::NonFiniteOdometry)[11].odometry.is_finite());
+}
+
+#[test]
+fn the_trace_is_a_drive_log() {
+    let mut episode = episode(flat());
+    for _ in 0..10 {
+        episode.apply(&CRUISE).unwrap();
+    }
+    let log = drive_log(episode.trace(), "run").unwrap();
+    let run = log.runs().next().unwrap();
+    assert_eq!(run.time_s().len(), 10);
+    assert_eq!(run.column(Column::CmdSpeed).unwrap()[3], 1.0);
+    assert!((run.column(Column::X).unwrap()[0] - 2.0).abs() < 1e-6);
+    assert!(run.column(Column::Vx).unwrap()[9] > 0.9);
+}
+
+#[test]
+fn the_default_drive_starts_40_m_from_its_goal_heading_for_it() {
+    for seed in 0..5 {
+        let task = Task::rock_field(&RockFieldConfig::default(), seed).unwrap();
+        let [x_m, y_m, yaw_rad] = task.start;
+        assert!((task.distance_to_goal_m(x_m, y_m) - 40.0).abs() < 1e-9);
+        let ahead_m = [x_m + 40.0 * yaw_rad.cos(), y_m + 40.0 * yaw_rad.sin()];
+        assert!(task.distance_to_goal_m(ahead_m[0], ahead_m[1]) < 1e-9);
+        // The body reaches 3 m ahead of the rear axle and a start may lie 5 m from the border.
+        assert!([x_m, y_m, task.goal_m[0], task.goal_m[1]].iter().all(|v| (4.9..45.1).contains(v)));
+    }
+}
