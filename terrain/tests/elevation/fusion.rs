@@ -1,8 +1,6 @@
 //! What many noisy points make of one cell: heights, variances, classes, plants, obstacles, bad input.
 
-mod points;
-
-use points::{all_centres, plain_config, plain_map, scan_of};
+use crate::points::{all_centres, plain_config, plain_map, scan_of};
 use rand::SeedableRng;
 use rand_distr::{Distribution, Normal};
 use rand_xoshiro::Xoshiro256PlusPlus;

@@ -1,8 +1,6 @@
 //! The window rolls, is re-anchored, seeded and tells what changed.
 
-mod points;
-
-use points::{plain_config, scan_of};
+use crate::points::{plain_config, scan_of};
 use proptest::prelude::*;
 use terrain::TerrainClass::{Obstacle, Open, Vegetation};
 use terrain::{

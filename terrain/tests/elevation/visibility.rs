@@ -1,8 +1,6 @@
 //! What a ranging sensor cannot see stays unknown, and what its rays refute goes: shadows, ditches, drops, ghosts.
 
-mod lidar;
-
-use lidar::{Lidar, pose_at};
+use crate::lidar::{Lidar, pose_at};
 use terrain::TerrainClass::{Obstacle, Open};
 use terrain::{Cell, ElevationConfig, ElevationMap, Knowledge, Pose, SurfaceCell, TerrainClass};
 
