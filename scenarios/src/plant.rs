@@ -86,11 +86,13 @@ pub struct CommandError {
 pub struct WheelState {
     /// Normal force of the ground, zero in the air [N].
     pub load_n: f64,
+    /// Normal and friction force of the ground on it, in the map frame [N].
+    pub force_n: [f64; 3],
     /// Centre of its contact in the map frame, if it touches the ground [m].
     pub contact_m: Option<[f64; 3]>,
     /// Hub in the map frame [m].
     pub hub_m: [f64; 3],
-    /// Circumferential speed of the unloaded radius [m/s].
+    /// Circumferential speed [m/s].
     pub speed_mps: f64,
     /// Travel of the strut from rest, upwards [m].
     pub travel_m: f64,
@@ -109,7 +111,7 @@ pub struct Plant {
     servo: SteeringServo,
     queue: DelayQueue,
     limits: bicycle::Limits,
-    radius_m: f64,
+    rolling_radius_m: f64,
     command: Command,
     motion: BodyMotion,
     specific_force_mps2: Vector3<f64>,
@@ -157,11 +159,11 @@ impl Plant {
                 Strut::new(axles[i / 2].suspension, rest.load_n[i], vehicle.wheel.mass_kg)
             }),
             anti_roll_n_per_m: axles.map(|axle| axle.anti_roll_nm_per_rad / (track_m * track_m)),
-            drivetrain: Drivetrain::new(vehicle, &rest),
+            drivetrain: Drivetrain::new(vehicle, &rest, &stance),
             servo: SteeringServo::new(vehicle),
             queue: DelayQueue::new(vehicle.servo.delay_s, step_s),
             limits: vehicle.limits,
-            radius_m: vehicle.geometry.wheel_radius_m,
+            rolling_radius_m: stance.rolling_radius_m,
             command: Command::default(),
             specific_force_mps2: Vector3::z() * GRAVITY_MPS2,
             step_s,
@@ -265,7 +267,7 @@ impl Plant {
             velocity_mps: body.in_body(&body.velocity_at_mps(&body.origin_m)).into(),
             angular_rate_radps: body.in_body(&body.angular_radps).into(),
             specific_force_mps2: self.specific_force_mps2.into(),
-            wheel_speed_mps: self.drivetrain.mean_spin_radps(&spin_radps) * self.radius_m,
+            wheel_speed_mps: self.drivetrain.speed_mps(&spin_radps),
             steering_rad: self.servo.steering_rad(),
         }
     }
@@ -276,9 +278,10 @@ impl Plant {
             let wheel = &self.wheels[i];
             WheelState {
                 load_n: wheel.load_n,
+                force_n: wheel.force_n.into(),
                 contact_m: wheel.contact.map(|contact| contact.point_m.into()),
                 hub_m: self.hub_m(i).into(),
-                speed_mps: wheel.spin_radps * self.radius_m,
+                speed_mps: wheel.spin_radps * self.rolling_radius_m,
                 travel_m: wheel.travel_m,
             }
         })

@@ -2,7 +2,7 @@
 
 use bicycle::Vehicle;
 
-use super::rest::Rest;
+use super::rest::{Rest, Stance};
 
 /// Torque between a wheel and the mean of the driven wheels, per difference of circumferential speed, over the
 /// wheel's load: how tight the limited-slip differentials are [s/m].
@@ -46,11 +46,11 @@ pub(crate) struct Drivetrain {
 }
 
 impl Drivetrain {
-    pub(crate) fn new(vehicle: &Vehicle, rest: &Rest) -> Self {
+    pub(crate) fn new(vehicle: &Vehicle, rest: &Rest, stance: &Stance) -> Self {
         let rear = vehicle.drivetrain.rear_share;
         let brake_rear = rest.load_n[2] / (rest.load_n[0] + rest.load_n[2]);
         let pairs = |rear: f64| [0.5 * (1.0 - rear), 0.5 * (1.0 - rear), 0.5 * rear, 0.5 * rear];
-        let radius_m = vehicle.geometry.wheel_radius_m;
+        let radius_m = stance.rolling_radius_m;
         let mean_load_n = 0.25 * rest.mass_kg * super::GRAVITY_MPS2;
         Self {
             mass_kg: rest.mass_kg,
@@ -88,8 +88,13 @@ impl Drivetrain {
         })
     }
 
+    /// Mean circumferential speed of the driven wheels, as the vehicle's own calibration has it [m/s].
+    pub(crate) fn speed_mps(&self, spin_radps: &[f64; 4]) -> f64 {
+        self.mean_spin_radps(spin_radps) * self.radius_m
+    }
+
     /// Mean speed of the driven wheels [rad/s].
-    pub(crate) fn mean_spin_radps(&self, spin_radps: &[f64; 4]) -> f64 {
+    fn mean_spin_radps(&self, spin_radps: &[f64; 4]) -> f64 {
         let driven = || (0..4).filter(|&i| self.drive_share[i] > 0.0);
         driven().map(|i| spin_radps[i]).sum::<f64>() / driven().count() as f64
     }

@@ -47,9 +47,8 @@ pub(crate) struct Contact {
 pub(crate) struct Envelope {
     radius_m: f64,
     width_m: f64,
-    /// Places along the wheel [m] and the rim's depth below the hub there [m].
-    stations_m: Vec<Vector2<f64>>,
-    spacing_m: f64,
+    /// Places ahead of the hub at which the ground's height is asked [m].
+    stations_m: Vec<f64>,
     /// Force per length of ground and depth, all slices together [N/m2].
     stiffness_n_per_m2: f64,
 }
@@ -68,12 +67,8 @@ impl Envelope {
     pub(crate) fn new(radius_m: f64, width_m: f64, stiffness_n_per_m: f64, load_n: f64, cell_m: f64) -> Self {
         let n = (radius_m / (0.5 * cell_m).min(0.25 * radius_m)).ceil().min(12.0) as i32;
         let spacing_m = radius_m / f64::from(n);
-        let station = |i: i32| {
-            let ahead_m = f64::from(i) * spacing_m;
-            Vector2::new(ahead_m, (radius_m * radius_m - ahead_m * ahead_m).max(0.0).sqrt())
-        };
-        let stations_m = (-n..=n).map(station).collect();
-        let mut envelope = Self { radius_m, width_m, stations_m, spacing_m, stiffness_n_per_m2: 1.0 };
+        let stations_m = (-n..=n).map(|i| f64::from(i) * spacing_m).collect();
+        let mut envelope = Self { radius_m, width_m, stations_m, stiffness_n_per_m2: 1.0 };
         envelope.stiffness_n_per_m2 = load_n / envelope.force_on_plane_n(load_n / stiffness_n_per_m);
         envelope
     }
@@ -81,6 +76,12 @@ impl Envelope {
     /// Radius of the unloaded wheel [m].
     pub(crate) fn radius_m(&self) -> f64 {
         self.radius_m
+    }
+
+    /// Distance rolled per turn, over two pi [m]: that of a radial tyre lies a third of the deflection below the
+    /// unloaded radius.
+    pub(crate) fn rolling_radius_m(&self, loaded_radius_m: f64) -> f64 {
+        self.radius_m - (self.radius_m - loaded_radius_m) / 3.0
     }
 
     /// Force of level ground `deflection_m` above the unloaded tread [N].
@@ -102,15 +103,16 @@ impl Envelope {
 
     /// How far the ground reaches above the unloaded tread, negative when the wheel is in the air [m].
     pub(crate) fn depth_m(&self, ground: &Ground, frame: &WheelFrame) -> f64 {
-        let slices = self.slices_m().into_iter();
-        slices
-            .flat_map(|left_m| self.stations_m.iter().map(move |station| (left_m, station)))
-            .map(|(left_m, station)| {
-                let rim =
-                    frame.hub_m + frame.left * left_m + frame.forward * station.x - frame.up * station.y;
-                ground.height_m(rim.x, rim.y) - rim.z
-            })
-            .fold(f64::NEG_INFINITY, f64::max)
+        let mut deepest_m = f64::NEG_INFINITY;
+        for left_m in self.slices_m() {
+            let centre = frame.hub_m + frame.left * left_m;
+            for &ahead_m in &self.stations_m {
+                let rim_m = (self.radius_m * self.radius_m - ahead_m * ahead_m).max(0.0).sqrt();
+                let rim = centre + frame.forward * ahead_m - frame.up * rim_m;
+                deepest_m = deepest_m.max(ground.height_m(rim.x, rim.y) - rim.z);
+            }
+        }
+        deepest_m
     }
 
     /// Contact of the wheel with the ground, `None` in the air.
@@ -139,15 +141,15 @@ impl Envelope {
     }
 
     fn press_slice(&self, ground: &Ground, frame: &WheelFrame, left_m: f64, pressure: &mut Pressure) {
-        let centre = frame.hub_m + frame.left * left_m;
-        let mut previous: Option<(Vector2<f64>, f64)> = None;
-        for station in &self.stations_m {
-            let rim = centre + frame.forward * station.x - frame.up * station.y;
-            let above_m = ground.height_m(rim.x, rim.y) - rim.z;
+        let foot = frame.hub_m + frame.left * left_m - frame.up * self.radius_m;
+        let mut previous = None;
+        for &ahead_m in &self.stations_m {
+            let place = foot + frame.forward * ahead_m;
+            let above_m = ground.height_m(place.x, place.y) - place.z;
             // The ground point in the wheel's plane, seen from the hub.
-            let point = Vector2::new(station.x + above_m * frame.forward.z, above_m * frame.up.z - station.y);
-            if let Some((before, before_above_m)) = previous
-                && above_m.max(before_above_m) > -self.spacing_m
+            let point =
+                Vector2::new(ahead_m + above_m * frame.forward.z, above_m * frame.up.z - self.radius_m);
+            if let Some(before) = previous
                 && let Some((force, radius_m)) = self.segment(before, point)
             {
                 let weight = force.norm();
@@ -156,7 +158,7 @@ impl Envelope {
                 pressure.radius += weight * radius_m;
                 pressure.lateral += weight * left_m;
             }
-            previous = Some((point, above_m));
+            previous = Some(point);
         }
     }
 
@@ -165,22 +167,27 @@ impl Envelope {
     #[inline]
     fn segment(&self, start: Vector2<f64>, end: Vector2<f64>) -> Option<(Vector2<f64>, f64)> {
         let r = self.radius_m;
-        let length = (end - start).norm();
-        if length < 1e-9 {
+        let run = end - start;
+        // Most pieces lie outside: told without roots and divisions.
+        let outside = |point: &Vector2<f64>| point.norm_squared() >= r * r;
+        let beside = start.dot(&run) * end.dot(&run) >= 0.0;
+        if beside && outside(&start) && outside(&end) {
             return None;
         }
-        let tangent = (end - start) / length;
+        let length = run.norm();
+        let tangent = run / length;
         // Towards the hub when the chain runs forward.
         let normal = Vector2::new(-tangent.y, tangent.x);
         let distance = -start.dot(&normal);
-        if distance >= r {
+        // Ground that runs backward is the far side of an edge: it pushes only what lies before it.
+        if distance >= r || (distance < 0.0 && run.x <= 0.0) {
             return None;
         }
         let d = distance.max(CORE_SHARE * r);
         let half = (r * r - d * d).sqrt();
         let a = start.dot(&tangent).max(-half);
         let b = end.dot(&tangent).min(half);
-        if a >= b {
+        if a >= b || length < 1e-9 {
             return None;
         }
         let (rho_a, rho_b) = ((d * d + a * a).sqrt(), (d * d + b * b).sqrt());

@@ -28,6 +28,8 @@ pub(crate) struct Stance {
     pub hub_m: [Vector3<f64>; 4],
     /// Rear axle above the ground [m].
     pub axle_height_m: f64,
+    /// Distance rolled per turn, over two pi, of the mean wheel [m].
+    pub rolling_radius_m: f64,
     /// Centre of gravity in the body frame [m].
     pub cog_m: Vector3<f64>,
 }
@@ -65,6 +67,8 @@ impl Rest {
         Stance {
             hub_m: std::array::from_fn(hub),
             axle_height_m,
+            rolling_radius_m: envelope
+                .rolling_radius_m(geometry.wheel_radius_m - 0.25 * deflection_m.iter().sum::<f64>()),
             cog_m: Vector3::new(self.cog_ahead_m, 0.0, self.cog_height_m - axle_height_m),
         }
     }

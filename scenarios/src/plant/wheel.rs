@@ -34,6 +34,8 @@ pub(crate) struct Wheel {
     stems: Stems,
     /// Normal force of the ground [N].
     pub load_n: f64,
+    /// Normal and friction force of the ground in map coordinates [N].
+    pub force_n: Vector3<f64>,
     /// Where the ground pushes, if it does.
     pub contact: Option<Contact>,
 }
@@ -104,6 +106,7 @@ impl Wheel {
             shear: Shear::default(),
             stems: Stems::default(),
             load_n: 0.0,
+            force_n: Vector3::zeros(),
             contact: None,
         }
     }
@@ -184,6 +187,7 @@ impl RunningGear {
             }
             None => self.hang(wheel),
         };
+        wheel.force_n = stand.force_n;
         let shaft_nm = self.turn(wheel, &stand, &input.torque, body_radps);
         // About its own axle the wheel turns freely: there the body feels the shaft and nothing else.
         let arm_m = wheel.contact.map_or_else(Vector3::zeros, |contact| contact.point_m - frame.hub_m);
@@ -209,8 +213,7 @@ impl RunningGear {
         // All of the body's turning but that about the axle, which is the wheel's own.
         let carrier_radps = body.angular_radps - frame.left * body.angular_radps.dot(&frame.left);
         let carried_mps = hub_mps + carrier_radps.cross(&(contact.point_m - frame.hub_m));
-        // Radial tyres roll on a radius a third of the deflection below the unloaded one.
-        let rolling_radius_m = self.radius_m - (self.radius_m - contact.loaded_radius_m) / 3.0;
+        let rolling_radius_m = self.envelope.rolling_radius_m(contact.loaded_radius_m);
         let tread_mps = wheel.turning_radps * rolling_radius_m;
         let slip_mps = Vector2::new(carried_mps.dot(&forward) - tread_mps, carried_mps.dot(&left));
         let damping_ns_per_m = self.radial_ns_per_m * (contact.force_n / self.reference_load_n).min(1.0);

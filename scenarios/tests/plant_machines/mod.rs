@@ -3,11 +3,59 @@
 
 use std::sync::Arc;
 
-use bicycle::{
-    Axle, Body, Drivetrain, Geometry, Limits, Servo, Suspension, Tyre, Vehicle, Wheel,
-};
-use scenarios::{Patch, Stribeck, World};
+use bicycle::{Axle, Body, Command, Drivetrain, Geometry, Limits, Servo, Suspension, Tyre, Vehicle, Wheel};
+use scenarios::{Patch, Plant, Stribeck, World};
 use terrain::GridGeometry;
+
+/// m/s2, the plant's.
+pub const G: f64 = 9.81;
+
+/// Friction that does not depend on the sliding speed above 0.05 m/s: mu tanh(14.1 v / 0.25).
+pub fn coulomb(mu: f32) -> Stribeck {
+    Stribeck { static_friction: mu, dynamic_friction: mu, viscous_friction: 0.0, stribeck_speed_mps: 0.25 }
+}
+
+/// A square world of `side_m` around the origin with cells of `cell_m`.
+pub fn world_of(
+    side_m: f64,
+    cell_m: f64,
+    friction: Stribeck,
+    height_m: impl Fn(f64, f64) -> f64,
+) -> Arc<World> {
+    let n = (side_m / cell_m).round() as usize;
+    let geometry = GridGeometry::centred(cell_m, n, n, 0.0, 0.0);
+    Arc::new(World::from_fn("test", geometry, height_m, |_, _| Patch::open(friction)).unwrap())
+}
+
+/// A plane that rises eastward at `slope_rad`.
+pub fn incline(slope_rad: f64, friction: Stribeck) -> Arc<World> {
+    world_of(200.0, 0.5, friction, move |x_m, _| x_m * slope_rad.tan())
+}
+
+/// Level ground, 400 m square.
+pub fn level(friction: Stribeck) -> Arc<World> {
+    world_of(400.0, 1.0, friction, |_, _| 0.0)
+}
+
+pub fn drive(plant: &mut Plant, speed_mps: f32, steering_rad: f32, duration_s: f64) {
+    plant.set_command(Command { speed_mps, steering_rad }).unwrap();
+    plant.advance(duration_s);
+}
+
+/// The same vehicle with servos and brakes that act at once, so that arithmetic need not follow their lags.
+pub fn prompt(mut vehicle: Vehicle) -> Vehicle {
+    vehicle.limits.acceleration_max_mps2 = 50.0;
+    vehicle.drivetrain.response_s = 0.005;
+    vehicle.servo = Servo { response_s: 0.005, delay_s: 0.0 };
+    vehicle
+}
+
+/// The same vehicle with neither motor nor brakes.
+pub fn powerless(mut vehicle: Vehicle) -> Vehicle {
+    vehicle.drivetrain.drive_torque_max_nm = 1e-9;
+    vehicle.drivetrain.brake_torque_max_nm = 1e-9;
+    vehicle
+}
 
 /// 3.4 x 1.8 m, 1500 kg: m g = 14 715 N.
 pub fn full_size() -> Vehicle {
@@ -36,7 +84,12 @@ pub fn full_size() -> Vehicle {
             roll_max_rad: 0.5236,
             pitch_max_rad: 0.5236,
         },
-        body: Body { mass_kg: 1360.0, inertia_kgm2: [370.0, 1270.0, 1420.0], cog_ahead_m: 1.25, cog_height_m: 0.75 },
+        body: Body {
+            mass_kg: 1360.0,
+            inertia_kgm2: [370.0, 1270.0, 1420.0],
+            cog_ahead_m: 1.25,
+            cog_height_m: 0.75,
+        },
         wheel: Wheel { mass_kg: 35.0, spin_inertia_kgm2: 5.0, width_m: 0.25 },
         front: axle(6000.0),
         rear: axle(3000.0),
@@ -84,7 +137,12 @@ pub fn rc_car() -> Vehicle {
             roll_max_rad: 0.5236,
             pitch_max_rad: 0.7854,
         },
-        body: Body { mass_kg: 2.4, inertia_kgm2: [0.010, 0.020, 0.026], cog_ahead_m: 0.09, cog_height_m: 0.075 },
+        body: Body {
+            mass_kg: 2.4,
+            inertia_kgm2: [0.010, 0.020, 0.026],
+            cog_ahead_m: 0.09,
+            cog_height_m: 0.075,
+        },
         wheel: Wheel { mass_kg: 0.15, spin_inertia_kgm2: 0.00068, width_m: 0.06 },
         front: axle,
         rear: axle,

@@ -1,0 +1,192 @@
+//! The plant in motion on even ground, held against closed forms.
+#![allow(missing_docs)]
+
+mod plant_machines;
+
+use bicycle::{Command, Vehicle};
+use plant_machines::*;
+use scenarios::{Plant, Stribeck};
+
+#[test]
+fn coasting_distance_follows_from_rolling_resistance() {
+    // Down a ramp without motor or brakes, then out on the level: with c = 0.02 + 0 and the wheels' inertia
+    // 4 * 5 / 0.44^2 = 103 kg beside 1500 kg, slowing from v1 to v2 takes (v1^2 - v2^2) (1603 / 1500) / (2 c g).
+    let mut vehicle = powerless(full_size());
+    vehicle.limits.steering_max_rad = 0.1;
+    let world = world_of(200.0, 0.5, Stribeck::ASPHALT, |x_m, _| if x_m < 0.0 { -0.1 * x_m } else { 0.0 });
+    let mut plant = Plant::new(&vehicle, world, [-20.0, 0.0, 0.0]).unwrap();
+    while plant.pose().x_m < 5.0 {
+        plant.advance(0.1);
+    }
+    let first = plant.motion();
+    while plant.motion().velocity_mps[0] > 2.0 {
+        plant.advance(0.1);
+    }
+    let last = plant.motion();
+    let squares = first.velocity_mps[0].powi(2) - last.velocity_mps[0].powi(2);
+    let expected_m = squares * (1.0 + 4.0 * 5.0 / 0.44f64.powi(2) / 1500.0) / (2.0 * 0.02 * G);
+    let found_m = last.pose.x_m - first.pose.x_m;
+    assert!(expected_m > 20.0, "{expected_m} m is too short to tell");
+    assert!((found_m / expected_m - 1.0).abs() < 0.03, "{found_m} m, expected {expected_m} m");
+}
+
+/// Distance from the command to stop until standstill [m] and the speed before [m/s].
+fn stopping(vehicle: &Vehicle, friction: f32, speed_mps: f32) -> [f64; 2] {
+    let mut plant = Plant::new(vehicle, level(coulomb(friction)), [-150.0, 0.0, 0.0]).unwrap();
+    drive(&mut plant, speed_mps, 0.0, 12.0);
+    let first = plant.motion();
+    drive(&mut plant, 0.0, 0.0, 0.0);
+    while plant.motion().velocity_mps[0] > 1e-3 {
+        plant.advance(0.01);
+    }
+    [plant.pose().x_m - first.pose.x_m, first.velocity_mps[0]]
+}
+
+#[test]
+fn locked_wheels_stop_within_v2_over_2_mu_g() {
+    let mut vehicle = prompt(full_size());
+    vehicle.limits.acceleration_max_mps2 = 50.0;
+    vehicle.drivetrain.brake_torque_max_nm = 20_000.0;
+    vehicle.tyre.load_sensitivity = 0.0;
+    for friction in [0.3, 0.6] {
+        let [found_m, speed_mps] = stopping(&vehicle, friction, 10.0);
+        let expected_m = speed_mps * speed_mps / (2.0 * f64::from(friction) * G);
+        assert!((speed_mps - 10.0).abs() < 0.2, "{speed_mps} m/s");
+        assert!(
+            (found_m / expected_m - 1.0).abs() < 0.04,
+            "mu {friction}: {found_m} m, expected {expected_m} m"
+        );
+    }
+}
+
+#[test]
+fn the_servo_slows_at_the_limit_of_acceleration() {
+    // 1.5 m/s2 from 6 m/s: 12 m; the lags of queue, motor and brake (0.05 s and 0.15 s) add 1.2 m at most.
+    let [found_m, speed_mps] = stopping(&full_size(), 0.9, 6.0);
+    let least_m = speed_mps * speed_mps / (2.0 * 1.5);
+    assert!((least_m..least_m + 0.2 * speed_mps).contains(&found_m), "{found_m} m from {speed_mps} m/s");
+}
+
+/// Acceleration up a slope at full throttle, all wheels slipping [m/s2].
+fn climbing_mps2(vehicle: &Vehicle, friction: f32, slope_rad: f64) -> f64 {
+    let world = incline(slope_rad, coulomb(friction));
+    let mut plant = Plant::new(vehicle, world, [0.0; 3]).unwrap();
+    drive(&mut plant, 10.0, 0.0, 2.0);
+    let before_mps = plant.motion().velocity_mps[0];
+    plant.advance(3.0);
+    (plant.motion().velocity_mps[0] - before_mps) / 3.0
+}
+
+#[test]
+fn the_steepest_slope_climbed_is_atan_mu() {
+    // All wheels driven and all slipping: a = g (mu cos - sin), zero at atan(0.4) = 21.8, atan(0.6) = 31.0 degrees.
+    let mut vehicle = full_size();
+    vehicle.tyre.load_sensitivity = 0.0;
+    vehicle.drivetrain.drive_torque_max_nm = 12_000.0;
+    for friction in [0.4f32, 0.6] {
+        for beyond_rad in [-5f64, -1.0, 1.0, 5.0].map(f64::to_radians) {
+            let slope_rad = f64::from(friction).atan() + beyond_rad;
+            let found_mps2 = climbing_mps2(&vehicle, friction, slope_rad);
+            let expected_mps2 = G * (f64::from(friction) * slope_rad.cos() - slope_rad.sin());
+            let error_mps2 = (found_mps2 - expected_mps2).abs();
+            assert!(
+                error_mps2 < 0.05,
+                "mu {friction}, {slope_rad} rad: {found_mps2}, expected {expected_mps2} m/s2"
+            );
+        }
+    }
+}
+
+#[test]
+fn the_servo_holds_its_speed_up_and_down_a_slope() {
+    for (yaw_rad, start_m) in [(0.0, -20.0), (std::f64::consts::PI, 20.0)] {
+        let world = incline(15f64.to_radians(), Stribeck::ASPHALT);
+        let mut plant = Plant::new(&full_size(), world, [start_m, 0.0, yaw_rad]).unwrap();
+        drive(&mut plant, 1.0, 0.0, 8.0);
+        let motion = plant.motion();
+        assert!((motion.wheel_speed_mps - 1.0).abs() < 0.02, "{motion:?}");
+        // Near zero the curve rises by (sqrt(2e) 0.28 + 10 sqrt2 0.70) / 4.5 = 2.345 per m/s; the tread's shear adds
+        // 0.03 m/s * (150 000 / 3679) / m * 0.3 m / (1 m/s)^2 = 0.367. tan 15 = 0.268 takes 0.099 m/s of slip.
+        let slip_mps = (motion.wheel_speed_mps - motion.velocity_mps[0]) * yaw_rad.cos();
+        assert!((slip_mps - 0.099).abs() < 0.008, "{slip_mps} m/s: {motion:?}");
+    }
+}
+
+/// Steady speed, yaw rate [m/s, rad/s] of the cog after 12 s at a command.
+fn steady_turn(vehicle: &Vehicle, friction: Stribeck, speed_mps: f32, steering_rad: f32) -> [f64; 2] {
+    let mut plant = Plant::new(vehicle, level(friction), [0.0; 3]).unwrap();
+    drive(&mut plant, speed_mps, steering_rad, 15.0);
+    let motion = plant.motion();
+    let ahead_mps = motion.velocity_mps[0];
+    let left_mps = motion.velocity_mps[1] + 1.25 * motion.angular_rate_radps[2];
+    [ahead_mps.hypot(left_mps), motion.angular_rate_radps[2]]
+}
+
+#[test]
+fn cornering_ends_at_v2_over_r_equal_mu_g() {
+    let mut vehicle = full_size();
+    vehicle.tyre.load_sensitivity = 0.0;
+    let friction = 0.4;
+    let mut plant = Plant::new(&vehicle, level(coulomb(friction)), [0.0; 3]).unwrap();
+    drive(&mut plant, 14.0, 0.12, 15.0);
+    let motion = plant.motion();
+    // The front ploughs: all of its friction is used, 0.4 of its load.
+    let wheels = plant.wheels();
+    let horizontal_n: f64 = wheels[..2].iter().map(|wheel| wheel.force_n[0].hypot(wheel.force_n[1])).sum();
+    let load_n: f64 = wheels[..2].iter().map(|wheel| wheel.load_n).sum();
+    assert!((horizontal_n / load_n - 0.4).abs() < 0.004, "{horizontal_n} of {load_n} N");
+    // The rear keeps what the differentials' moment against the turn takes from the front's: some tenth.
+    let most_mps2 = motion.velocity_mps[0] * motion.angular_rate_radps[2];
+    let limit_mps2 = f64::from(friction) * G;
+    assert!((0.87..1.0).contains(&(most_mps2 / limit_mps2)), "{most_mps2} of {limit_mps2} m/s2");
+}
+
+#[test]
+fn understeer_grows_with_speed() {
+    // Yaw rate over that of the geometry, v tan(steering) / L.
+    let gain = |speed_mps: f32| {
+        let [found_mps, yaw_radps] = steady_turn(&full_size(), Stribeck::ASPHALT, speed_mps, 0.1);
+        yaw_radps / (found_mps * 0.1f64.tan() / 2.5)
+    };
+    let gains = [1.0, 4.0, 8.0, 11.0].map(gain);
+    assert!((0.95..1.01).contains(&gains[0]), "{gains:?}");
+    assert!(gains.windows(2).all(|pair| pair[1] < pair[0] - 0.005), "{gains:?}");
+}
+
+#[test]
+fn left_and_right_are_mirror_images() {
+    for vehicle in [full_size(), rc_car()] {
+        let run = |side: f32| {
+            let mut plant = Plant::new(&vehicle, level(Stribeck::DIRT), [0.0; 3]).unwrap();
+            drive(&mut plant, 1.5, side * 0.4, 4.0);
+            drive(&mut plant, -0.5, side * -0.2, 2.0);
+            plant.pose()
+        };
+        let (left, right) = (run(1.0), run(-1.0));
+        for (name, sum) in [
+            ("y", left.y_m + right.y_m),
+            ("yaw", left.yaw_rad + right.yaw_rad),
+            ("roll", left.roll_rad + right.roll_rad),
+            ("x", left.x_m - right.x_m),
+        ] {
+            assert!(sum.abs() < 1e-6, "{} {name}: {left:?} {right:?}", vehicle.name);
+        }
+        assert!(left.y_m > 0.1);
+    }
+}
+
+#[test]
+fn commands_arrive_after_the_delay_and_at_the_limited_rate() {
+    let mut vehicle = full_size();
+    vehicle.servo.response_s = 0.0;
+    let mut plant = Plant::new(&vehicle, level(Stribeck::DIRT), [0.0; 3]).unwrap();
+    drive(&mut plant, 0.0, 0.3, 0.05);
+    assert!(plant.motion().steering_rad.abs() < 1e-9);
+    plant.advance(0.25);
+    // 0.6 rad/s for 0.25 s.
+    assert!((plant.motion().steering_rad - 0.15).abs() < 1e-3);
+    drive(&mut plant, 0.0, 3.0, 3.0);
+    assert!((plant.motion().steering_rad - vehicle.limits.steering_max_rad).abs() < 1e-9);
+    let refused = plant.set_command(Command { speed_mps: f32::NAN, steering_rad: 0.0 });
+    assert!(refused.is_err());
+}
