@@ -4,6 +4,8 @@
 use rayon::prelude::*;
 use terrain::{Cell, GridGeometry, GridMap, SurfaceCell, TerrainClass};
 
+use crate::lengths::Lengths;
+
 /// What wheels read of a cell, adjacent so that interpolation runs over all quantities at once.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C, align(32))]
@@ -76,8 +78,9 @@ pub(crate) struct ContactGround {
     /// Distance of the heights that make the gradient [cells].
     baseline: i64,
     contacts: Vec<Contact>,
-    /// Height, minus infinity where unknown: what a belly may touch.
-    bumps_m: Vec<f32>,
+    /// What a belly may touch: level l holds the highest of the 2^l cells from each cell eastward, minus
+    /// infinity where unknown [m].
+    bumps_m: Vec<Vec<f32>>,
     /// Sums of the cells before each column, one more than columns per row.
     sums: Vec<Packed>,
 }
@@ -85,13 +88,17 @@ pub(crate) struct ContactGround {
 impl ContactGround {
     /// Ground of which nothing is known yet. The gradient is taken over about the diameter of a wheel, which
     /// does not feel what is smaller.
-    pub fn unknown(window: GridGeometry, wheel_radius_m: f64) -> Self {
-        let baseline = ((wheel_radius_m / window.resolution_m).round() as i64).max(1);
+    pub fn unknown(window: GridGeometry, lengths: &Lengths) -> Self {
+        let cells = |length_m: f64| length_m / window.resolution_m;
+        // A belly is longest along its diagonal.
+        let widest_belly = cells(lengths.belly_diagonal_m()).ceil() as usize + 1;
+        let n_levels = widest_belly.ilog2() as usize + 1;
+        let baseline = (cells(lengths.wheel_radius_m).round() as i64).max(1);
         Self {
             window,
             baseline,
             contacts: vec![Contact::NOWHERE; window.n_cells()],
-            bumps_m: vec![f32::NEG_INFINITY; window.n_cells()],
+            bumps_m: vec![vec![f32::NEG_INFINITY; window.n_cells()]; n_levels],
             sums: vec![0; window.n_rows * (window.n_cols + 1)],
         }
     }
@@ -107,6 +114,7 @@ impl ContactGround {
     }
 
     /// Position of a lattice cell, which must lie in the window.
+    #[inline(always)]
     pub fn index(&self, lattice: [i64; 2]) -> usize {
         let [col, row] = [0, 1].map(|axis| (lattice[axis] - self.window.origin[axis]) as usize);
         row * self.window.n_cols + col
@@ -118,7 +126,7 @@ impl ContactGround {
         let rows = clipped(min[1] - south, max[1] - south, self.window.n_rows);
         let cols = clipped(min[0] - west, max[0] - west, self.window.n_cols);
         let (n_cols, baseline) = (self.window.n_cols, self.baseline);
-        let lines = self.contacts.par_chunks_mut(n_cols).zip(self.bumps_m.par_chunks_mut(n_cols));
+        let lines = self.contacts.par_chunks_mut(n_cols).zip(self.bumps_m[0].par_chunks_mut(n_cols));
         lines
             .zip(self.sums.par_chunks_mut(n_cols + 1))
             .enumerate()
@@ -135,7 +143,24 @@ impl ContactGround {
                     sums[col + 1] = sums[col] + packed(reader.cell(lattice));
                 }
             });
+        self.raise_levels(rows.clone());
         self.fill_holes(rows, cols);
+    }
+
+    /// Each level from the one below, whole rows.
+    fn raise_levels(&mut self, rows: std::ops::Range<usize>) {
+        let cells = rows.start * self.window.n_cols..rows.end * self.window.n_cols;
+        for level in 1..self.bumps_m.len() {
+            let (below, above) = self.bumps_m.split_at_mut(level);
+            let reach = 1 << (level - 1);
+            let rows = below[level - 1][cells.clone()].chunks(self.window.n_cols);
+            for (below, above) in rows.zip(above[0][cells.clone()].chunks_mut(self.window.n_cols)) {
+                for (k, above) in above.iter_mut().enumerate() {
+                    // The window's border ends the stretch.
+                    *above = below[k].max(below[(k + reach).min(below.len() - 1)]);
+                }
+            }
+        }
     }
 
     /// Gives unknown cells the mean of the known cells around them; they stay marked as unknown.
@@ -175,11 +200,21 @@ impl ContactGround {
     }
 
     /// Heights that a belly may touch, by [`ContactGround::index`] [m].
+    #[inline(always)]
     pub fn bumps_m(&self) -> &[f32] {
-        &self.bumps_m
+        &self.bumps_m[0]
+    }
+
+    /// Highest of some adjacent cells of a row, at most as many as the widest belly has [m].
+    #[inline(always)]
+    pub fn highest_m(&self, start: usize, n_cells: usize) -> f32 {
+        let level = n_cells.ilog2() as usize;
+        let stretches = &self.bumps_m[level];
+        stretches[start].max(stretches[start + n_cells - (1 << level)])
     }
 
     /// Counts over spans of adjacent cells, each given as row and column in the window and number of cells.
+    #[inline(always)]
     pub fn counts(&self, spans: impl Iterator<Item = (usize, usize, usize)>) -> Counts {
         let mut sum = 0;
         for (row, col, n_cells) in spans {

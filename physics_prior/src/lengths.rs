@@ -3,6 +3,8 @@
 use bicycle::Geometry;
 use terrain::{Footprint, WheelLayout};
 
+use crate::PriorConfig;
+
 /// Where the vehicle touches, covers and overhangs the ground.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Lengths {
@@ -12,12 +14,14 @@ pub(crate) struct Lengths {
     /// Between the wheels, where the ground may not rise above the clearance: from axle to axle and half a
     /// wheel's radius beyond them, and as far short of the wheels' middle planes, about a tyre's half width.
     pub belly: Footprint,
-    pub ground_clearance_m: f32,
+    /// How far the ground under the belly may rise above the plane of the wheels' contacts [m].
+    pub bump_max_m: f32,
     pub wheel_radius_m: f64,
 }
 
 impl Lengths {
-    pub fn new(geometry: &Geometry, obstacle_margin_m: f64) -> Self {
+    pub fn new(geometry: &Geometry, prior: &PriorConfig) -> Self {
+        let obstacle_margin_m = prior.obstacle_margin_m;
         Self {
             wheels: WheelLayout { wheelbase_m: geometry.wheelbase_m, track_m: geometry.track_m },
             footprint: Footprint {
@@ -30,8 +34,13 @@ impl Lengths {
                 rear_m: 0.5 * geometry.wheel_radius_m,
                 half_width_m: (0.5 * (geometry.track_m - geometry.wheel_radius_m)).max(0.0),
             },
-            ground_clearance_m: geometry.ground_clearance_m as f32,
+            bump_max_m: (geometry.ground_clearance_m - prior.belly_margin_m) as f32,
             wheel_radius_m: geometry.wheel_radius_m,
         }
+    }
+
+    /// Longest straight line under the belly [m].
+    pub fn belly_diagonal_m(&self) -> f64 {
+        (self.belly.front_m + self.belly.rear_m).hypot(2.0 * self.belly.half_width_m)
     }
 }

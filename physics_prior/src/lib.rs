@@ -15,16 +15,23 @@
 //! - Ground between the wheels that rises above the plane of the contacts by more than the ground clearance
 //!   leaves the vehicle high-centred: the traction estimates fall to nothing.
 
+#![allow(
+    clippy::needless_range_loop,
+    reason = "arithmetic in lanes: one index over several arrays of equal length"
+)]
+
 mod belief;
 mod config;
-mod equations;
 mod ground;
 mod lattice;
 mod lengths;
+mod outcomes;
 mod pose;
 mod poses;
 mod prior_map;
 mod stencil;
+mod tails;
+mod triangle;
 
 pub use belief::PriorBelief;
 pub use config::{PriorConfig, PriorConfigError};

@@ -15,8 +15,8 @@ pub(crate) struct PoseGround {
     pub vegetation_share: f32,
     /// Share of the footprint that is unknown.
     pub unknown_share: f32,
-    /// How far the ground between the wheels rises above the plane through the wheels' contacts [m].
-    pub bump_m: f32,
+    /// Whether the ground between the wheels reaches the belly.
+    pub high_centred: bool,
 }
 
 /// A stencil laid on the ground at a base cell.
@@ -30,6 +30,7 @@ pub(crate) struct Placed<'a> {
 
 impl Placed<'_> {
     /// Counts over every cell that the footprint touches.
+    #[inline(always)]
     pub fn counts(&self) -> Counts {
         let [west, south] = self.ground.window().origin;
         let place = |span: &Span| {
@@ -41,63 +42,86 @@ impl Placed<'_> {
     }
 
     /// Everything that the prior wants to know.
+    #[inline(always)]
     pub fn pose_ground(&self, counts: Counts, lengths: &Lengths) -> PoseGround {
         let wheels = self.wheels();
         let [east, north] = self.stencil.heading;
-        let slope = |wheel: &Contact| {
-            let [_, _, _, gradient_east, gradient_north, ..] = wheel.values;
-            (gradient_east * east + gradient_north * north).abs()
-        };
+        let mut slopes = [0.0; 4];
+        for (slope, wheel) in slopes.iter_mut().zip(&wheels) {
+            let gradient = &wheel.values;
+            *slope =
+                (gradient[Contact::GRADIENT_EAST] * east + gradient[Contact::GRADIENT_NORTH] * north).abs();
+        }
         let n_known = self.stencil.n_footprint_cells - counts.unknown;
         PoseGround {
             wheels,
-            slopes: wheels.each_ref().map(slope),
+            slopes,
             vegetation_share: counts.vegetation_255 as f32 / (255.0 * n_known.max(1) as f32),
             unknown_share: counts.unknown as f32 / self.stencil.n_footprint_cells as f32,
-            bump_m: self.bump_m(&wheels, lengths),
+            high_centred: self.is_high_centred(&wheels, lengths),
         }
     }
 
+    #[inline(always)]
     fn wheels(&self) -> [Contact; 4] {
         let contacts = self.ground.contacts();
         let n_cols = self.ground.window().n_cols;
-        self.stencil.wheels.each_ref().map(|tap| {
+        let mut wheels = [Contact { values: [0.0; 8] }; 4];
+        for (wheel, tap) in wheels.iter_mut().zip(&self.stencil.wheels) {
             let south_west = self.index(tap.offset);
-            let corners = [south_west, south_west + 1, south_west + n_cols, south_west + n_cols + 1];
-            let mut values = [0.0; 8];
-            for (corner, weight) in corners.into_iter().zip(tap.weights) {
-                let corner = &contacts[corner].values;
-                values.iter_mut().zip(corner).for_each(|(value, corner)| *value += weight * corner);
+            let (south, north) =
+                (&contacts[south_west..south_west + 2], &contacts[south_west + n_cols..][..2]);
+            let corners = [&south[0].values, &south[1].values, &north[0].values, &north[1].values];
+            for k in 0..8 {
+                wheel.values[k] = tap.weights[0] * corners[0][k]
+                    + tap.weights[1] * corners[1][k]
+                    + tap.weights[2] * corners[2][k]
+                    + tap.weights[3] * corners[3][k];
             }
-            Contact { values }
+        }
+        wheels
+    }
+
+    /// Whether the ground under the belly rises too far above the plane that fits the four wheel contacts best.
+    #[inline(always)]
+    fn is_high_centred(&self, wheels: &[Contact; 4], lengths: &Lengths) -> bool {
+        let height_m = |wheel: usize| wheels[wheel].values[Contact::HEIGHT];
+        let (front_left_m, rear_left_m, rear_right_m, front_right_m) =
+            (height_m(0), height_m(1), height_m(2), height_m(3));
+        let (wheelbase_m, track_m) = (lengths.wheels.wheelbase_m as f32, lengths.wheels.track_m as f32);
+        let rear_m = 0.5 * (rear_left_m + rear_right_m);
+        let per_forward = (0.5 * (front_left_m + front_right_m) - rear_m) / wheelbase_m;
+        let per_left = 0.5 * (front_left_m + rear_left_m - front_right_m - rear_right_m) / track_m;
+        let [cos, sin] = self.stencil.heading;
+        let step_m = self.ground.window().resolution_m as f32 * (per_forward * cos - per_left * sin);
+        self.stencil.belly.iter().any(|BellySpan { span, start_m: [forward_m, left_m] }| {
+            let plane_m = rear_m + per_forward * forward_m + per_left * left_m;
+            let limit = Line { start_m: plane_m + lengths.bump_max_m, step_m };
+            self.rises_above(span, limit)
         })
     }
 
-    /// Highest ground under the belly above the plane that fits the four wheel contacts best.
-    fn bump_m(&self, wheels: &[Contact; 4], lengths: &Lengths) -> f32 {
-        let [front_left, rear_left, rear_right, front_right] =
-            wheels.each_ref().map(|wheel| wheel.values[Contact::HEIGHT]);
-        let (wheelbase_m, track_m) = (lengths.wheels.wheelbase_m as f32, lengths.wheels.track_m as f32);
-        let rear_m = 0.5 * (rear_left + rear_right);
-        let per_forward = (0.5 * (front_left + front_right) - rear_m) / wheelbase_m;
-        let per_left = 0.5 * (front_left + rear_left - front_right - rear_right) / track_m;
-        // The fitted plane passes the mean contact height half-way between the axles.
-        let height_m = |[forward_m, left_m]: [f32; 2]| rear_m + per_forward * forward_m + per_left * left_m;
-        let [cos, sin] = self.stencil.heading;
-        let step_m = self.ground.window().resolution_m as f32 * (per_forward * cos - per_left * sin);
-        let mut highest_m = f32::NEG_INFINITY;
-        for BellySpan { span, start_m } in &self.stencil.belly {
-            let start = self.index(span.start);
-            let plane_m = height_m(*start_m);
-            for (k, &ground_m) in self.ground.bumps_m()[start..start + span.n_cells].iter().enumerate() {
-                let above_m = ground_m - (plane_m + k as f32 * step_m);
-                highest_m = if above_m > highest_m { above_m } else { highest_m };
-            }
+    /// Whether any cell of a span is higher than a line along it.
+    #[inline(always)]
+    fn rises_above(&self, span: &Span, limit: Line) -> bool {
+        let start = self.index(span.start);
+        let end_m = limit.start_m + (span.n_cells - 1) as f32 * limit.step_m;
+        if self.ground.highest_m(start, span.n_cells) <= limit.start_m.min(end_m) {
+            return false;
         }
-        highest_m
+        let bumps_m = &self.ground.bumps_m()[start..start + span.n_cells];
+        bumps_m.iter().enumerate().any(|(k, &bump_m)| bump_m > limit.start_m + k as f32 * limit.step_m)
     }
 
+    #[inline(always)]
     fn index(&self, offset: [i64; 2]) -> usize {
         self.ground.index([self.base[0] + offset[0], self.base[1] + offset[1]])
     }
+}
+
+/// Heights along a span: at its westmost cell and from cell to cell [m].
+#[derive(Clone, Copy)]
+struct Line {
+    start_m: f32,
+    step_m: f32,
 }

@@ -1,20 +1,29 @@
 //! All poses of a risk map over the ground below.
 
 use terrain::{Cell, GridGeometry, GridMap, SurfaceCell, TerrainClass};
-use traversability::{CvarLevel, Ground, GroundFlags, PmfQuad, Risk};
+use traversability::{Ground, GroundFlags, PmfQuad, Risk};
 
-use crate::equations::Equations;
 use crate::ground::{Contact, ContactGround};
 use crate::lattice::Ratio;
 use crate::lengths::Lengths;
+use crate::outcomes::Equations;
 use crate::pose::Placed;
 use crate::stencil::{Reach, Stencil};
+use crate::tails::{Tails, distribution};
 
 /// How the ground under a pose becomes a risk.
 #[derive(Clone, Debug)]
 pub(crate) enum Judgement {
-    Physics { equations: Equations, level: CvarLevel, evidence: f32 },
+    Physics(Box<Physics>),
     Nominal,
+}
+
+/// The physics prior at a level.
+#[derive(Clone, Debug)]
+pub(crate) struct Physics {
+    pub equations: Equations,
+    pub tails: Tails,
+    pub evidence: f32,
 }
 
 /// The poses that cells and yaw bins stand for. Lattice indices are columns, rows on the global lattice.
@@ -44,14 +53,14 @@ impl Poses {
         let around = Reach { min: [-own_cell; 2], max: [own_cell; 2] };
         let reach = stencils.iter().map(Stencil::reach).fold(around, Reach::union);
         let window = window(risk, ratio, reach, surface_resolution_m);
-        let ground = ContactGround::unknown(window, lengths.wheel_radius_m);
+        let ground = ContactGround::unknown(window, &lengths);
         Self { judgement, ground, lengths, ratio, n_yaws, stencils, reach }
     }
 
     /// Makes room for another window of the risk map; the ground must be read anew.
     pub fn move_to(&mut self, risk: &GridGeometry) {
         let window = window(risk, self.ratio, self.reach, self.ground.window().resolution_m);
-        self.ground = ContactGround::unknown(window, self.lengths.wheel_radius_m);
+        self.ground = ContactGround::unknown(window, &self.lengths);
     }
 
     /// Whether the pose in the centre of a risk cell reads any surface cell from `min` to `max`, per axis.
@@ -65,16 +74,17 @@ impl Poses {
         let base = cell.map(|index| self.ratio.base(index));
         let [col_phase, row_phase] = cell.map(|index| self.ratio.phase_index(index));
         let first = (row_phase * self.ratio.n_phases() + col_phase) * self.n_yaws;
-        for (stencil, risk) in self.stencils[first..first + self.n_yaws].iter().zip(risks) {
-            *risk = self.risk(&Placed { ground: &self.ground, stencil, base });
-        }
+        let stencils = &self.stencils[first..first + self.n_yaws];
+        pulp::Arch::new().dispatch(Yaws { poses: self, stencils, base, risks });
     }
 
+    #[inline(always)]
     fn risk(&self, placed: &Placed) -> Risk {
         let counts = placed.counts();
         let free = match &self.judgement {
-            Judgement::Physics { equations, level, .. } => {
-                equations.distribution(&placed.pose_ground(counts, &self.lengths)).risk(*level)
+            Judgement::Physics(physics) => {
+                let pose = placed.pose_ground(counts, &self.lengths);
+                physics.tails.risk(&physics.equations.outcomes(&pose))
             }
             Judgement::Nominal => Risk::NONE,
         };
@@ -83,7 +93,7 @@ impl Poses {
 
     /// Distribution at any pose; `None` outside the ground's window and for the nominal judgement.
     pub fn distribution(&self, x_m: f64, y_m: f64, yaw_rad: f64) -> Option<(PmfQuad, f32)> {
-        let Judgement::Physics { equations, evidence, .. } = &self.judgement else { return None };
+        let Judgement::Physics(physics) = &self.judgement else { return None };
         let resolution_m = self.ground.window().resolution_m;
         let place = [x_m, y_m].map(|v| v / resolution_m);
         let base = place.map(|v| v.floor() as i64);
@@ -91,7 +101,8 @@ impl Poses {
         let stencil = Stencil::new(&self.lengths, resolution_m, phase, yaw_rad);
         self.contains(base, stencil.reach()).then(|| {
             let placed = Placed { ground: &self.ground, stencil: &stencil, base };
-            (equations.distribution(&placed.pose_ground(placed.counts(), &self.lengths)), *evidence)
+            let outcomes = physics.equations.outcomes(&placed.pose_ground(placed.counts(), &self.lengths));
+            (distribution(&physics.equations, &outcomes), physics.evidence)
         })
     }
 
@@ -116,6 +127,27 @@ impl Poses {
             }
         }
         tally.ground()
+    }
+}
+
+/// The poses of one risk cell, for the widest instructions of the machine. Every one of them gives the same
+/// bits, since multiplications and additions stay apart.
+struct Yaws<'a> {
+    poses: &'a Poses,
+    stencils: &'a [Stencil],
+    base: [i64; 2],
+    risks: &'a mut [Risk],
+}
+
+impl pulp::WithSimd for Yaws<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: pulp::Simd>(self, _: S) {
+        let (poses, base) = (self.poses, self.base);
+        for (stencil, risk) in self.stencils.iter().zip(self.risks) {
+            *risk = poses.risk(&Placed { ground: &poses.ground, stencil, base });
+        }
     }
 }
 
@@ -190,4 +222,57 @@ fn window(risk: &GridGeometry, ratio: Ratio, reach: Reach, resolution_m: f64) ->
     let last = |axis: usize| ratio.base(risk.origin[axis] + n[axis] - 1) + reach.max[axis];
     let count = |axis: usize| (last(axis) - first(axis) + 1).max(0) as usize;
     GridGeometry { resolution_m, origin: [first(0), first(1)], n_rows: count(1), n_cols: count(0) }
+}
+
+#[cfg(test)]
+mod tests {
+    use bicycle::Geometry;
+    use pulp::WithSimd;
+
+    use super::*;
+    use crate::PriorConfig;
+
+    const CAR: Geometry = Geometry {
+        wheelbase_m: 0.18,
+        track_m: 0.19,
+        length_m: 0.33,
+        width_m: 0.25,
+        rear_overhang_m: 0.075,
+        ground_clearance_m: 0.05,
+        wheel_radius_m: 0.075,
+    };
+
+    /// Bumpy, half green ground with noise and a hole.
+    fn bumpy(window: GridGeometry) -> GridMap<SurfaceCell> {
+        let cell = |index: usize| {
+            let Cell { row, col } = window.cell(index);
+            let height_m = 0.06 * ((1.3 * row as f32).sin() + (0.7 * col as f32).cos());
+            let mut cell = SurfaceCell::certain(height_m, TerrainClass::Open, 0.01 * (index % 13) as f32);
+            cell.class_probability = [0.5, 0.0, 0.5, 0.0];
+            cell.height_variance_m2 = 1e-5 * (index % 7) as f32;
+            if index == window.n_cells() / 2 { SurfaceCell::UNKNOWN } else { cell }
+        };
+        let values = (0..window.n_cells()).map(cell).collect();
+        GridMap::from_values(window, values).unwrap()
+    }
+
+    #[test]
+    fn every_instruction_set_gives_the_same_bits() {
+        let window = GridGeometry { resolution_m: 0.1, origin: [0, 0], n_rows: 24, n_cols: 24 };
+        let prior = PriorConfig::default();
+        let lengths = Lengths::new(&CAR, &prior);
+        let equations = Equations::new(&prior, &lengths);
+        let tails = Tails::new(&equations, traversability::CvarLevel::new(0.4).unwrap());
+        let judgement = Judgement::Physics(Box::new(Physics { equations, tails, evidence: 12.0 }));
+        let ratio = Ratio::new(0.1, 0.1).unwrap();
+        let mut poses = Poses::new(judgement, lengths, ratio, 0.1, &window, 13);
+        poses.ground.read(&bumpy(window), [-100; 2], [100; 2]);
+        for cell in [[5, 5], [12, 11], [12, 12], [17, 4]] {
+            let (mut widest, mut plain) = ([Risk::NONE; 13], [Risk::NONE; 13]);
+            poses.risks(cell, &mut widest);
+            Yaws { poses: &poses, stencils: &poses.stencils, base: cell, risks: &mut plain }
+                .with_simd(pulp::Scalar);
+            assert_eq!(widest, plain);
+        }
+    }
 }

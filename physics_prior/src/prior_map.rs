@@ -7,10 +7,11 @@ use rayon::prelude::*;
 use terrain::{CellRegion, GridGeometry, GridMap, SurfaceCell};
 use traversability::{CvarLevel, Risk, RiskMap};
 
-use crate::equations::Equations;
 use crate::lattice::Ratio;
 use crate::lengths::Lengths;
-use crate::poses::{Judgement, Poses};
+use crate::outcomes::Equations;
+use crate::poses::{Judgement, Physics, Poses};
+use crate::tails::Tails;
 use crate::{PriorBelief, PriorConfig, PriorConfigError};
 
 /// What a [`PriorMap`] takes the ground for.
@@ -114,9 +115,9 @@ impl PriorMap {
     }
 
     /// Judges at another level from the next update on, which is a full one. The nominal assumption has none.
-    pub fn set_level(&mut self, new_level: CvarLevel) {
-        if let Judgement::Physics { level, .. } = &mut self.poses.judgement {
-            *level = new_level;
+    pub fn set_level(&mut self, level: CvarLevel) {
+        if let Judgement::Physics(physics) = &mut self.poses.judgement {
+            physics.tails = Tails::new(&physics.equations, level);
             self.filled_from = None;
         }
     }
@@ -211,15 +212,16 @@ fn judged(geometry: &Geometry, assumption: &Assumption) -> Result<(Lengths, Judg
     match assumption {
         Assumption::Physics { prior, level } => {
             prior.validate()?;
-            let lengths = Lengths::new(geometry, prior.obstacle_margin_m);
+            let lengths = Lengths::new(geometry, prior);
             let equations = Equations::new(prior, &lengths);
-            let evidence = prior.evidence as f32;
-            Ok((lengths, Judgement::Physics { equations, level: *level, evidence }))
+            let tails = Tails::new(&equations, *level);
+            let physics = Physics { equations, tails, evidence: prior.evidence as f32 };
+            Ok((lengths, Judgement::Physics(Box::new(physics))))
         }
         Assumption::Nominal { obstacle_margin_m } => {
             let prior = PriorConfig { obstacle_margin_m: *obstacle_margin_m, ..PriorConfig::default() };
             prior.validate()?;
-            Ok((Lengths::new(geometry, *obstacle_margin_m), Judgement::Nominal))
+            Ok((Lengths::new(geometry, &prior), Judgement::Nominal))
         }
     }
 }

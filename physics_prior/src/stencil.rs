@@ -23,7 +23,7 @@ pub(crate) struct Span {
     pub n_cells: usize,
 }
 
-/// Cells between the wheels.
+/// Cells between the wheels, adjacent in one row.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct BellySpan {
     pub span: Span,

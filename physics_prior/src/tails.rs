@@ -1,0 +1,144 @@
+//! From outcomes to the distribution over bins, and straight to its CVaR.
+
+use traversability::{Bins, CvarLevel, N_BINS, PmfQuad, Risk};
+
+use crate::outcomes::{Equations, Outcomes};
+use crate::triangle::{Excess, VALUES, probabilities};
+
+/// CVaR at one level without a distribution in between.
+///
+/// Outcomes are split between the bins' values, so the distribution lies on these values, and by Rockafellar and
+/// Uryasev its CVaR is the best over them of t - E[(t - Z)^+] / level from the left, t + E[(Z - t)^+] / level from
+/// the right. With t a bin's value, linear splitting leaves both expectations as they were: they come from
+/// the outcomes themselves, and every t is one lane.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Tails {
+    per_level: f32,
+    /// Of traction: value less what the uniform share costs.
+    traction: [f32; N_BINS],
+    /// Expected excess of the angles of unknown ground.
+    unknown_excess: Excess,
+}
+
+/// Below this the tail is one outcome whatever the level, and f32 would overflow.
+const LEVEL_MIN: f32 = 1e-20;
+
+impl Tails {
+    pub fn new(equations: &Equations, level: CvarLevel) -> Self {
+        let per_level = 1.0 / (level.get() as f32).max(LEVEL_MIN);
+        let unknown_excess = unknown_excess(equations);
+        let share = equations.uniform_weight / N_BINS as f32;
+        let values = Bins::TRACTION.values();
+        let shortfall = |t: f32| values.iter().map(|value| (t - value).max(0.0)).sum::<f32>();
+        Self { per_level, traction: values.map(|t| t - per_level * share * shortfall(t)), unknown_excess }
+    }
+
+    /// CVaR of every parameter from its bad end (equation 6).
+    #[inline(always)]
+    pub fn risk(&self, outcomes: &Outcomes) -> Risk {
+        Risk {
+            linear_traction: self.traction(outcomes, &outcomes.dirt[0]),
+            angular_traction: self.traction(outcomes, &outcomes.dirt[1]),
+            roll_rad: self.angle_rad(outcomes, 0),
+            pitch_rad: self.angle_rad(outcomes, 1),
+        }
+    }
+
+    #[inline(always)]
+    fn traction(&self, outcomes: &Outcomes, dirt: &[f32; 4]) -> f32 {
+        let mut tails = self.traction;
+        for wheel in 0..4 {
+            self.take(&mut tails, dirt[wheel], outcomes.dirt_probability[wheel]);
+        }
+        let vegetation_shares = &outcomes.vegetation_probability;
+        if vegetation_shares.iter().any(|&share| share > 0.0) {
+            for wheel in 0..4 {
+                self.take(&mut tails, outcomes.vegetation[wheel], vegetation_shares[wheel]);
+            }
+        }
+        if outcomes.unknown_probability > 0.0 {
+            self.take(&mut tails, outcomes.unknown, outcomes.unknown_probability);
+        }
+        let mut best = f32::NEG_INFINITY;
+        for tail in tails {
+            best = if tail > best { tail } else { best };
+        }
+        best
+    }
+
+    /// Takes the expected shortfall of one outcome off.
+    #[inline(always)]
+    fn take(&self, tails: &mut [f32; N_BINS], traction: f32, probability: f32) {
+        let cost = self.per_level * probability;
+        for k in 0..N_BINS {
+            tails[k] -= cost * (Bins::TRACTION.values()[k] - traction).max(0.0);
+        }
+    }
+
+    #[inline(always)]
+    fn angle_rad(&self, outcomes: &Outcomes, axis: usize) -> f32 {
+        let excess = excess(outcomes, axis, &self.unknown_excess);
+        // What lies beyond the largest value counts as that.
+        let beyond = excess[N_BINS - 1];
+        let mut best = f32::INFINITY;
+        for (value, excess) in VALUES.iter().zip(excess) {
+            let tail = value + self.per_level * (excess - beyond);
+            best = if tail < best { tail } else { best };
+        }
+        best * Bins::ATTITUDE_WIDTH_RAD
+    }
+}
+
+/// Expected excess of the angle about one axis.
+#[inline(always)]
+fn excess(outcomes: &Outcomes, axis: usize, of_unknown: &Excess) -> Excess {
+    let mut excess = *of_unknown;
+    for excess in &mut excess {
+        *excess *= outcomes.unknown_angle_probability[axis];
+    }
+    for triangles in &outcomes.angles {
+        triangles.add_excess(2 * axis, &mut excess);
+        triangles.add_excess(2 * axis + 1, &mut excess);
+    }
+    excess
+}
+
+fn unknown_excess(equations: &Equations) -> Excess {
+    let mut excess = [0.0; N_BINS];
+    for lane in 0..4 {
+        equations.unknown_attitude.add_excess(lane, &mut excess);
+    }
+    excess
+}
+
+/// The distributions of a pose (equation 18), with the uniform share of traction spread over all bins.
+pub(crate) fn distribution(equations: &Equations, outcomes: &Outcomes) -> PmfQuad {
+    let mut quad = PmfQuad { rows: [[0.0; 4]; N_BINS] };
+    for (lane, dirt) in outcomes.dirt.iter().enumerate() {
+        for row in &mut quad.rows {
+            row[lane] = equations.uniform_weight / N_BINS as f32;
+        }
+        for wheel in 0..4 {
+            add_atom(&mut quad, lane, dirt[wheel], outcomes.dirt_probability[wheel]);
+            add_atom(&mut quad, lane, outcomes.vegetation[wheel], outcomes.vegetation_probability[wheel]);
+        }
+        add_atom(&mut quad, lane, outcomes.unknown, outcomes.unknown_probability);
+    }
+    let unknown_excess = unknown_excess(equations);
+    for axis in 0..2 {
+        let probabilities = probabilities(&excess(outcomes, axis, &unknown_excess));
+        for (row, probability) in quad.rows.iter_mut().rev().zip(probabilities) {
+            row[2 + axis] = probability;
+        }
+    }
+    quad
+}
+
+/// Adds a probability at a traction, split between the two bins whose values enclose it.
+fn add_atom(quad: &mut PmfQuad, lane: usize, traction: f32, probability: f32) {
+    let values = Bins::TRACTION.values();
+    let below = values[1..N_BINS - 1].iter().take_while(|&&value| traction >= value).count();
+    let share = (traction - values[below]) / (values[below + 1] - values[below]);
+    quad.rows[below][lane] += probability * (1.0 - share);
+    quad.rows[below + 1][lane] += probability * share;
+}
