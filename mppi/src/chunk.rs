@@ -2,9 +2,8 @@
 
 use crate::diagnostics::CostTerm;
 use crate::kernel::Row;
-
-/// Sixteen partial sums, the same on every instruction set.
-pub(crate) type Partial = [f32; 16];
+use crate::sampling::Control;
+use crate::summary::Totals;
 
 /// Controls, costs and sums of [`crate::kernel::CHUNK`] rollouts.
 #[derive(Clone)]
@@ -18,9 +17,11 @@ pub(crate) struct Chunk {
     /// Weight of every rollout, not normalised.
     pub(crate) weights: Row,
     /// Weighted sums of the controls of every step.
-    pub(crate) sums: Vec<[Partial; 2]>,
+    pub(crate) sums: Vec<Control>,
     /// Whether every weight is zero; the sums are then not computed.
     pub(crate) is_negligible: bool,
+    /// What the costs of the chunk came to.
+    pub(crate) totals: Totals,
 }
 
 impl Chunk {
@@ -30,8 +31,9 @@ impl Chunk {
             terms: [Row::ZERO; CostTerm::COUNT],
             costs: Row::ZERO,
             weights: Row::ZERO,
-            sums: vec![[[0.0; 16]; 2]; n_steps],
+            sums: vec![[0.0; 2]; n_steps],
             is_negligible: false,
+            totals: Totals::default(),
         }
     }
 }

@@ -11,8 +11,8 @@ use crate::objective::{Input, Objective, ReferenceStep, Terminal, TerminalField}
 use crate::plan::Plan;
 use crate::recovery::{Mode, Watch};
 use crate::rollout::{GoalTask, Grid, MAX_SLOTS, Prices, RollOut, Scene, Start, Task};
-use crate::sampling::{Accumulate, Control, Sample, Sampler};
-use crate::summary::Summarize;
+use crate::sampling::{Control, Sample, Sampler};
+use crate::summary::{Accumulate, Totals};
 use crate::weights::{Weigh, WeightSummary};
 use bicycle::{Command, Decision, HoldReason, Model, State, Stepper, StopReason};
 use std::f64::consts::TAU;
@@ -173,9 +173,6 @@ impl Controller {
             self.roll_out(input, task);
             observe(Phase::Rollout);
             summary = self.weigh();
-            if summary.n_non_finite == self.config.n_rollouts {
-                break;
-            }
             self.average(&summary);
             if iteration + 1 < self.config.n_iterations {
                 observe(Phase::Update);
@@ -354,34 +351,29 @@ impl Controller {
     fn average(&mut self, summary: &WeightSummary) {
         let machine = self.machine;
         self.workers.run(&mut self.chunks, |_, chunk| machine.run(Accumulate { chunk }));
-        for (t, nominal) in self.plan.nominal.iter_mut().enumerate() {
-            *nominal = [0, 1].map(|c| {
-                let mut sums = [0.0; 16];
-                for chunk in self.chunks.iter().filter(|chunk| !chunk.is_negligible) {
-                    for (sum, part) in sums.iter_mut().zip(&chunk.sums[t][c]) {
-                        *sum += part;
-                    }
-                }
-                let eight: [f32; 8] = std::array::from_fn(|i| sums[i] + sums[i + 8]);
-                let four: [f32; 4] = std::array::from_fn(|i| eight[i] + eight[i + 4]);
-                ((four[0] + four[2]) + (four[1] + four[3])) / summary.normalizer
-            });
+        self.plan.nominal.fill([0.0; 2]);
+        for chunk in self.chunks.iter().filter(|chunk| !chunk.is_negligible) {
+            for (nominal, sum) in self.plan.nominal.iter_mut().zip(&chunk.sums) {
+                *nominal = [nominal[0] + sum[0], nominal[1] + sum[1]];
+            }
         }
+        let share = 1.0 / summary.normalizer;
+        self.plan.nominal.iter_mut().flatten().for_each(|value| *value *= share);
     }
 
     fn describe(&mut self, summary: &WeightSummary, mode: Mode) {
-        let chunks = &self.chunks;
-        let totals = self.machine.run(Summarize { chunks, baseline_s: summary.baseline_s });
+        let totals = self.chunks.iter().fold(Totals::default(), |totals, chunk| totals.plus(&chunk.totals));
+        let (chunk, lane) = summary.best;
         self.diagnostics = Diagnostics {
             isa: self.machine.isa(),
-            best_terms_s: totals.best_terms_s,
-            mean_terms_s: totals.mean_terms_s,
+            best_terms_s: self.chunks[chunk].terms.each_ref().map(|row| row.0[lane]),
+            mean_terms_s: totals.mean_terms_s(),
             baseline_s: summary.baseline_s,
             normalizer: summary.normalizer,
             effective_sample_size: summary.effective_sample_size,
             temperature_s: summary.temperature_s,
             free_energy_s: summary.free_energy_s(self.config.n_rollouts),
-            n_feasible: totals.n_feasible,
+            n_feasible: totals.n_feasible as usize,
             n_non_finite: summary.n_non_finite,
             is_recovering: mode != Mode::Onward,
             is_best_alone: false,
@@ -402,7 +394,7 @@ impl Controller {
         if !judge.breaks_limits(&self.start, plan, &mut memory) {
             return Decision::Drive(self.plan.command(0));
         }
-        let (chunk, lane) = self.best();
+        let (chunk, lane) = summary.best;
         let controls = self.chunks[chunk].controls.iter().map(|rows| [rows[0].0[lane], rows[1].0[lane]]);
         let mut memory = self.slots.map(f64::from);
         if judge.breaks_limits(&self.start, controls.clone().take(n_steps), &mut memory) {
@@ -419,19 +411,6 @@ impl Controller {
         let speed_mps = self.start.speed_mps.abs().max(f64::from(self.plan.nominal[0][0].abs()));
         let stop_s = speed_mps / self.model.limits.acceleration_max_mps2;
         ((stop_s / self.config.step_s).ceil() as usize + 1).min(self.config.n_steps)
-    }
-
-    /// Chunk and lane of the cheapest rollout.
-    pub(crate) fn best(&self) -> (usize, usize) {
-        let mut best = (0, 0, f32::INFINITY);
-        for (index, chunk) in self.chunks.iter().enumerate() {
-            for (lane, &cost) in chunk.costs.0.iter().enumerate() {
-                if cost < best.2 {
-                    best = (index, lane, cost);
-                }
-            }
-        }
-        (best.0, best.1)
     }
 
     /// Keeps what the next cycle needs to know of this decision.

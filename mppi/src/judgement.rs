@@ -15,15 +15,28 @@ pub(crate) struct Judge<'a> {
 impl Judge<'_> {
     /// The state after one step.
     pub(crate) fn step(&self, state: &State, command: Command, memory: &mut [f64], t: usize) -> State {
-        let risk = self.risk(state);
-        let cell = self.map.geometry.cell_at(state.x_m, state.y_m);
-        let ground = cell.map(|cell| self.map.ground[self.map.geometry.index(cell)]).unwrap_or_default();
-        let sample = GroundSample {
+        self.step_on(self.risk(state), state, command, (memory, t))
+    }
+
+    /// The state after one step on ground of known risk.
+    fn step_on(
+        &self,
+        risk: Risk,
+        state: &State,
+        command: Command,
+        (memory, t): (&mut [f64], usize),
+    ) -> State {
+        let mut sample = GroundSample {
             linear_traction: f64::from(risk.linear_traction),
             angular_traction: f64::from(risk.angular_traction),
-            gradient: ground.gradient.map(f64::from),
-            class: f64::from(ground.class),
+            ..GroundSample::FIRM
         };
+        if self.stepper.uses_ground() {
+            let cell = self.map.geometry.cell_at(state.x_m, state.y_m);
+            let ground = cell.map(|cell| self.map.ground[self.map.geometry.index(cell)]).unwrap_or_default();
+            sample.gradient = ground.gradient.map(f64::from);
+            sample.class = f64::from(ground.class);
+        }
         self.stepper.step_state(state, command, &sample, memory, t)
     }
 
@@ -41,10 +54,10 @@ impl Judge<'_> {
     ) -> bool {
         let start_risk = self.risk(start);
         let mut is_leaving = self.is_tilted(start_risk);
-        let mut state = *start;
+        let (mut state, mut risk) = (*start, start_risk);
         for (t, [speed_mps, steering_rad]) in controls.enumerate() {
-            state = self.step(&state, Command { speed_mps, steering_rad }, memory, t);
-            let risk = self.risk(&state);
+            state = self.step_on(risk, &state, Command { speed_mps, steering_rad }, (&mut *memory, t));
+            risk = self.risk(&state);
             let is_worse = risk.roll_rad > start_risk.roll_rad || risk.pitch_rad > start_risk.pitch_rad;
             if self.is_tilted(risk) && (!is_leaving || is_worse) {
                 return true;

@@ -42,8 +42,6 @@ pub(crate) trait Kernel: Lanes {
     fn store(self, row: &mut Row, offset: usize, value: Self::Value);
     /// The first `WIDTH` of these sixteen values.
     fn load_lanes(self, values: &[f32; 16]) -> Self::Value;
-    /// Writes a pack into sixteen values from `offset` on; panics beyond them.
-    fn store_lanes(self, values: &mut [f32; 16], offset: usize, value: Self::Value);
     /// first, first + 1, ... in the lanes.
     fn count_from(self, first: u32) -> Self::Bits;
     /// The same word in every lane.

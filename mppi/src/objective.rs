@@ -156,23 +156,30 @@ impl<'a> TerminalField<'a> {
     #[inline(always)]
     pub(crate) fn seconds<K: Kernel>(&self, x_cells: Real<K>, y_cells: Real<K>) -> Real<K> {
         let kernel = x_cells.0;
-        let place = |cells: Real<K>, axis: usize, n: usize| {
-            let place = cells.mul_add(kernel.real(self.scale), kernel.real(self.offset[axis]));
-            let place = place.clamp(kernel.real(0.0), kernel.real((n - 1) as f64));
-            let whole = kernel.truncate(place.min(kernel.real((n - 2) as f64)).1);
-            (whole, place - Real(kernel, kernel.convert(whole)))
-        };
-        let (col, east) = place(x_cells, 0, self.n_cols);
-        let (row, north) = place(y_cells, 1, self.n_rows);
+        let (col, east) = self.place(x_cells, self.offset[0], self.n_cols);
+        let (row, north) = self.place(y_cells, self.offset[1], self.n_rows);
         let corner = kernel.add_bits(kernel.mul_bits(row, kernel.word(self.n_cols as u32)), col);
-        let at = |further: usize| {
-            let index = kernel.add_bits(corner, kernel.word(further as u32));
-            Real(kernel, kernel.gather(self.seconds, index))
-        };
-        let (south_west, south_east) = (at(0), at(1));
-        let (north_west, north_east) = (at(self.n_cols), at(self.n_cols + 1));
-        let south = (south_east - south_west).mul_add(east, south_west);
-        let upper = (north_east - north_west).mul_add(east, north_west);
+        let south = self.along_row(corner, east);
+        let upper = self.along_row(kernel.add_bits(corner, kernel.word(self.n_cols as u32)), east);
         (upper - south).mul_add(north, south)
+    }
+
+    /// Cell and share of the way to the next one, along one axis.
+    #[inline(always)]
+    fn place<K: Kernel>(&self, cells: Real<K>, offset: f64, n: usize) -> (K::Bits, Real<K>) {
+        let kernel = cells.0;
+        let place = cells.mul_add(kernel.real(self.scale), kernel.real(offset));
+        let place = place.clamp(kernel.real(0.0), kernel.real((n - 1) as f64));
+        let whole = kernel.truncate(place.min(kernel.real((n - 2) as f64)).1);
+        (whole, place - Real(kernel, kernel.convert(whole)))
+    }
+
+    /// Between a cell and its eastern neighbour.
+    #[inline(always)]
+    fn along_row<K: Kernel>(&self, index: K::Bits, share: Real<K>) -> Real<K> {
+        let kernel = share.0;
+        let west = Real(kernel, kernel.gather(self.seconds, index));
+        let east = Real(kernel, kernel.gather(self.seconds, kernel.add_bits(index, kernel.word(1))));
+        (east - west).mul_add(share, west)
     }
 }

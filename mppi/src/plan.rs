@@ -124,6 +124,7 @@ impl Plan {
                 SampleSpace::Rates => f64::from(self.nominal[t][c] - before),
             }
         };
+        let inverse = std.map(|std| 1.0 / (std * std * (1.0 - correlation * correlation)));
         for t in 0..n {
             self.scores[t] = [0, 1].map(|c| {
                 let rim = t == 0 || t + 1 == n;
@@ -131,7 +132,7 @@ impl Plan {
                 let before = if t == 0 { 0.0 } else { sampled(t - 1, c) };
                 let after = if t + 1 == n { 0.0 } else { sampled(t + 1, c) };
                 let sum = middle * sampled(t, c) - correlation * (before + after);
-                sum / (std[c] * std[c] * (1.0 - correlation * correlation))
+                sum * inverse[c]
             });
         }
         self.scores[n] = [0.0; 2];

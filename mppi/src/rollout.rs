@@ -5,7 +5,7 @@
 
 use crate::chunk::Chunk;
 use crate::diagnostics::CostTerm;
-use crate::kernel::{CHUNK, Kernel, Work};
+use crate::kernel::{CHUNK, Kernel, Row, Work};
 use crate::objective::{ReferenceStep, TerminalField};
 use bicycle::lanes::Real;
 use bicycle::{GroundSample, LaneState, Stepper};
@@ -126,8 +126,9 @@ fn roll_chunk<K: Kernel, S: Stage<K>, const EFFECTS: bool, const MANOEUVRES: boo
     }
 }
 
-/// One pack on its way.
+/// One pack on its way. Aligned to a cache line, for what of it does not fit into registers.
 #[derive(Clone, Copy)]
+#[repr(align(64))]
 struct Flight<K: Kernel> {
     state: LaneState<K>,
     /// Where the goal is not reached yet.
@@ -155,6 +156,11 @@ impl<K: Kernel> Flight<K> {
         Self { state, under_way, distance: zero, running: zero, attitude: zero, lateral: zero, reverse: zero }
     }
 }
+
+/// What the effects of a pack carry from step to step.
+#[derive(Clone, Copy)]
+#[repr(align(64))]
+struct Memory<K: Kernel>([K::Value; MAX_SLOTS]);
 
 /// What a step and the end cost beside the limits.
 trait Stage<K: Kernel> {
@@ -257,7 +263,7 @@ fn roll_packs<K: Kernel, S: Stage<K>, const G: usize, const EFFECTS: bool, const
     chunk: &mut Chunk,
 ) {
     let index = Index::new(kernel, &scene.grid);
-    let mut memory = [[kernel.real(0.0).1; MAX_SLOTS]; G];
+    let mut memory = [Memory::<K>([kernel.real(0.0).1; MAX_SLOTS]); G];
     for first in (0..CHUNK).step_by(G * K::WIDTH) {
         let mut flights = [Flight::new(kernel, &scene.start); G];
         if EFFECTS {
@@ -266,23 +272,49 @@ fn roll_packs<K: Kernel, S: Stage<K>, const G: usize, const EFFECTS: bool, const
             }
         }
         for (t, controls) in chunk.controls.iter().enumerate() {
-            for g in 0..G {
-                let command = [0, 1].map(|c| Real(kernel, kernel.load(&controls[c], first + g * K::WIDTH)));
-                let memory = &mut memory[g];
-                advance::<K, EFFECTS, MANOEUVRES>(scene, &index, &mut flights[g], command, (memory, t));
-                stage.step(t, &mut flights[g]);
+            // Written out, because flights that a loop indexes would live in memory instead of registers.
+            let fly = Fly { scene, index: &index, stage, controls, t };
+            fly.step::<EFFECTS, MANOEUVRES>(&mut flights[0], &mut memory[0], first);
+            if G == 2 {
+                fly.step::<EFFECTS, MANOEUVRES>(&mut flights[1], &mut memory[1], first + K::WIDTH);
             }
         }
-        for (g, flight) in flights.iter().enumerate() {
-            settle(stage.finish(flight), flight, chunk, first + g * K::WIDTH);
+        settle(stage.finish(&flights[0]), &flights[0], chunk, first);
+        if G == 2 {
+            settle(stage.finish(&flights[1]), &flights[1], chunk, first + K::WIDTH);
         }
+    }
+}
+
+/// What the packs in flight share in one step.
+struct Fly<'a, K: Kernel, S: Stage<K>> {
+    scene: &'a Scene<'a>,
+    index: &'a Index<K>,
+    stage: &'a S,
+    controls: &'a [Row; 2],
+    t: usize,
+}
+
+impl<K: Kernel, S: Stage<K>> Fly<'_, K, S> {
+    #[inline(always)]
+    fn step<const EFFECTS: bool, const MANOEUVRES: bool>(
+        &self,
+        flight: &mut Flight<K>,
+        memory: &mut Memory<K>,
+        first: usize,
+    ) {
+        let kernel = flight.state.x.0;
+        let [speed, steering] = self.controls;
+        let command = [Real(kernel, kernel.load(speed, first)), Real(kernel, kernel.load(steering, first))];
+        advance::<K, EFFECTS, MANOEUVRES>(self.scene, self.index, flight, command, (memory, self.t));
+        self.stage.step(self.t, flight);
     }
 }
 
 /// Every rollout starts with the same memory.
 #[inline(always)]
-fn recall<K: Kernel>(kernel: K, slots: &[f32], memory: &mut [K::Value; MAX_SLOTS]) {
-    for (value, slot) in memory.iter_mut().zip(slots) {
+fn recall<K: Kernel>(kernel: K, slots: &[f32], memory: &mut Memory<K>) {
+    for (value, slot) in memory.0.iter_mut().zip(slots) {
         *value = kernel.real(f64::from(*slot)).1;
     }
 }
@@ -294,7 +326,7 @@ fn advance<K: Kernel, const EFFECTS: bool, const MANOEUVRES: bool>(
     index: &Index<K>,
     flight: &mut Flight<K>,
     command: [Real<K>; 2],
-    (memory, t): (&mut [K::Value; MAX_SLOTS], usize),
+    (memory, t): (&mut Memory<K>, usize),
 ) {
     let kernel = command[0].0;
     let cell = index.cell(&flight.state);
@@ -308,7 +340,7 @@ fn advance<K: Kernel, const EFFECTS: bool, const MANOEUVRES: bool>(
                 kernel.grounds(scene.grid.ground, cell).map(|value| Real(kernel, value));
             (ground.gradient, ground.class) = ([east, north], class);
         }
-        scene.stepper.step(&mut flight.state, command, &ground, memory, t)
+        scene.stepper.step(&mut flight.state, command, &ground, &mut memory.0, t)
     } else {
         scene.stepper.step_bare(&mut flight.state, command, &ground)
     };

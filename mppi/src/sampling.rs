@@ -8,7 +8,6 @@ use crate::chunk::Chunk;
 use crate::diagnostics::CostTerm;
 use crate::kernel::functions::Generator;
 use crate::kernel::{CHUNK, Kernel, Work};
-use bicycle::lanes::Real;
 
 /// Speed and steering angle.
 pub(crate) type Control = [f32; 2];
@@ -48,6 +47,14 @@ impl Sampler<'_> {
     /// Whether every step can be sampled for itself.
     fn is_independent(&self) -> bool {
         self.kept_noise == [0.0; 2] && self.kept_control == 0.0 && self.change == [f32::INFINITY; 2]
+    }
+
+    /// Gradients times nominal controls [s].
+    fn nominal_cost(&self) -> f64 {
+        let of_step = |step: &SampleStep| -> f64 {
+            (0..2).map(|c| f64::from(step.gradient[c]) * f64::from(step.nominal[c])).sum()
+        };
+        self.steps.iter().map(of_step).sum()
     }
 }
 
@@ -90,21 +97,21 @@ fn sample_pack<K: Kernel, const INDEPENDENT: bool>(
     let (kept_noise, kept_control) = (all(sampler.kept_noise), kernel.real(f64::from(sampler.kept_control)));
     let mut noise = [kernel.real(0.0); 2];
     let mut control = all(sampler.start);
-    let mut cost = kernel.real(0.0);
+    let mut cost = kernel.real(-sampler.nominal_cost());
     for (step, rows) in sampler.steps.iter().zip(&mut chunk.controls) {
         let fresh = generator.normals();
-        let (base, nominal) = (all(step.base), all(step.nominal));
-        let (innovation, gradient) = (all(step.innovation), all(step.gradient));
         for c in 0..2 {
+            let base = kernel.real(f64::from(step.base[c]));
+            let innovation = kernel.real(f64::from(step.innovation[c]));
             let sampled = if INDEPENDENT {
-                fresh[c].mul_add(innovation[c], base[c])
+                fresh[c].mul_add(innovation, base)
             } else {
-                noise[c] = noise[c].mul_add(kept_noise[c], fresh[c] * innovation[c]);
-                let wished = control[c].mul_add(kept_control, base[c] + noise[c]);
+                noise[c] = noise[c].mul_add(kept_noise[c], fresh[c] * innovation);
+                let wished = control[c].mul_add(kept_control, base + noise[c]);
                 wished.clamp(control[c] - change[c], control[c] + change[c])
             };
             control[c] = sampled.clamp(low[c], high[c]);
-            cost = (control[c] - nominal[c]).mul_add(gradient[c], cost);
+            cost = control[c].mul_add(kernel.real(f64::from(step.gradient[c])), cost);
             kernel.store(&mut rows[c], first, control[c].1);
         }
     }
@@ -125,36 +132,4 @@ fn plant_nominal(sampler: &Sampler<'_>, chunk: &mut Chunk) {
         }
     }
     chunk.terms[CostTerm::Control as usize].0[0] = cost;
-}
-
-/// Adds the weighted controls of a chunk.
-pub(crate) struct Accumulate<'a> {
-    pub(crate) chunk: &'a mut Chunk,
-}
-
-impl Work for Accumulate<'_> {
-    type Output = ();
-    #[inline(always)]
-    fn run<K: Kernel>(self, kernel: K) {
-        let Chunk { controls, weights, sums, is_negligible, .. } = self.chunk;
-        *is_negligible = weights.0.iter().all(|&weight| weight == 0.0);
-        if *is_negligible {
-            return;
-        }
-        for (rows, sums) in controls.iter().zip(sums) {
-            for (row, sum) in rows.iter().zip(sums) {
-                for half in (0..16).step_by(K::WIDTH) {
-                    let product = |first: usize| {
-                        Real(kernel, kernel.load(weights, first)) * Real(kernel, kernel.load(row, first))
-                    };
-                    let mut total = product(half);
-                    for first in (half + 16..CHUNK).step_by(16) {
-                        let weight = Real(kernel, kernel.load(weights, first));
-                        total = weight.mul_add(Real(kernel, kernel.load(row, first)), total);
-                    }
-                    kernel.store_lanes(sum, half, total.1);
-                }
-            }
-        }
-    }
 }

@@ -1,57 +1,91 @@
-//! Cost terms of all rollouts in a few numbers.
+//! The average of the sampled controls, and cost terms in a few numbers.
 
 use crate::chunk::Chunk;
 use crate::diagnostics::CostTerm;
-use crate::kernel::{CHUNK, Kernel, Work};
+use crate::kernel::{CHUNK, Kernel, Row, Work};
 use bicycle::lanes::Real;
 
-/// What the costs of an iteration came to.
+/// What the costs of some rollouts came to.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct CostSummary {
-    /// Terms of the cheapest rollout [s].
-    pub(crate) best_terms_s: [f32; CostTerm::COUNT],
-    /// Mean terms over the rollouts of finite cost [s].
-    pub(crate) mean_terms_s: [f32; CostTerm::COUNT],
+pub(crate) struct Totals {
+    /// Sums of the terms over the rollouts of finite cost [s].
+    pub(crate) terms_s: [f32; CostTerm::COUNT],
+    /// Rollouts of finite cost.
+    pub(crate) n_finite: f32,
     /// Rollouts that keep every limit.
-    pub(crate) n_feasible: usize,
+    pub(crate) n_feasible: f32,
 }
 
-/// Sums up weighed chunks.
-pub(crate) struct Summarize<'a> {
-    pub(crate) chunks: &'a [Chunk],
-    pub(crate) baseline_s: f32,
-}
-
-impl Work for Summarize<'_> {
-    type Output = CostSummary;
-    #[inline(always)]
-    fn run<K: Kernel>(self, kernel: K) -> CostSummary {
-        let (zero, one) = (kernel.real(0.0), kernel.real(1.0));
-        // Quarantined costs are the largest f32.
-        let broken = kernel.real(f64::from(f32::MAX));
-        let mut sums = [zero; CostTerm::COUNT];
-        let (mut n_finite, mut n_feasible) = (zero, zero);
-        let mut summary = CostSummary::default();
-        for chunk in self.chunks {
-            for first in (0..CHUNK).step_by(K::WIDTH) {
-                let load = |row| Real(kernel, kernel.load(row, first));
-                let finite = load(&chunk.costs).less(broken);
-                let terms = chunk.terms.each_ref().map(load);
-                for (sum, term) in sums.iter_mut().zip(terms) {
-                    *sum = sum.add_where(finite, term);
-                }
-                let excess = terms[CostTerm::Attitude as usize] + terms[CostTerm::Lateral as usize];
-                n_finite = n_finite.add_where(finite, one);
-                n_feasible =
-                    n_feasible.add_where(kernel.and(finite, excess.less(one * kernel.real(1e-9))), one);
-            }
-            if let Some(lane) = chunk.costs.0.iter().position(|&cost| cost == self.baseline_s) {
-                summary.best_terms_s = chunk.terms.each_ref().map(|row| row.0[lane]);
-            }
+impl Totals {
+    pub(crate) fn plus(mut self, other: &Self) -> Self {
+        self.terms_s.iter_mut().zip(other.terms_s).for_each(|(sum, term)| *sum += term);
+        Self {
+            n_finite: self.n_finite + other.n_finite,
+            n_feasible: self.n_feasible + other.n_feasible,
+            ..self
         }
-        let n_finite = kernel.sum(n_finite.1).max(1.0);
-        summary.mean_terms_s = sums.map(|sum| kernel.sum(sum.1) / n_finite);
-        summary.n_feasible = kernel.sum(n_feasible.1) as usize;
-        summary
     }
+
+    /// Mean terms [s].
+    pub(crate) fn mean_terms_s(&self) -> [f32; CostTerm::COUNT] {
+        self.terms_s.map(|sum| sum / self.n_finite.max(1.0))
+    }
+}
+
+/// Adds up a weighed chunk: its weighted controls and its cost terms.
+pub(crate) struct Accumulate<'a> {
+    pub(crate) chunk: &'a mut Chunk,
+}
+
+impl Work for Accumulate<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn run<K: Kernel>(self, kernel: K) {
+        let chunk = self.chunk;
+        chunk.totals = total(kernel, chunk);
+        chunk.is_negligible = chunk.weights.0.iter().all(|&weight| weight == 0.0);
+        if chunk.is_negligible {
+            return;
+        }
+        for (rows, sums) in chunk.controls.iter().zip(&mut chunk.sums) {
+            *sums = [dot(kernel, &chunk.weights, &rows[0]), dot(kernel, &chunk.weights, &rows[1])];
+        }
+    }
+}
+
+/// Sum of products, rollout i in the order of i mod 16, whatever the width of the packs.
+#[inline(always)]
+fn dot<K: Kernel>(kernel: K, weights: &Row, row: &Row) -> f32 {
+    let mut halves = [kernel.real(0.0); 2];
+    for first in (0..CHUNK).step_by(K::WIDTH) {
+        let half = usize::from(first % 16 >= K::WIDTH);
+        let weight = Real(kernel, kernel.load(weights, first));
+        halves[half] = weight.mul_add(Real(kernel, kernel.load(row, first)), halves[half]);
+    }
+    kernel.sum((halves[0] + halves[1]).1)
+}
+
+#[inline(always)]
+fn total<K: Kernel>(kernel: K, chunk: &Chunk) -> Totals {
+    let (zero, one) = (kernel.real(0.0), kernel.real(1.0));
+    // Quarantined costs are the largest f32.
+    let broken = kernel.real(f64::from(f32::MAX));
+    let mut sums = [zero; CostTerm::COUNT];
+    let (mut n_finite, mut n_feasible) = (zero, zero);
+    for first in (0..CHUNK).step_by(K::WIDTH) {
+        let finite = Real(kernel, kernel.load(&chunk.costs, first)).less(broken);
+        for (sum, row) in sums.iter_mut().zip(&chunk.terms) {
+            *sum = sum.add_where(finite, Real(kernel, kernel.load(row, first)));
+        }
+        let attitude = Real(kernel, kernel.load(&chunk.terms[CostTerm::Attitude as usize], first));
+        let lateral = Real(kernel, kernel.load(&chunk.terms[CostTerm::Lateral as usize], first));
+        let feasible = kernel.and(finite, (attitude + lateral).less(kernel.real(1e-9)));
+        n_finite = n_finite.add_where(finite, one);
+        n_feasible = n_feasible.add_where(feasible, one);
+    }
+    let mut terms_s = [0.0; CostTerm::COUNT];
+    for (term_s, sum) in terms_s.iter_mut().zip(sums) {
+        *term_s = kernel.sum(sum.1);
+    }
+    Totals { terms_s, n_finite: kernel.sum(n_finite.1), n_feasible: kernel.sum(n_feasible.1) }
 }

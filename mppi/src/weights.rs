@@ -26,6 +26,8 @@ pub(crate) struct WeightSummary {
     pub(crate) temperature_s: f32,
     /// Rollouts without a finite cost; they have no weight.
     pub(crate) n_non_finite: usize,
+    /// Chunk and lane of the cheapest rollout.
+    pub(crate) best: (usize, usize),
 }
 
 impl WeightSummary {
@@ -47,14 +49,16 @@ impl Work for Weigh<'_> {
     #[inline(always)]
     fn run<K: Kernel>(self, kernel: K) -> WeightSummary {
         let mut n_non_finite = 0;
-        let mut least = kernel.real(f64::from(f32::MAX));
-        for chunk in self.chunks.iter_mut() {
+        let (mut baseline_s, mut best_chunk) = (f32::MAX, 0);
+        for (index, chunk) in self.chunks.iter_mut().enumerate() {
             n_non_finite += quarantine(&mut chunk.costs);
-            for first in (0..CHUNK).step_by(K::WIDTH) {
-                least = least.min(Real(kernel, kernel.load(&chunk.costs, first)));
+            let least_s = least(kernel, &chunk.costs);
+            if least_s < baseline_s {
+                (baseline_s, best_chunk) = (least_s, index);
             }
         }
-        let baseline_s = kernel.smallest(least.1);
+        let costs = &self.chunks[best_chunk].costs.0;
+        let best = (best_chunk, costs.iter().position(|&cost| cost == baseline_s).unwrap_or(0));
         let temperature_s = match self.temperature {
             Temperature::Fixed { temperature_s } => temperature_s as f32,
             Temperature::EffectiveSampleSize { fraction } => {
@@ -63,8 +67,17 @@ impl Work for Weigh<'_> {
             }
         };
         let (normalizer, effective_sample_size) = weigh_all(kernel, self.chunks, baseline_s, temperature_s);
-        WeightSummary { baseline_s, normalizer, effective_sample_size, temperature_s, n_non_finite }
+        WeightSummary { baseline_s, normalizer, effective_sample_size, temperature_s, n_non_finite, best }
     }
+}
+
+#[inline(always)]
+fn least<K: Kernel>(kernel: K, costs: &Row) -> f32 {
+    let mut least = kernel.real(f64::from(f32::MAX));
+    for first in (0..CHUNK).step_by(K::WIDTH) {
+        least = least.min(Real(kernel, kernel.load(costs, first)));
+    }
+    kernel.smallest(least.1)
 }
 
 /// Replaces costs that are not finite by the worst finite one; counts them.

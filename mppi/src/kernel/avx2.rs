@@ -23,10 +23,6 @@ impl Kernel for V3 {
         cast!(values.as_chunks::<8>().0[0])
     }
     #[inline(always)]
-    fn store_lanes(self, values: &mut [f32; 16], offset: usize, value: f32x8) {
-        values.as_chunks_mut::<8>().0[offset / 8] = cast!(value);
-    }
-    #[inline(always)]
     fn count_from(self, first: u32) -> u32x8 {
         let lanes: [u32; 8] = std::array::from_fn(|lane| lane as u32);
         self.add_bits(self.word(first), cast!(lanes))

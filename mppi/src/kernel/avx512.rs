@@ -23,10 +23,6 @@ impl Kernel for V4 {
         cast!(values.as_chunks::<16>().0[0])
     }
     #[inline(always)]
-    fn store_lanes(self, values: &mut [f32; 16], offset: usize, value: f32x16) {
-        values.as_chunks_mut::<16>().0[offset / 16] = cast!(value);
-    }
-    #[inline(always)]
     fn count_from(self, first: u32) -> u32x16 {
         let lanes: [u32; 16] = std::array::from_fn(|lane| lane as u32);
         self.add_bits(self.word(first), cast!(lanes))

@@ -28,10 +28,6 @@ impl Kernel for Portable {
         std::array::from_fn(|i| values[i])
     }
     #[inline(always)]
-    fn store_lanes(self, values: &mut [f32; 16], offset: usize, value: [f32; 8]) {
-        values.as_chunks_mut::<8>().0[offset / 8] = value;
-    }
-    #[inline(always)]
     fn count_from(self, first: u32) -> Words {
         std::array::from_fn(|i| first.wrapping_add(i as u32))
     }
