@@ -96,6 +96,8 @@ pub(crate) trait Definition {
     /// Whether it reads the gradient or the class of the ground.
     const USES_GROUND: bool = false;
 
+    /// From values in the order of the description's parameters.
+    fn from_values(values: [f64; 4]) -> Self;
     /// Values in the order of the description's parameters.
     fn values(&self) -> [f64; 4];
     /// What a step of `step_s` needs of the parameters.
@@ -153,6 +155,14 @@ macro_rules! catalogue {
             /// What the catalogue says of it.
             pub fn description(&self) -> Description {
                 match self { $(Self::$name(_) => $name::DESCRIPTION,)* }
+            }
+
+            /// The effect with this id and these values of its parameters; `None` for an unknown id.
+            pub fn from_values(id: &str, values: [f64; 4]) -> Option<Self> {
+                $(if id == $name::DESCRIPTION.id {
+                    return Some(Self::$name($name::from_values(values)));
+                })*
+                None
             }
 
             /// Its parameters' values in the order of the description; unused places hold 0.

@@ -20,6 +20,10 @@ impl Definition for SpeedScale {
     };
     const ACTS: Acts = Acts::OnMotion;
 
+    fn from_values([ratio, ..]: [f64; 4]) -> Self {
+        Self { ratio }
+    }
+
     fn values(&self) -> [f64; 4] {
         [self.ratio, 0.0, 0.0, 0.0]
     }

@@ -20,6 +20,10 @@ impl Definition for SteerBias {
     };
     const ACTS: Acts = Acts::OnCommand;
 
+    fn from_values([bias_rad, ..]: [f64; 4]) -> Self {
+        Self { bias_rad }
+    }
+
     fn values(&self) -> [f64; 4] {
         [self.bias_rad, 0.0, 0.0, 0.0]
     }

@@ -20,6 +20,10 @@ impl Definition for SteerDelay {
     };
     const ACTS: Acts = Acts::OnCommand;
 
+    fn from_values([delay_s, ..]: [f64; 4]) -> Self {
+        Self { delay_s }
+    }
+
     fn values(&self) -> [f64; 4] {
         [self.delay_s, 0.0, 0.0, 0.0]
     }

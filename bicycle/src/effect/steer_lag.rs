@@ -20,6 +20,10 @@ impl Definition for SteerLag {
     };
     const ACTS: Acts = Acts::OnCommand;
 
+    fn from_values([time_constant_s, ..]: [f64; 4]) -> Self {
+        Self { time_constant_s }
+    }
+
     fn values(&self) -> [f64; 4] {
         [self.time_constant_s, 0.0, 0.0, 0.0]
     }

@@ -26,6 +26,10 @@ impl Definition for Understeer {
     };
     const ACTS: Acts = Acts::OnMotion;
 
+    fn from_values([gradient_s2_per_m2, ..]: [f64; 4]) -> Self {
+        Self { gradient_s2_per_m2 }
+    }
+
     fn values(&self) -> [f64; 4] {
         [self.gradient_s2_per_m2, 0.0, 0.0, 0.0]
     }

@@ -1,0 +1,341 @@
+//! The model against closed forms, and its packs against its reference.
+
+use bicycle::effect::{CATALOGUE, Effect};
+use bicycle::lanes::{Lanes, Portable, Real, Scalar};
+use bicycle::{Command, GroundSample, LaneState, Limits, Model, ModelError, State, Stepper};
+use proptest::prelude::*;
+use rand::{RngExt, SeedableRng};
+use rand_xoshiro::Xoshiro256PlusPlus;
+
+const STEP_S: f64 = 0.1;
+const WHEELBASE_M: f64 = 2.0;
+
+fn model(effects: Vec<Effect>) -> Model {
+    let limits = Limits {
+        speed_max_mps: 5.0,
+        reverse_speed_max_mps: 2.0,
+        steering_max_rad: 0.6,
+        steering_rate_max_radps: 1.0,
+        acceleration_max_mps2: 2.0,
+        lateral_acceleration_max_mps2: 5.0,
+        roll_max_rad: 0.5,
+        pitch_max_rad: 0.5,
+    };
+    Model { wheelbase_m: WHEELBASE_M, limits, effects }
+}
+
+fn effect(id: &str, value: f64) -> Effect {
+    Effect::from_values(id, [value, 0.0, 0.0, 0.0]).unwrap()
+}
+
+/// Drives `n` steps with one command on firm ground with actuators that follow at once.
+fn run(effects: Vec<Effect>, start: State, command: Command, n: usize) -> Vec<State> {
+    let stepper = Stepper::new(&model(effects), STEP_S, 1.0).with_instant_actuators();
+    let mut memory = vec![0.0; stepper.n_slots()];
+    let mut states = vec![start];
+    for t in 0..n {
+        let next = stepper.step_state(&states[t], command, &GroundSample::FIRM, &mut memory, t);
+        states.push(next);
+    }
+    states
+}
+
+fn command(speed_mps: f32, steering_rad: f32) -> Command {
+    Command { speed_mps, steering_rad }
+}
+
+proptest! {
+    /// PIETRA, equation 2, written out.
+    #[test]
+    fn a_step_is_equation_two(
+        x in -50.0..50.0f64, y in -50.0..50.0f64, yaw in -3.0..3.0f64,
+        v in -2.0..5.0f32, delta in -0.6..0.6f32, psi1 in 0.0..1.0f64, psi2 in 0.0..1.0f64,
+    ) {
+        let stepper = Stepper::new(&model(vec![]), STEP_S, 1.0).with_instant_actuators();
+        let start = State { x_m: x, y_m: y, yaw_rad: yaw, ..State::default() };
+        let ground = GroundSample { linear_traction: psi1, angular_traction: psi2, ..GroundSample::FIRM };
+        let end = stepper.step_state(&start, command(v, delta), &ground, &mut [], 0);
+        let (v, delta) = (f64::from(v), f64::from(delta));
+        prop_assert!((end.x_m - (x + STEP_S * psi1 * v * yaw.cos())).abs() < 1e-12);
+        prop_assert!((end.y_m - (y + STEP_S * psi1 * v * yaw.sin())).abs() < 1e-12);
+        let turned = yaw + STEP_S * psi2 * v * delta.tan() / WHEELBASE_M;
+        prop_assert!((end.yaw_rad - turned).sin().abs() < 1e-12 && (end.yaw_rad - turned).cos() > 0.0);
+    }
+}
+
+/// At constant steering the corners of the track lie on a circle; its radius is that of a regular polygon with side
+/// v dt and outer angle v dt tan(delta) / L.
+#[test]
+fn constant_steering_drives_a_circle() {
+    let (v, delta) = (1.5f32, 0.3f32);
+    let states = run(vec![], State::default(), command(v, delta), 400);
+    let angle = f64::from(v) * STEP_S * f64::from(delta).tan() / WHEELBASE_M;
+    let radius_m = f64::from(v) * STEP_S / (2.0 * (angle / 2.0).sin());
+    // The first side points east; the centre lies across it, half an outer angle ahead.
+    let centre = [radius_m * (angle / 2.0).sin(), radius_m * (angle / 2.0).cos()];
+    for state in &states {
+        let distance_m = (state.x_m - centre[0]).hypot(state.y_m - centre[1]);
+        assert!((distance_m - radius_m).abs() < 1e-9, "{distance_m} {radius_m}");
+    }
+}
+
+#[test]
+fn actuators_keep_their_limits() {
+    let stepper = Stepper::new(&model(vec![]), STEP_S, 1.0);
+    let mut state = State::default();
+    for t in 0..10 {
+        state = stepper.step_state(&state, command(5.0, 0.6), &GroundSample::FIRM, &mut [], t);
+        let n = (t + 1) as f64;
+        // 2 m/s2 and 1 rad/s, until 0.6 rad are reached.
+        assert!((state.speed_mps - 0.2 * n).abs() < 1e-6);
+        assert!((state.steering_rad - (0.1 * n).min(0.6)).abs() < 1e-6);
+    }
+}
+
+#[test]
+fn a_lag_closes_exponentially() {
+    let states = run(vec![effect("speed_lag", 0.4)], State::default(), command(2.0, 0.0), 20);
+    for (t, state) in states.iter().enumerate() {
+        let expected = 2.0 * (1.0 - (-(t as f64) * STEP_S / 0.4).exp());
+        assert!((state.speed_mps - expected).abs() < 1e-9);
+    }
+    let states = run(vec![effect("steer_lag", 0.4)], State::default(), command(0.0, 0.5), 20);
+    assert!((states[4].steering_rad - 0.5 * (1.0 - (-1.0f64).exp())).abs() < 1e-9);
+}
+
+/// Standing still before, a delay D shortens the way at constant speed by v D, whole number of steps or not.
+#[test]
+fn a_delay_shortens_the_way_by_its_length() {
+    for delay_s in [0.0, 0.05, 0.1, 0.23, 0.4] {
+        let states = run(vec![effect("speed_delay", delay_s)], State::default(), command(2.0, 0.0), 30);
+        let expected_m = 2.0 * (3.0 - delay_s);
+        assert!((states[30].x_m - expected_m).abs() < 1e-9, "{delay_s}: {}", states[30].x_m);
+    }
+}
+
+/// What was commanded before the start still comes out of the line, oldest first.
+#[test]
+fn a_delay_remembers_what_was_sent_before() {
+    let stepper =
+        Stepper::new(&model(vec![effect("speed_delay", 0.2)]), STEP_S, 1.0).with_instant_actuators();
+    let mut memory = vec![0.0; stepper.n_slots()];
+    // 1 m/s until 0.1 s before the start, 3 m/s since.
+    let past = |age_s: f64| if age_s > 0.1 { command(1.0, 0.0) } else { command(3.0, 0.0) };
+    stepper.recall(&past, |slot, value| memory[slot] = value);
+    let mut state = State::default();
+    let mut speeds = Vec::new();
+    for t in 0..4 {
+        state = stepper.step_state(&state, command(0.0, 0.0), &GroundSample::FIRM, &mut memory, t);
+        speeds.push(state.speed_mps);
+    }
+    assert_eq!(speeds, [1.0, 3.0, 0.0, 0.0]);
+}
+
+#[test]
+fn static_effects_have_their_closed_forms() {
+    let turned = |effects: Vec<Effect>| run(effects, State::default(), command(2.0, 0.2), 1)[1].yaw_rad;
+    let rate = |delta: f64| 2.0 * delta.tan() / WHEELBASE_M * STEP_S;
+    let delta = f64::from(0.2f32);
+    assert!((turned(vec![effect("steer_gain", 1.2)]) - rate(1.2 * delta)).abs() < 1e-12);
+    assert!((turned(vec![effect("steer_bias", -0.05)]) - rate(delta - 0.05)).abs() < 1e-12);
+    // 1 + 0.1 x 2^2 = 1.4.
+    assert!((turned(vec![effect("understeer", 0.1)]) - rate(delta) / 1.4).abs() < 1e-12);
+    assert!((turned(vec![effect("speed_scale", 0.9)]) - 0.9 * rate(delta)).abs() < 1e-12);
+    let both = vec![effect("speed_scale", 0.9), effect("steer_gain", 1.2)];
+    assert!((turned(both) - 0.9 * rate(1.2 * delta)).abs() < 1e-12);
+    let ahead = run(vec![effect("speed_scale", 0.9)], State::default(), command(2.0, 0.0), 10);
+    assert!((ahead[10].x_m - 1.8).abs() < 1e-12);
+}
+
+#[test]
+fn the_order_in_which_effects_are_listed_does_not_matter() {
+    let list = vec![effect("steer_bias", 0.05), effect("steer_delay", 0.15), effect("steer_gain", 1.3)];
+    let reversed: Vec<Effect> = list.iter().rev().copied().collect();
+    let drive = |effects| run(effects, State::default(), command(1.0, 0.2), 20);
+    assert_eq!(drive(list), drive(reversed));
+}
+
+#[test]
+fn a_neutral_effect_changes_nothing() {
+    let plain = run(vec![], State::default(), command(1.7, 0.25), 30);
+    for description in CATALOGUE {
+        let mut values = [0.0; 4];
+        for (value, parameter) in values.iter_mut().zip(description.parameters) {
+            *value = parameter.neutral;
+        }
+        let neutral = Effect::from_values(description.id, values).unwrap();
+        assert_eq!(neutral.validate(), Ok(()));
+        assert_eq!(neutral.values(), values);
+        for (a, b) in run(vec![neutral], State::default(), command(1.7, 0.25), 30).iter().zip(&plain) {
+            let difference = (a.x_m - b.x_m).abs() + (a.y_m - b.y_m).abs() + (a.yaw_rad - b.yaw_rad).abs();
+            assert!(difference < 1e-12, "{}", description.id);
+        }
+    }
+}
+
+/// Every effect at once, every lane with its own commands and ground, 50 steps: f32 against f64.
+#[test]
+fn packs_agree_with_the_reference() {
+    compare(Portable, |value| value.to_vec(), |values| values.try_into().unwrap());
+    #[cfg(target_arch = "x86_64")]
+    {
+        use pulp::cast;
+        if let Some(v3) = pulp::x86::V3::try_new() {
+            compare(
+                v3,
+                |value| cast::<_, [f32; 8]>(value).to_vec(),
+                |values| cast(<[f32; 8]>::try_from(values).unwrap()),
+            );
+        }
+        if let Some(v4) = pulp::x86::V4::try_new() {
+            compare(
+                v4,
+                |value| cast::<_, [f32; 16]>(value).to_vec(),
+                |values| cast(<[f32; 16]>::try_from(values).unwrap()),
+            );
+        }
+    }
+}
+
+fn compare<L: Lanes>(lanes: L, unpack: impl Fn(L::Value) -> Vec<f32>, pack: impl Fn(&[f32]) -> L::Value) {
+    let mut random = Xoshiro256PlusPlus::seed_from_u64(11);
+    let effects = ["steer_delay", "speed_delay", "steer_gain", "steer_bias", "steer_lag", "speed_lag"]
+        .into_iter()
+        .zip([0.17, 0.25, 1.1, 0.02, 0.15, 0.3])
+        .chain([("speed_scale", 0.95), ("understeer", 0.02)])
+        .map(|(id, value)| effect(id, value));
+    let stepper = Stepper::new(&model(effects.collect()), STEP_S, 1.0);
+    let zero = lanes.real(0.0);
+    let mut state = LaneState { x: zero, y: zero, turns: zero, speed: zero, steering: zero };
+    let mut references = vec![State::default(); L::WIDTH];
+    let mut memory = vec![zero.1; stepper.n_slots()];
+    let mut memories = vec![vec![0.0; stepper.n_slots()]; L::WIDTH];
+    for t in 0..50 {
+        let mut draw = |low: f32, high: f32| -> Vec<f32> {
+            (0..L::WIDTH).map(|_| random.random_range(low..high)).collect()
+        };
+        let (speeds, steerings) = (draw(-2.0, 5.0), draw(-0.6, 0.6));
+        let (linear, angular) = (draw(0.0, 1.0), draw(0.0, 1.0));
+        let real = |values: &[f32]| Real(lanes, pack(values));
+        let ground = GroundSample {
+            linear_traction: real(&linear),
+            angular_traction: real(&angular),
+            gradient: [zero; 2],
+            class: zero,
+        };
+        stepper.step(&mut state, [real(&speeds), real(&steerings)], &ground, &mut memory, t);
+        for lane in 0..L::WIDTH {
+            let ground = GroundSample {
+                linear_traction: f64::from(linear[lane]),
+                angular_traction: f64::from(angular[lane]),
+                ..GroundSample::FIRM
+            };
+            let wish = command(speeds[lane], steerings[lane]);
+            references[lane] = stepper.step_state(&references[lane], wish, &ground, &mut memories[lane], t);
+        }
+    }
+    let (x, y, turns) = (unpack(state.x.1), unpack(state.y.1), unpack(state.turns.1));
+    for lane in 0..L::WIDTH {
+        let reference = &references[lane];
+        assert!((f64::from(x[lane]) - reference.x_m).abs() < 2e-5, "{} {}", x[lane], reference.x_m);
+        assert!((f64::from(y[lane]) - reference.y_m).abs() < 2e-5);
+        let turned = f64::from(turns[lane]) - reference.yaw_rad / std::f64::consts::TAU;
+        assert!((turned - turned.round()).abs() < 2e-6);
+    }
+}
+
+/// The bare step is the whole step of a model without effects and with instant actuators.
+#[test]
+fn the_bare_step_is_the_step_without_effects() {
+    let stepper = Stepper::new(&model(vec![]), STEP_S, 0.25).with_instant_actuators();
+    let real = |value: f64| Real(Scalar, value);
+    let start =
+        LaneState { x: real(1.0), y: real(2.0), turns: real(0.3), speed: real(0.0), steering: real(0.0) };
+    let ground = GroundSample {
+        linear_traction: real(0.8),
+        angular_traction: real(0.6),
+        gradient: [real(0.0); 2],
+        class: real(0.0),
+    };
+    let (mut bare, mut whole) = (start, start);
+    let wish = [real(1.5), real(-0.4)];
+    let rates = stepper.step_bare(&mut bare, wish, &ground);
+    let same = stepper.step(&mut whole, wish, &ground, &mut [], 0);
+    for (a, b) in
+        [(bare.x, whole.x), (bare.y, whole.y), (bare.turns, whole.turns), (rates.yaw_rate, same.yaw_rate)]
+    {
+        assert!((a.1 - b.1).abs() < 1e-15);
+    }
+}
+
+#[test]
+fn impossible_models_are_refused_with_field_and_value() {
+    let refused = |change: &dyn Fn(&mut Model)| {
+        let mut model = model(vec![]);
+        change(&mut model);
+        model.validate().unwrap_err().to_string()
+    };
+    assert_eq!(model(vec![]).validate(), Ok(()));
+    let message = refused(&|model| model.wheelbase_m = 0.0);
+    assert_eq!(message, "wheelbase_m: expected a finite number > 0, found 0");
+    assert!(refused(&|model| model.limits.speed_max_mps = f64::NAN).starts_with("limits.speed_max_mps"));
+    assert!(refused(&|model| model.limits.steering_max_rad = 1.0).contains("0.8"));
+    let message = refused(&|model| model.effects = vec![effect("steer_lag", -1.0)]);
+    assert_eq!(message, "effect steer_lag: time_constant_s: expected 0 to 2 s, found -1");
+    let twice = vec![effect("steer_gain", 1.1), effect("steer_gain", 1.2)];
+    assert_eq!(model(twice).validate(), Err(ModelError::Repeated { id: "steer_gain" }));
+}
+
+#[test]
+fn ids_are_unique_and_known() {
+    for (index, description) in CATALOGUE.iter().enumerate() {
+        assert!(CATALOGUE[..index].iter().all(|other| other.id != description.id));
+        assert!(Effect::from_values(description.id, [0.0; 4]).is_some());
+    }
+    assert_eq!(Effect::from_values("flat_tyre", [0.0; 4]), None);
+}
+
+/// Square roots, tangents and sines of packs over their domains, and what becomes of NaN.
+#[test]
+fn functions_of_packs_are_accurate() {
+    accuracy(Portable, |value| value.to_vec());
+    #[cfg(target_arch = "x86_64")]
+    {
+        use pulp::cast;
+        if let Some(v3) = pulp::x86::V3::try_new() {
+            accuracy(v3, |value| cast::<_, [f32; 8]>(value).to_vec());
+        }
+        if let Some(v4) = pulp::x86::V4::try_new() {
+            accuracy(v4, |value| cast::<_, [f32; 16]>(value).to_vec());
+        }
+    }
+}
+
+fn accuracy<L: Lanes>(lanes: L, unpack: impl Fn(L::Value) -> Vec<f32>) {
+    let first = |value: Real<L>| f64::from(unpack(value.1)[0]);
+    for i in -500..=500 {
+        let share = f64::from(i) / 500.0;
+        let turns = f64::from((0.5 * share) as f32);
+        let (sine, cosine) = lanes.real(turns).sin_cos_turns();
+        let angle = turns * std::f64::consts::TAU;
+        assert!((first(sine) - angle.sin()).abs() < 5e-7 && (first(cosine) - angle.cos()).abs() < 5e-7);
+        let steering = f64::from((0.8 * share) as f32);
+        assert!((first(lanes.real(steering).tan()) - steering.tan()).abs() < 5e-7);
+        let square = f64::from((10.0f64.powf(6.0 * share)) as f32);
+        assert!((first(lanes.real(square).sqrt()) / square.sqrt() - 1.0).abs() < 1e-6);
+        let whole = f64::from((f64::from(i) * 0.3717) as f32);
+        assert!((first(lanes.real(whole).wrap_turns()) - (whole - whole.round())).abs() < 2e-5);
+    }
+    assert!((0.0..1e-5).contains(&first(lanes.real(0.0).sqrt())));
+    assert!(first(lanes.real(f64::NAN).sqrt()).is_nan());
+    let (nan, one) = (lanes.real(f64::NAN), lanes.real(1.0));
+    let [zero, two] = [0.0, 2.0].map(|value| lanes.real(value));
+    assert_eq!(first(nan.max(one)), 1.0);
+    assert_eq!(first(nan.min(one)), 1.0);
+    assert!(first(one.max(nan)).is_nan() && first(one.min(nan)).is_nan());
+    assert_eq!(first(two.or_else(nan.exceeds(one), zero)), 2.0);
+    assert_eq!(first(two.or_else(one.exceeds(one), zero)), 0.0);
+    assert_eq!(first(two.or_else(nan.less(one), zero)), 0.0);
+    assert_eq!(first(zero.add_where(one.less(two), two)), 2.0);
+    assert_eq!(first(zero.add_where(two.less(one), nan)), 0.0);
+}
