@@ -25,6 +25,7 @@ use terrain::Pose;
 use crate::{Motion, World};
 use chassis::{BodyMotion, Chassis, Wrench};
 use drivetrain::Drivetrain;
+use envelope::Disc;
 use ground::Ground;
 use rest::{Rest, Stance};
 use servo::{DelayQueue, SteeringServo};
@@ -338,12 +339,11 @@ fn standing(stance: &Stance, gear: &RunningGear, ground: &Ground, start: [f64; 3
     let pitch_rad = ((rear_left + rear_right - front_left - front_right) / (2.0 * wheelbase_m)).atan();
     let roll_rad = ((front_left + rear_left - front_right - rear_right) / (2.0 * track_m)).atan();
     let rotation = UnitQuaternion::from_euler_angles(roll_rad, pitch_rad, yaw_rad);
-    let axes = [Vector3::x(), Vector3::y(), Vector3::z()].map(|axis| rotation * axis);
-    let [forward, left, up] = axes;
+    let left = rotation * Vector3::y();
     let lowest_m = 0.5 * (rear_left + rear_right);
     let depth_m = stance.hub_m.map(|hub_m| {
         let hub_m = Vector3::new(x_m, y_m, lowest_m) + rotation * hub_m;
-        gear.envelope.depth_m(ground, &envelope::WheelFrame { hub_m, forward, left, up })
+        Disc::new(hub_m, left).map_or(0.0, |disc| gear.envelope.depth_m(ground, &disc))
     });
     let deepest_m = depth_m.into_iter().fold(f64::NEG_INFINITY, f64::max);
     let rest_depth_m = gear.envelope.radius_m() - stance.axle_height_m;

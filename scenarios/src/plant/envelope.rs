@@ -15,19 +15,21 @@ const N_SLICES: usize = 3;
 const RIM_SHARE: f64 = 0.5;
 /// Share of the radius below which the ground may not come to the hub in the closed form (it is singular there).
 const CORE_SHARE: f64 = 0.25;
+/// Sine of the axle's inclination beyond which a wheel lies on its side.
+const LYING_SINE: f64 = 0.95;
 /// Steepest ground across the tread that the contact normal follows [-].
 const CROSS_SLOPE_MAX: f64 = 2.0;
 
-/// Where a wheel is: hub and the directions of its plane, in map coordinates.
+/// Where a wheel is, in map coordinates.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct WheelFrame {
+pub(crate) struct Disc {
     pub hub_m: Vector3<f64>,
-    /// Rolling direction.
-    pub forward: Vector3<f64>,
     /// Along the axle.
     pub left: Vector3<f64>,
-    /// Along the strut.
-    pub up: Vector3<f64>,
+    /// In the wheel's plane, level.
+    ahead: Vector3<f64>,
+    /// In the wheel's plane, upwards.
+    up: Vector3<f64>,
 }
 
 /// The ground's answer to a wheel.
@@ -60,6 +62,17 @@ struct Pressure {
     weight: f64,
     radius: f64,
     lateral: f64,
+}
+
+impl Disc {
+    /// `None` for a wheel that lies on its side: there the body touches first.
+    pub(crate) fn new(hub_m: Vector3<f64>, left: Vector3<f64>) -> Option<Self> {
+        if left.z.abs() > LYING_SINE {
+            return None;
+        }
+        let ahead = Vector3::new(left.y, -left.x, 0.0).normalize();
+        Some(Self { hub_m, left, ahead, up: ahead.cross(&left) })
+    }
 }
 
 impl Envelope {
@@ -102,13 +115,13 @@ impl Envelope {
     }
 
     /// How far the ground reaches above the unloaded tread, negative when the wheel is in the air [m].
-    pub(crate) fn depth_m(&self, ground: &Ground, frame: &WheelFrame) -> f64 {
+    pub(crate) fn depth_m(&self, ground: &Ground, disc: &Disc) -> f64 {
         let mut deepest_m = f64::NEG_INFINITY;
         for left_m in self.slices_m() {
-            let centre = frame.hub_m + frame.left * left_m;
+            let centre = disc.hub_m + disc.left * left_m;
             for &ahead_m in &self.stations_m {
                 let rim_m = (self.radius_m * self.radius_m - ahead_m * ahead_m).max(0.0).sqrt();
-                let rim = centre + frame.forward * ahead_m - frame.up * rim_m;
+                let rim = centre + disc.ahead * ahead_m - disc.up * rim_m;
                 deepest_m = deepest_m.max(ground.height_m(rim.x, rim.y) - rim.z);
             }
         }
@@ -116,21 +129,20 @@ impl Envelope {
     }
 
     /// Contact of the wheel with the ground, `None` in the air.
-    pub(crate) fn touch(&self, ground: &Ground, frame: &WheelFrame) -> Option<Contact> {
+    pub(crate) fn touch(&self, ground: &Ground, disc: &Disc) -> Option<Contact> {
         let mut pressure = Pressure::default();
         for left_m in self.slices_m() {
-            self.press_slice(ground, frame, left_m, &mut pressure);
+            self.press_slice(ground, disc, left_m, &mut pressure);
         }
         if pressure.weight <= 0.0 {
             return None;
         }
         let loaded_radius_m = pressure.radius / pressure.weight;
         let inward = pressure.force.normalize();
-        let point_m = frame.hub_m + frame.left * (pressure.lateral / pressure.weight)
-            - (frame.forward * inward.x + frame.up * inward.y) * loaded_radius_m;
-        let cross_slope = self.cross_slope(ground, frame, &point_m);
-        let force =
-            frame.forward * pressure.force.x + (frame.up - frame.left * cross_slope) * pressure.force.y;
+        let point_m = disc.hub_m + disc.left * (pressure.lateral / pressure.weight)
+            - (disc.ahead * inward.x + disc.up * inward.y) * loaded_radius_m;
+        let cross_slope = self.cross_slope(ground, disc, &point_m);
+        let force = disc.ahead * pressure.force.x + (disc.up - disc.left * cross_slope) * pressure.force.y;
         let magnitude = force.norm();
         let force_n = magnitude * self.stiffness_n_per_m2 / N_SLICES as f64;
         Some(Contact { point_m, normal: force / magnitude, force_n, loaded_radius_m })
@@ -140,15 +152,14 @@ impl Envelope {
         [-self.width_m / 3.0, 0.0, self.width_m / 3.0]
     }
 
-    fn press_slice(&self, ground: &Ground, frame: &WheelFrame, left_m: f64, pressure: &mut Pressure) {
-        let foot = frame.hub_m + frame.left * left_m - frame.up * self.radius_m;
+    fn press_slice(&self, ground: &Ground, disc: &Disc, left_m: f64, pressure: &mut Pressure) {
+        let foot = disc.hub_m + disc.left * left_m - disc.up * self.radius_m;
         let mut previous = None;
         for &ahead_m in &self.stations_m {
-            let place = foot + frame.forward * ahead_m;
+            let place = foot + disc.ahead * ahead_m;
             let above_m = ground.height_m(place.x, place.y) - place.z;
             // The ground point in the wheel's plane, seen from the hub.
-            let point =
-                Vector2::new(ahead_m + above_m * frame.forward.z, above_m * frame.up.z - self.radius_m);
+            let point = Vector2::new(ahead_m, above_m * disc.up.z - self.radius_m);
             if let Some(before) = previous
                 && let Some((force, radius_m)) = self.segment(before, point)
             {
@@ -162,8 +173,9 @@ impl Envelope {
         }
     }
 
-    /// Force of a straight piece of ground on a disc over its stiffness [m2], and the distance of the pressed
-    /// part from the hub [m]: the integral of (r - rho) times the direction to the hub over the part inside.
+    /// Force of a straight piece of ground, from back to front, on a disc over its stiffness [m2], and the distance
+    /// of the pressed part from the hub [m]: the integral of (r - rho) times the direction to the hub over the part
+    /// inside.
     #[inline]
     fn segment(&self, start: Vector2<f64>, end: Vector2<f64>) -> Option<(Vector2<f64>, f64)> {
         let r = self.radius_m;
@@ -174,38 +186,147 @@ impl Envelope {
         if beside && outside(&start) && outside(&end) {
             return None;
         }
-        let length = run.norm();
-        let tangent = run / length;
-        // Towards the hub when the chain runs forward.
+        let tangent = run / run.norm();
         let normal = Vector2::new(-tangent.y, tangent.x);
-        let distance = -start.dot(&normal);
-        // Ground that runs backward is the far side of an edge: it pushes only what lies before it.
-        if distance >= r || (distance < 0.0 && run.x <= 0.0) {
-            return None;
-        }
-        let d = distance.max(CORE_SHARE * r);
-        let half = (r * r - d * d).sqrt();
+        let mut d = -start.dot(&normal);
+        let half = (r * r - d * d).max(0.0).sqrt();
         let a = start.dot(&tangent).max(-half);
         let b = end.dot(&tangent).min(half);
-        if a >= b || length < 1e-9 {
+        if a >= b {
             return None;
         }
+        let nearest = if a < 0.0 && b > 0.0 { d } else { d.hypot(a.abs().min(b.abs())) };
+        // With the hub in or almost in the ground the direction to it says nothing.
+        if nearest < CORE_SHARE * r {
+            d = CORE_SHARE * r;
+        }
         let (rho_a, rho_b) = ((d * d + a * a).sqrt(), (d * d + b * b).sqrt());
-        let inward = d * (r * ((b + rho_b) / (a + rho_a)).ln() - (b - a));
+        // asinh(b/d) - asinh(a/d), written so that a line through the hub does no harm.
+        let ratio = if b <= 0.0 { (rho_a - a) / (rho_b - b) } else { (b + rho_b) / (a + rho_a) };
+        let inward = d * (r * ratio.ln() - (b - a));
         let along = -(r * (rho_b - rho_a) - 0.5 * (rho_b * rho_b - rho_a * rho_a));
-        let rim = r * (RIM_SHARE * r - distance).max(0.0) * (b - a) / (2.0 * half);
+        let rim = r * (RIM_SHARE * r - nearest).max(0.0) * (b - a) / (2.0 * r);
         let middle = 0.5 * (a + b);
         Some((normal * (inward + rim) + tangent * along, (d * d + middle * middle).sqrt()))
     }
 
     /// Rise of the ground per length along the axle, seen in the wheel's frame [-].
-    fn cross_slope(&self, ground: &Ground, frame: &WheelFrame, point_m: &Vector3<f64>) -> f64 {
+    fn cross_slope(&self, ground: &Ground, disc: &Disc, point_m: &Vector3<f64>) -> f64 {
         let above_m = |side: f64| {
-            let place = point_m + frame.left * (0.5 * side * self.width_m);
+            let place = point_m + disc.left * (0.5 * side * self.width_m);
             ground.height_m(place.x, place.y) - place.z
         };
         let rise_m = above_m(1.0) - above_m(-1.0);
-        let run_m = (self.width_m + rise_m * frame.left.z).max(0.1 * self.width_m);
-        (rise_m * frame.up.z / run_m).clamp(-CROSS_SLOPE_MAX, CROSS_SLOPE_MAX)
+        let run_m = (self.width_m + rise_m * disc.left.z).max(0.1 * self.width_m);
+        (rise_m * disc.up.z / run_m).clamp(-CROSS_SLOPE_MAX, CROSS_SLOPE_MAX)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use terrain::GridGeometry;
+
+    use super::*;
+    use crate::{Patch, Stribeck, World};
+
+    const RADIUS_M: f64 = 0.4;
+
+    fn ground(height_m: impl Fn(f64, f64) -> f64) -> Ground {
+        let geometry = GridGeometry::centred(0.1, 80, 80, 0.0, 0.0);
+        let patch = |_: f64, _: f64| Patch::open(Stribeck::ROCK);
+        Ground::new(Arc::new(World::from_fn("test", geometry, height_m, patch).unwrap()))
+    }
+
+    /// A tyre of 200 kN/m under 4 kN: 20 mm.
+    fn tyre() -> Envelope {
+        Envelope::new(RADIUS_M, 0.2, 200_000.0, 4000.0, 0.1)
+    }
+
+    /// Upright, heading east.
+    fn upright(hub_m: Vector3<f64>) -> Disc {
+        Disc::new(hub_m, Vector3::y()).unwrap()
+    }
+
+    #[test]
+    fn the_plane_answers_with_the_given_stiffness() {
+        let tyre = tyre();
+        assert!((tyre.deflection_m(4000.0) - 0.02).abs() < 1e-9);
+        // Depth to the power 1.5 for small depths: half the load at 2^(-2/3) of the depth.
+        assert!((tyre.deflection_m(2000.0) / (0.02 * 2f64.powf(-2.0 / 3.0)) - 1.0).abs() < 0.01);
+        let hub_m = Vector3::new(0.013, 0.021, RADIUS_M - 0.02);
+        for heading in [Vector3::y(), -Vector3::x(), Vector3::new(0.6, 0.8, 0.0)] {
+            let contact = tyre.touch(&ground(|_, _| 0.0), &Disc::new(hub_m, heading).unwrap()).unwrap();
+            assert!((contact.force_n - 4000.0).abs() < 1e-6, "{contact:?}");
+            assert!((contact.normal - Vector3::z()).norm() < 1e-9, "{contact:?}");
+        }
+    }
+
+    #[test]
+    fn a_slope_pushes_along_its_normal() {
+        for slope_rad in [0.2f64, 0.5, 0.9] {
+            let normal = Vector3::new(-slope_rad.sin(), 0.0, slope_rad.cos());
+            let ground = ground(|x_m, _| x_m * slope_rad.tan());
+            let contact = tyre().touch(&ground, &upright(normal * (RADIUS_M - 0.02))).unwrap();
+            assert!((contact.force_n / 4000.0 - 1.0).abs() < 1e-3, "{slope_rad}: {contact:?}");
+            assert!((contact.normal - normal).norm() < 1e-3, "{slope_rad}: {contact:?}");
+        }
+    }
+
+    #[test]
+    fn a_leaning_wheel_on_a_leaning_plane_is_an_upright_one_on_a_level_plane() {
+        let slope_rad = 0.5f64;
+        let normal = Vector3::new(0.0, -slope_rad.sin(), slope_rad.cos());
+        let left = Vector3::new(0.0, slope_rad.cos(), slope_rad.sin());
+        let ground = ground(|_, y_m| y_m * slope_rad.tan());
+        let disc = Disc::new(normal * (RADIUS_M - 0.02), left).unwrap();
+        let contact = tyre().touch(&ground, &disc).unwrap();
+        assert!((contact.force_n / 4000.0 - 1.0).abs() < 1e-3, "{contact:?}");
+        assert!((contact.normal - normal).norm() < 1e-3, "{contact:?}");
+    }
+
+    #[test]
+    fn a_cross_slope_pushes_sideways() {
+        // An upright wheel on ground that rises to its left by 0.2: the normal leans to the right.
+        let ground = ground(|_, y_m| 0.2 * y_m);
+        let hub_m = Vector3::new(0.0, 0.0, RADIUS_M - 0.02);
+        let contact = tyre().touch(&ground, &upright(hub_m)).unwrap();
+        let expected = Vector3::new(0.0, -0.2, 1.0).normalize();
+        assert!((contact.normal - expected).norm() < 1e-3, "{contact:?}");
+        // And the centre of pressure moves uphill.
+        assert!(contact.point_m.y > 0.005, "{contact:?}");
+    }
+
+    #[test]
+    fn rough_ground_presses_as_the_sum_over_its_points() {
+        // Kinks at the cell centres only, which every other station hits: the chain is the ground itself.
+        let heights_m = |x_m: f64| 0.05 * (9.0 * x_m).sin() + 0.03 * (23.0 * x_m).cos();
+        let ground = ground(|x_m, _| heights_m(x_m));
+        for step in 0..20 {
+            let hub_m =
+                Vector3::new(0.05 + 0.1 * f64::from(step), 0.05, heights_m(0.1 * f64::from(step)) + 0.37);
+            let found = tyre().touch(&ground, &upright(hub_m));
+            let mut sum = Vector3::zeros();
+            let n = 80_000;
+            let dx_m = 2.0 * RADIUS_M / f64::from(n);
+            for i in 0..n {
+                let x_m = hub_m.x - RADIUS_M + (f64::from(i) + 0.5) * dx_m;
+                let height_m = |x_m: f64| ground.height_m(x_m, 0.05);
+                let rise = (height_m(x_m + 0.5 * dx_m) - height_m(x_m - 0.5 * dx_m)) / dx_m;
+                let towards = hub_m - Vector3::new(x_m, hub_m.y, height_m(x_m));
+                let depth_m = (RADIUS_M - towards.norm()).max(0.0);
+                sum += towards.normalize() * (depth_m * dx_m * (1.0 + rise * rise).sqrt());
+            }
+            let expected_n = sum * tyre().stiffness_n_per_m2;
+            let found_n = found.map_or(Vector3::zeros(), |contact| contact.normal * contact.force_n);
+            assert!((found_n - expected_n).norm() < 1.0 + 2e-3 * expected_n.norm(), "{found_n} {expected_n}");
+        }
+    }
+
+    #[test]
+    fn a_wheel_in_the_air_touches_nothing() {
+        let hub_m = Vector3::new(0.0, 0.0, RADIUS_M + 1e-6);
+        assert!(tyre().touch(&ground(|_, _| 0.0), &upright(hub_m)).is_none());
     }
 }

@@ -128,3 +128,92 @@ pub(crate) fn adhesion(curve: &Stribeck, speed_mps: f64) -> f64 {
         sliding
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const LOAD_N: f64 = 4000.0;
+
+    fn tyre() -> Tyre {
+        Tyre {
+            relaxation_length_m: 0.3,
+            load_sensitivity: 0.2,
+            reference_load_n: LOAD_N,
+            shear_per_m: 40.0,
+            damping_s_per_m: 0.5,
+        }
+    }
+
+    /// Friction over load after `duration_s` of steady slip.
+    fn friction(slip_mps: Vector2<f64>, rolling_mps: f64, load_n: f64, duration_s: f64) -> Vector2<f64> {
+        let footing = Footing { slip_mps, rolling_mps, load_n, friction: Stribeck::ASPHALT };
+        let mut shear = Shear::default();
+        let mut force_n = Vector2::zeros();
+        for _ in 0..(duration_s / 1e-3).round() as usize {
+            force_n = tyre().grip(&mut shear, &footing, 1e-3).force_n;
+        }
+        force_n / load_n
+    }
+
+    #[test]
+    fn the_curve_peaks_at_the_static_friction_and_ends_at_the_dynamic() {
+        let curve = Stribeck::ASPHALT;
+        let value = |speed_mps: f64| friction_per_speed(&curve, speed_mps) * speed_mps;
+        // vS / sqrt2 = 3.18 m/s: (0.98 - 0.70) + 0.70 tanh(10).
+        let peak_mps = 4.5 / SQRT_2;
+        assert!((value(peak_mps) - 0.98).abs() < 1e-6);
+        assert!(value(0.9 * peak_mps) < 0.98 && value(1.1 * peak_mps) < 0.98);
+        assert!((value(20.0) - 0.70).abs() < 1e-6);
+        // At zero the limit of mu / v: (sqrt(2e) 0.28 + 10 sqrt2 0.70) / 4.5.
+        let limit = ((2.0 * E).sqrt() * 0.28 + 10.0 * SQRT_2 * 0.70) / 4.5;
+        assert!((friction_per_speed(&curve, 0.0) - limit).abs() < 1e-6);
+        assert!((friction_per_speed(&curve, 1e-4) - limit).abs() < 1e-4);
+    }
+
+    #[test]
+    fn a_rolling_tyre_slides_by_the_curve_against_its_slip() {
+        let slip_mps = Vector2::new(0.6, -0.8);
+        let curve = friction_per_speed(&Stribeck::ASPHALT, 1.0);
+        let found = friction(slip_mps, 20.0, LOAD_N, 1.0);
+        assert!((found + slip_mps * curve).norm() < 0.01, "{found}");
+    }
+
+    #[test]
+    fn force_builds_up_over_the_relaxation_length() {
+        // 10 m/s over 0.3 m: after 0.03 s the force stands at 1 - 1/e of its end.
+        let slip_mps = Vector2::new(0.0, 0.2);
+        let share = friction(slip_mps, 10.0, LOAD_N, 0.03).y / friction(slip_mps, 10.0, LOAD_N, 1.0).y;
+        assert!((share - (1.0 - 1.0 / E)).abs() < 0.02, "{share}");
+    }
+
+    #[test]
+    fn a_locked_tyre_holds_by_shear_and_slides_at_the_static_friction() {
+        // 5 mm of shear at 40 / m: 0.2, and it stays.
+        let mut shear = Shear::default();
+        let mut footing = Footing {
+            slip_mps: Vector2::new(0.05, 0.0),
+            rolling_mps: 0.0,
+            load_n: LOAD_N,
+            friction: Stribeck::ASPHALT,
+        };
+        for _ in 0..100 {
+            tyre().grip(&mut shear, &footing, 1e-3);
+        }
+        footing.slip_mps = Vector2::zeros();
+        for _ in 0..60_000 {
+            tyre().grip(&mut shear, &footing, 1e-3);
+        }
+        let held = tyre().grip(&mut shear, &footing, 1e-3).force_n.x / LOAD_N;
+        assert!((held + 0.2).abs() < 1e-9, "{held}");
+        let sliding = friction(Vector2::new(0.3, 0.0), 0.0, LOAD_N, 1.0);
+        assert!((sliding.x + 0.98).abs() < 1e-6, "{sliding}");
+    }
+
+    #[test]
+    fn friction_falls_with_load() {
+        let slip_mps = Vector2::new(0.0, 3.0);
+        let ratio = friction(slip_mps, 20.0, 2.0 * LOAD_N, 1.0).y / friction(slip_mps, 20.0, LOAD_N, 1.0).y;
+        assert!((ratio - 0.8).abs() < 1e-3, "{ratio}");
+    }
+}

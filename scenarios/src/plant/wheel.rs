@@ -5,7 +5,7 @@ use nalgebra::{Vector2, Vector3};
 
 use super::chassis::{BodyMotion, Wrench};
 use super::drivetrain::WheelTorque;
-use super::envelope::{Contact, Envelope, WheelFrame};
+use super::envelope::{Contact, Disc, Envelope};
 use super::ground::Ground;
 use super::rest::Rest;
 use super::tyre::{Footing, Shear, Tyre};
@@ -17,6 +17,18 @@ const STOP_RATIO: f64 = 10.0;
 const STOP_DAMPING: f64 = 0.3;
 /// Radial damping of the tyre over critical for the wheel [-].
 const TYRE_DAMPING: f64 = 0.05;
+
+/// Hub of a wheel and the directions of strut and steering, in map coordinates.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct WheelFrame {
+    pub hub_m: Vector3<f64>,
+    /// Rolling direction.
+    forward: Vector3<f64>,
+    /// Along the axle.
+    left: Vector3<f64>,
+    /// Along the strut.
+    up: Vector3<f64>,
+}
 
 /// State of one wheel.
 #[derive(Clone, Copy, Debug)]
@@ -179,7 +191,8 @@ impl RunningGear {
         let frame = wheel.frame(body, input.steering_rad);
         let hub_mps = body.velocity_at_mps(&frame.hub_m) + frame.up * wheel.travel_mps;
         let body_radps = body.angular_radps.dot(&frame.left);
-        wheel.contact = self.envelope.touch(ground, &frame);
+        wheel.contact =
+            Disc::new(frame.hub_m, frame.left).and_then(|disc| self.envelope.touch(ground, &disc));
         let stand = match wheel.contact {
             Some(contact) => {
                 let slide = self.slide(wheel, &contact, &frame, &hub_mps, body);
