@@ -24,7 +24,8 @@ pub struct SurfaceCell {
     pub height_variance_m2: f32,
     /// Height of soft vegetation above the ground [m].
     pub vegetation_height_m: f32,
-    /// Probability of each [`TerrainClass`]; sums to one where anything was seen, zeros otherwise.
+    /// Probability of each [`TerrainClass`]; sums to one where the height is known or anything was seen, zeros
+    /// otherwise. An obstacle may be seen where the ground is not.
     pub class_probability: [f32; TerrainClass::COUNT],
     /// How the height came to be known.
     pub knowledge: Knowledge,

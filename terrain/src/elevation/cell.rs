@@ -127,6 +127,9 @@ impl CellState {
         let above = if reference_m.is_nan() { lowest_m } else { reference_m };
         let touching = |p: &&CellPoint| p.height_m <= above + config.clearance_m;
         let touching = points.iter().filter(touching);
+        if touching.clone().next().is_none() {
+            return self.hang(points, config);
+        }
         let highest_m = touching.clone().fold(f32::NEG_INFINITY, |high, p| high.max(p.height_m));
         self.fade_obstacle(highest_m, config);
         let rigid = touching.clone().filter(|p| p.is_rigid());
@@ -152,12 +155,25 @@ impl CellState {
         }
     }
 
+    /// Takes in that all points of a scan hang high above what passes for ground. Rigid ground does not hang:
+    /// when scan after scan says so, the map was wrong.
+    fn hang(&mut self, points: &[CellPoint], config: &ElevationConfig) {
+        if !points.iter().all(CellPoint::is_rigid) {
+            return;
+        }
+        self.contradictions = self.contradictions.saturating_add(1);
+        if self.contradictions >= config.ghost_scans {
+            *self = Self::NEW;
+            self.fuse(points, f32::NAN, config);
+        }
+    }
+
     /// Takes in that a ray went through the cell at `height_m` and no point of the scan fell into it.
     pub fn pass(&mut self, height_m: f32, config: &ElevationConfig) {
         if self.ground == Ground::Unseen {
             self.ceiling_m = self.ceiling_m.min(height_m);
         } else if height_m < self.ground_m - self.margin_m(config) {
-            self.contradictions += 1;
+            self.contradictions = self.contradictions.saturating_add(1);
             if self.contradictions >= config.ghost_scans {
                 *self = Self { ceiling_m: height_m, ..Self::NEW };
             }

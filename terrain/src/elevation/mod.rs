@@ -13,7 +13,7 @@ pub use config::{ElevationConfig, ElevationConfigError};
 use crate::region::LatticeBounds;
 use crate::{CellRegion, Footprint, GridGeometry, GridMap, Pose, Scan, SurfaceCell, TerrainClass};
 use cell::{CellState, Ground};
-use nalgebra::Point3;
+use nalgebra::{Point3, Vector3};
 use sorting::SortedPoints;
 
 /// What became of one scan.
@@ -25,30 +25,31 @@ pub struct FuseReport {
     pub n_rejected_non_finite: usize,
     /// Points dropped because they lie on the vehicle itself.
     pub n_own_body: usize,
-    /// Points dropped because they lie outside the window.
+    /// Points dropped because they lie outside the window, or farther above or below the ray origin than the
+    /// window is wide.
     pub n_out_of_window: usize,
     /// Cells whose surface was published anew by this scan, as one bounding rectangle of the window.
     pub changed: Option<CellRegion>,
 }
 
-/// A scan that cannot be fused.
+/// What the map refuses to take in; it is then left as it was.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum FuseError {
     /// The pose is not a pose.
-    #[error("scan at {valid_at_ns} ns: expected a pose of finite numbers, found {pose:?}")]
-    NonFinitePose {
-        /// When the scan was measured.
-        valid_at_ns: u64,
-        /// The pose that was given.
-        pose: Pose,
-    },
+    #[error("expected a pose of finite numbers, found {0:?}")]
+    NonFinitePose(Pose),
     /// The place from which the rays start is not a place.
-    #[error("scan at {valid_at_ns} ns: expected a finite ray origin, found {origin_m:?}")]
-    NonFiniteOrigin {
-        /// When the scan was measured.
-        valid_at_ns: u64,
-        /// The origin that was given, in the body frame [m].
-        origin_m: [f32; 3],
+    #[error("expected a ray origin of finite numbers, found {0:?}")]
+    NonFiniteOrigin([f32; 3]),
+    /// The assumption about the ground gives no heights.
+    #[error("assumed ground: {field}: expected {expected}, found {found}")]
+    Assumption {
+        /// What cannot be.
+        field: &'static str,
+        /// The range that would do.
+        expected: &'static str,
+        /// The value that was given.
+        found: f64,
     },
 }
 
@@ -61,6 +62,27 @@ pub struct AssumedGround {
     pub axle_height_m: f64,
     /// Standard deviation of the assumed height [m].
     pub height_std_m: f64,
+}
+
+impl AssumedGround {
+    /// Refuses numbers that give no heights, and a body whose z axis rises by less than a tenth of its length.
+    fn check(&self, rise: f64) -> Result<(), FuseError> {
+        let refuse = |field, expected, found| Err(FuseError::Assumption { field, expected, found });
+        if !self.axle_height_m.is_finite() {
+            return refuse("axle_height_m", "a finite number", self.axle_height_m);
+        }
+        if !(self.height_std_m.is_finite() && self.height_std_m > 0.0) {
+            return refuse("height_std_m", "a finite number > 0", self.height_std_m);
+        }
+        if rise < 0.1 {
+            return refuse("cosine of the body's tilt", "at least 0.1", rise);
+        }
+        Ok(())
+    }
+}
+
+fn check_pose(pose: &Pose) -> Result<(), FuseError> {
+    if pose.is_finite() { Ok(()) } else { Err(FuseError::NonFinitePose(*pose)) }
 }
 
 /// The semantic elevation map, fused online from scans and poses.
@@ -117,16 +139,13 @@ impl ElevationMap {
 
     /// Fuses one scan that was taken at `pose`. Non-finite points are dropped and counted.
     pub fn fuse(&mut self, scan: &Scan, pose: &Pose) -> Result<FuseReport, FuseError> {
-        let valid_at_ns = scan.valid_at_ns;
-        if !pose.is_finite() {
-            return Err(FuseError::NonFinitePose { valid_at_ns, pose: *pose });
-        }
+        check_pose(pose)?;
         if !scan.origin_m.iter().all(|v| v.is_finite()) {
-            return Err(FuseError::NonFiniteOrigin { valid_at_ns, origin_m: scan.origin_m });
+            return Err(FuseError::NonFiniteOrigin(scan.origin_m));
         }
         let before = std::mem::replace(&mut self.changed, LatticeBounds::EMPTY);
         self.follow(pose);
-        self.fade(valid_at_ns);
+        self.fade(scan.valid_at_ns);
         self.points.sort(scan, pose, self.states.geometry(), &self.config);
         self.fuse_points();
         self.publish();
@@ -144,13 +163,12 @@ impl ElevationMap {
     /// Takes for granted, where nothing was seen, that the ground carries the wheels of a vehicle at `pose`:
     /// a sensor cannot see below its own vehicle. The cells count as interpolated until they are seen.
     pub fn assume_ground(&mut self, pose: &Pose, assumed: &AssumedGround) -> Result<(), FuseError> {
-        if !pose.is_finite() {
-            return Err(FuseError::NonFinitePose { valid_at_ns: 0, pose: *pose });
-        }
-        self.follow(pose);
+        check_pose(pose)?;
         let motion = pose.isometry();
+        let normal = motion.rotation * Vector3::z();
+        assumed.check(normal.z)?;
+        self.follow(pose);
         let (sin, cos) = pose.yaw_rad.sin_cos();
-        let normal = motion.rotation * nalgebra::Vector3::z();
         let contact = motion * Point3::new(0.0, 0.0, -assumed.axle_height_m);
         let geometry = *self.states.geometry();
         for (index, state) in self.states.values_mut().iter_mut().enumerate() {
@@ -176,9 +194,8 @@ impl ElevationMap {
     /// Whole-cell translations are exact. Otherwise each cell takes over the nearest stored cell, so that
     /// places are off by at most half a cell's diagonal.
     pub fn reanchor(&mut self, before: &Pose, after: &Pose) -> Result<(), FuseError> {
-        if let Some(pose) = [before, after].into_iter().find(|pose| !pose.is_finite()) {
-            return Err(FuseError::NonFinitePose { valid_at_ns: 0, pose: *pose });
-        }
+        check_pose(before)?;
+        check_pose(after)?;
         let [dx_m, dy_m] = [after.x_m - before.x_m, after.y_m - before.y_m];
         let mut geometry = *self.states.geometry();
         geometry.origin[0] += (dx_m / geometry.resolution_m).round() as i64;
@@ -254,4 +271,44 @@ fn moved_states(
         }
     }
     new
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::RangePoint;
+
+    /// Where the map's buffers lie and how much they hold.
+    fn buffers(map: &ElevationMap) -> Vec<(usize, usize)> {
+        let place = |values: *const u8, capacity| (values as usize, capacity);
+        let cells = [map.surface.values().as_ptr().cast(), map.states.values().as_ptr().cast()];
+        let mut all: Vec<_> = cells.map(|values| place(values, 0)).to_vec();
+        all.extend(map.points.buffers());
+        all.extend(map.surfacing.buffers());
+        all.push(place(map.rays.floors_m.as_ptr().cast(), map.rays.floors_m.capacity()));
+        all
+    }
+
+    #[test]
+    fn buffers_stay_where_they_are_once_the_largest_scan_was_seen() {
+        let config =
+            ElevationConfig { n_rows: 50, n_cols: 60, recentre_m: 0.4, ..ElevationConfig::default() };
+        let mut map = ElevationMap::new(config).unwrap();
+        let points = (0..4000_u32).map(|i| RangePoint {
+            position_m: [(i % 61) as f32 * 0.1 - 3.0, (i / 61) as f32 * 0.1 - 3.0, 0.01 * (i % 7) as f32],
+            class: TerrainClass::ALL[(i % 4) as usize],
+        });
+        let mut scan = Scan { valid_at_ns: 0, origin_m: [0.0, 0.0, 1.5], points: points.collect() };
+        let drive = |map: &mut ElevationMap, scan: &Scan| {
+            for i in 0..10 {
+                map.fuse(scan, &Pose { x_m: 0.3 * f64::from(i), ..Pose::default() }).unwrap();
+            }
+        };
+        drive(&mut map, &scan);
+        let before = buffers(&map);
+        drive(&mut map, &scan);
+        scan.points.truncate(1500);
+        drive(&mut map, &scan);
+        assert_eq!(buffers(&map), before);
+    }
 }

@@ -64,6 +64,7 @@ impl SortedPoints {
         self.origin_m = [origin.x, origin.y, origin.z];
         (self.n_rejected_non_finite, self.n_own_body, self.n_out_of_window) = (0, 0, 0);
         self.placed.clear();
+        let reach_m = geometry.n_rows.max(geometry.n_cols) as f64 * geometry.resolution_m;
         let ([west_m, south_m], edge_m) = (geometry.south_west_m(), geometry.resolution_m);
         for point in &scan.points {
             if !point.position_m.iter().all(|v| v.is_finite()) {
@@ -76,7 +77,8 @@ impl SortedPoints {
                 self.n_own_body += 1;
                 continue;
             }
-            let Some(cell) = geometry.cell_at(position.x, position.y) else {
+            let is_near = (position.z - origin.z).abs() <= reach_m;
+            let Some(cell) = geometry.cell_at(position.x, position.y).filter(|_| is_near) else {
                 self.n_out_of_window += 1;
                 continue;
             };
@@ -93,5 +95,19 @@ impl SortedPoints {
             self.placed
                 .push((cell, CellPoint { place, height_m, variance_m2, shared_m2, class: point.class }));
         }
+    }
+}
+
+#[cfg(test)]
+impl SortedPoints {
+    /// Where the buffers lie and how much they hold.
+    pub fn buffers(&self) -> [(usize, usize); 5] {
+        [
+            (self.hit_cells.as_ptr() as usize, self.hit_cells.capacity()),
+            (self.points.as_ptr() as usize, self.points.capacity()),
+            (self.ends.as_ptr() as usize, self.ends.capacity()),
+            (self.counts.as_ptr() as usize, self.counts.capacity()),
+            (self.placed.as_ptr() as usize, self.placed.capacity()),
+        ]
     }
 }

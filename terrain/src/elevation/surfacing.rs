@@ -172,3 +172,15 @@ pub(super) fn fade(surface: &mut GridMap<SurfaceCell>, by_m2: f32) {
         cell.height_variance_m2 += by_m2;
     }
 }
+
+#[cfg(test)]
+impl Scratch {
+    /// Where the buffers lie and how much they hold.
+    pub fn buffers(&self) -> [(usize, usize); 3] {
+        [
+            (self.next.as_ptr() as usize, self.next.capacity()),
+            (self.inferred.as_ptr() as usize, self.inferred.capacity()),
+            (self.enclosure.quadrants.as_ptr() as usize, self.enclosure.quadrants.capacity()),
+        ]
+    }
+}

@@ -76,3 +76,62 @@ impl Ray {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+    use std::collections::BTreeMap;
+
+    const WINDOW: GridGeometry = GridGeometry { resolution_m: 1.0, origin: [0, 0], n_rows: 12, n_cols: 17 };
+
+    proptest! {
+        #[test]
+        fn visited_cells_are_crossed_at_no_more_than_the_height_told(
+            start in ((-8.0..25.0_f32), (-8.0..20.0_f32), (-3.0..3.0_f32)),
+            end in ((0.0..17.0_f32), (0.0..12.0_f32), (-3.0..3.0_f32)),
+        ) {
+            let ray = Ray { start: start.into(), end: end.into() };
+            // The oracle walks in small steps and keeps the way and the heights within each cell.
+            let n_steps = 4000;
+            let mut crossed: BTreeMap<usize, (usize, f32)> = BTreeMap::new();
+            for step in 0..=n_steps {
+                let share = step as f32 / n_steps as f32;
+                let at = |axis: usize| ray.start[axis] + share * (ray.end[axis] - ray.start[axis]);
+                let (col, row) = (at(0), at(1));
+                if (0.0..17.0).contains(&col) && (0.0..12.0).contains(&row) {
+                    let entry = crossed.entry(row as usize * 17 + col as usize).or_insert((0, f32::NEG_INFINITY));
+                    *entry = (entry.0 + 1, entry.1.max(at(2)));
+                }
+            }
+            let mut visited = BTreeMap::new();
+            ray.for_each_cell(&WINDOW, |index, height_m| {
+                visited.insert(index, height_m);
+            });
+            let along = [end.0 - start.0, end.1 - start.1];
+            let length = along[0].hypot(along[1]);
+            let major = along[0].abs().max(along[1].abs());
+            let drop_per_cell = (end.2 - start.2).abs() / major;
+            let own = |place: (f32, f32, f32)| place.1.floor() as i64 * 17 + place.0.floor() as i64;
+            for (index, height_m) in &visited {
+                prop_assert!(crossed.contains_key(index), "cell {} is off the ray", index);
+                let highest_m = crossed[index].1;
+                prop_assert!(*height_m >= highest_m - 1e-3 && *height_m <= highest_m + drop_per_cell + 1e-3);
+                prop_assert!(*index as i64 != own(end));
+            }
+            for (index, (n, _)) in &crossed {
+                // Through two thirds of a column or more: the middle of the column is in the cell.
+                let advance = *n as f32 / n_steps as f32 * major;
+                let is_end = *index as i64 == own(end) || *index as i64 == own(start);
+                let shares_a_column_with_an_end = [start, end].iter().any(|place| {
+                    let (col, row) = (*index % 17, *index / 17);
+                    if along[0].abs() >= along[1].abs() { place.0.floor() as i64 == col as i64 }
+                    else { place.1.floor() as i64 == row as i64 }
+                });
+                if advance > 0.67 && length > 1.0 && !is_end && !shares_a_column_with_an_end {
+                    prop_assert!(visited.contains_key(index), "cell {} was passed over", index);
+                }
+            }
+        }
+    }
+}

@@ -151,6 +151,50 @@ fn plants_stand_on_the_ground_seen_between_them() {
     assert!((cell.height_m - 0.1).abs() < 1e-6 && (cell.vegetation_height_m - 0.4).abs() < 0.03, "{cell:?}");
 }
 
+/// Ground h = 0.2 x + `rise_m` in the eight cells around the spot, plants from 0.3 to 0.6 m in its own.
+fn bush_on_a_slope(rise_m: f64) -> SurfaceCell {
+    let mut map = plain_map(|_| {});
+    let mut points = column(&[0.3, 0.45, 0.6], Vegetation);
+    for (dx_m, dy_m) in (-1..=1).flat_map(|i| (-1..=1).map(move |j| (0.5 * f64::from(i), 0.5 * f64::from(j))))
+    {
+        if (dx_m, dy_m) != (0.0, 0.0) {
+            points.push(([SPOT[0] + dx_m, SPOT[1] + dy_m, 0.2 * (SPOT[0] + dx_m) + rise_m], Open));
+        }
+    }
+    map.fuse(&scan_of(points), &HERE).unwrap();
+    at_spot(&map)
+}
+
+#[test]
+fn ground_hidden_by_plants_is_inferred_from_the_ground_around_them() {
+    let cell = bush_on_a_slope(0.1);
+    assert_eq!(cell.knowledge, Knowledge::Interpolated);
+    assert!(
+        (cell.height_m - 0.15).abs() < 1e-5 && (cell.vegetation_height_m - 0.45).abs() < 1e-5,
+        "{cell:?}"
+    );
+    // Each neighbour has 0.02^2; what is inferred is no better.
+    assert!(cell.height_variance_m2 >= 0.99 * 4e-4);
+    assert_eq!(cell.class(), Vegetation);
+}
+
+#[test]
+fn hidden_ground_is_never_above_the_lowest_leaf() {
+    assert!((bush_on_a_slope(0.9).height_m - 0.3).abs() < 1e-6);
+}
+
+#[test]
+fn in_a_meadow_the_ground_is_at_the_lowest_leaf_around_and_uncertain() {
+    let mut map = plain_map(|config| config.hidden_ground_std_m = 0.15);
+    let leaves =
+        |x_m: f64, low_m: f64| [([x_m, SPOT[1], low_m], Vegetation), ([x_m, SPOT[1], 0.8], Vegetation)];
+    let points = [leaves(SPOT[0], 0.4), leaves(SPOT[0] + 0.5, 0.2), leaves(SPOT[0] + 2.0, 0.1)].concat();
+    map.fuse(&scan_of(points), &HERE).unwrap();
+    let cell = at_spot(&map);
+    assert_eq!((cell.knowledge, cell.height_m), (Knowledge::Interpolated, 0.2), "0.1 m is two metres away");
+    assert!((cell.vegetation_height_m - 0.6).abs() < 1e-6 && (cell.height_variance_m2 - 0.0225).abs() < 1e-7);
+}
+
 #[test]
 fn a_leaf_named_as_ground_does_not_lift_the_ground() {
     let mut map = plain_map(|_| {});
@@ -174,6 +218,16 @@ fn branches_above_the_vehicle_are_left_out() {
 }
 
 #[test]
+fn ground_far_above_a_false_low_return_is_believed_the_second_time() {
+    let mut map = plain_map(|_| {});
+    map.fuse(&scan_of(column(&[-4.0], Open)), &HERE).unwrap();
+    map.fuse(&scan_of(column(&[0.0, 0.0], Open)), &HERE).unwrap();
+    assert_eq!(at_spot(&map).height_m, -4.0);
+    map.fuse(&scan_of(column(&[0.0, 0.0], Open)), &HERE).unwrap();
+    assert_eq!(at_spot(&map).height_m, 0.0);
+}
+
+#[test]
 fn a_steep_face_is_an_obstacle_whatever_its_name() {
     let mut map = plain_map(|_| {});
     let face: Vec<f64> = (0..20).map(|i| 0.1 * f64::from(i)).collect();
@@ -193,12 +247,13 @@ fn bad_points_are_dropped_and_counted() {
         ([0.0, f64::INFINITY, 0.0], Open),
         ([0.0, 0.0, f64::NEG_INFINITY], Obstacle),
         ([100.0, 0.0, 0.0], Open),
+        ([1.0, 1.0, 1e30], Open),
         ([0.3, 0.0, 10.5], Obstacle),
         ([SPOT[0], SPOT[1], 0.7], Open),
     ];
     let report = map.fuse(&scan_of(bad), &HERE).unwrap();
-    assert_eq!((report.n_points, report.n_rejected_non_finite), (6, 3));
-    assert_eq!((report.n_out_of_window, report.n_own_body), (1, 1));
+    assert_eq!((report.n_points, report.n_rejected_non_finite), (7, 3));
+    assert_eq!((report.n_out_of_window, report.n_own_body), (2, 1));
     assert_eq!(map.surface().values().iter().filter(|cell| cell.is_known()).count(), 1);
     assert!((at_spot(&map).height_m - 0.7).abs() < 1e-6);
 }
@@ -225,10 +280,10 @@ fn a_pose_or_origin_that_is_no_number_is_refused_and_leaves_the_map_alone() {
         Pose { z_m: f64::INFINITY, ..HERE },
         Pose { yaw_rad: f64::NAN, ..HERE },
     ] {
-        assert!(matches!(map.fuse(&scan, &broken), Err(FuseError::NonFinitePose { .. })));
+        assert!(matches!(map.fuse(&scan, &broken), Err(FuseError::NonFinitePose(_))));
     }
     let nowhere = Scan { origin_m: [0.0, f32::NAN, 0.0], ..scan };
-    assert!(matches!(map.fuse(&nowhere, &HERE), Err(FuseError::NonFiniteOrigin { .. })));
+    assert!(matches!(map.fuse(&nowhere, &HERE), Err(FuseError::NonFiniteOrigin(_))));
     assert!(map.surface().values().iter().all(|cell| !cell.is_known()));
     assert_eq!(map.take_changed(), None);
 }

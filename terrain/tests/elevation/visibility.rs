@@ -1,8 +1,11 @@
 //! What a ranging sensor cannot see stays unknown, and what its rays refute goes: shadows, ditches, drops, ghosts.
 
 use crate::lidar::{Lidar, pose_at};
+use crate::points::plain_map;
 use terrain::TerrainClass::{Obstacle, Open};
-use terrain::{Cell, ElevationConfig, ElevationMap, Knowledge, Pose, SurfaceCell, TerrainClass};
+use terrain::{
+    Cell, ElevationConfig, ElevationMap, Knowledge, Pose, RangePoint, Scan, SurfaceCell, TerrainClass,
+};
 
 const NOISE_M: f64 = 0.01;
 /// Time between scans.
@@ -156,6 +159,61 @@ fn what_has_left_leaves_the_map_within_two_seconds() {
         assert_eq!(share_of(&there, gone), 1.0, "{class:?}: {there:?}");
         assert!(share_of(&there, |cell| cell.is_known() && cell.height_m.abs() < 0.1) > 0.9, "{class:?}");
     }
+}
+
+/// What a map holds at (3.25, 0.25), where `points` were seen once, after `n_scans` whose rays pass there at
+/// 0.84 m above the ground, from 1.5 m at the origin to the ground at (7.25, 0.25), and hit nothing there.
+fn after_passing_rays(points: &[[f32; 3]], class: TerrainClass, n_scans: usize) -> SurfaceCell {
+    let mut map = plain_map(|config| config.gap_radius_m = 0.0);
+    let scan = |points: &[[f32; 3]], class| Scan {
+        valid_at_ns: 0,
+        origin_m: [0.25, 0.25, 1.5],
+        points: points.iter().map(|&position_m| RangePoint { position_m, class }).collect(),
+    };
+    map.fuse(&scan(points, class), &Pose::default()).unwrap();
+    for _ in 0..n_scans {
+        map.fuse(&scan(&[[7.25, 0.25, 0.0]], Open), &Pose::default()).unwrap();
+    }
+    *map.surface().at(3.25, 0.25).unwrap()
+}
+
+#[test]
+fn two_scans_whose_rays_pass_below_a_height_refute_it() {
+    let ghost = [[3.25, 0.25, 1.3]; 5];
+    assert!((after_passing_rays(&ghost, Open, 1).height_m - 1.3).abs() < 1e-6);
+    assert!(!after_passing_rays(&ghost, Open, 2).is_known());
+    // A ray above a height says nothing against it, nor does one just below it.
+    assert!((after_passing_rays(&[[3.25, 0.25, 1.0]; 5], Open, 50).height_m - 1.0).abs() < 1e-6);
+    assert!((after_passing_rays(&[[3.25, 0.25, 0.7]; 5], Open, 50).height_m - 0.7).abs() < 1e-6);
+}
+
+#[test]
+fn a_gap_stays_a_hole_when_a_ray_passes_deep_below_its_rim() {
+    for (end_m, is_filled) in [([3.75, 0.25, 0.0], true), ([7.25, 0.25, -3.0], false)] {
+        let mut points = vec![end_m];
+        for (dx, dy) in (-1..=1).flat_map(|i| (-1..=1).map(move |j| (i, j))).filter(|place| *place != (0, 0))
+        {
+            points.push([3.25 + 0.5 * dx as f32, 0.25 + 0.5 * dy as f32, 0.0]);
+        }
+        let points = points.iter().map(|&position_m| RangePoint { position_m, class: Open }).collect();
+        let mut map = plain_map(|_| {});
+        // The deep ray passes the gap at 1.5 m - 3 m x 4.5 / 7 = -0.43 m.
+        let scan = Scan { valid_at_ns: 0, origin_m: [0.25, 0.25, 1.5], points };
+        map.fuse(&scan, &Pose::default()).unwrap();
+        let gap = map.surface().at(3.25, 0.25).unwrap();
+        assert_eq!(gap.knowledge == Knowledge::Interpolated, is_filled, "{gap:?}");
+        assert!(!is_filled || gap.height_m.abs() < 1e-6);
+    }
+}
+
+#[test]
+fn rays_wear_an_obstacle_away_step_by_step() {
+    let post: Vec<[f32; 3]> = (0..12).map(|i| [3.25, 0.25, 0.1 * i as f32]).collect();
+    let class_after = |n_scans| after_passing_rays(&post, Obstacle, n_scans).class();
+    assert_eq!((class_after(1), class_after(3)), (Obstacle, Obstacle));
+    assert_eq!(class_after(10), Open);
+    let low: Vec<[f32; 3]> = (0..12).map(|i| [3.25, 0.25, 0.05 * i as f32]).collect();
+    assert_eq!(after_passing_rays(&low, Obstacle, 50).class(), Obstacle);
 }
 
 #[test]

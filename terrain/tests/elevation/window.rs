@@ -4,8 +4,8 @@ use crate::points::{plain_config, scan_of};
 use proptest::prelude::*;
 use terrain::TerrainClass::{Obstacle, Open, Vegetation};
 use terrain::{
-    AssumedGround, Cell, CellRegion, ElevationConfig, ElevationMap, Footprint, GridMap, Knowledge, Pose,
-    SurfaceCell,
+    AssumedGround, Cell, CellRegion, ElevationConfig, ElevationMap, Footprint, FuseError, GridMap, Knowledge,
+    Pose, SurfaceCell,
 };
 
 fn pose_at(x_m: f64, y_m: f64) -> Pose {
@@ -104,6 +104,15 @@ fn entering_strips_count_as_changed() {
     assert_eq!(map.take_changed(), Some(CellRegion { rows: 0..40, cols: 36..40 }));
     map.fuse(&scan_of([]), &pose_at(2.0, -1.5)).unwrap();
     assert_eq!(map.take_changed(), Some(CellRegion { rows: 0..3, cols: 0..40 }));
+    for odd in [
+        AssumedGround { axle_height_m: f64::NAN, ..ASSUMED },
+        AssumedGround { height_std_m: 0.0, ..ASSUMED },
+        AssumedGround { height_std_m: f64::INFINITY, ..ASSUMED },
+    ] {
+        assert!(matches!(map.assume_ground(&Pose::default(), &odd), Err(FuseError::Assumption { .. })));
+    }
+    let on_its_side = Pose { roll_rad: 1.55, ..Pose::default() };
+    assert!(map.assume_ground(&on_its_side, &ASSUMED).is_err());
     assert_eq!(map.take_changed(), None);
 }
 
@@ -261,5 +270,14 @@ fn poses_that_are_no_numbers_change_nothing() {
     assert!(map.assume_ground(&broken, &ASSUMED).is_err());
     assert!(map.reanchor(&broken, &Pose::default()).is_err());
     assert!(map.reanchor(&Pose::default(), &broken).is_err());
+    for odd in [
+        AssumedGround { axle_height_m: f64::NAN, ..ASSUMED },
+        AssumedGround { height_std_m: 0.0, ..ASSUMED },
+        AssumedGround { height_std_m: f64::INFINITY, ..ASSUMED },
+    ] {
+        assert!(matches!(map.assume_ground(&Pose::default(), &odd), Err(FuseError::Assumption { .. })));
+    }
+    let on_its_side = Pose { roll_rad: 1.55, ..Pose::default() };
+    assert!(map.assume_ground(&on_its_side, &ASSUMED).is_err());
     assert_eq!(map.take_changed(), None);
 }
