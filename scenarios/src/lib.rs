@@ -5,7 +5,9 @@
 mod arena;
 mod episode;
 mod friction;
+mod layers;
 mod motion;
+mod pair;
 mod plant;
 mod random;
 mod rock_field;
@@ -23,7 +25,9 @@ pub use episode::{
     drive_log,
 };
 pub use friction::Stribeck;
+pub use layers::{LayerConfig, LayersError, WorldLayers, world_from_layers};
 pub use motion::Motion;
+pub use pair::{End, Pair, PairError, PairWish, check_pair, feasible_pair};
 pub use plant::{CommandError, Plant, PlantError, WheelState};
 pub use rock_field::{
     MAPS_PER_SPLIT, RockFieldConfig, RockFieldError, RockMap, RockPopulation, Split, rock_field,
@@ -31,6 +35,6 @@ pub use rock_field::{
 pub use sensor_imu::{IMU_PERIOD_NS, Imu, ImuConfig};
 pub use sensor_odometry::{OdometryConfig, OdometrySensor};
 pub use sensor_range::{RangeSensor, RangeSensorConfig, RangeSensorError};
-pub use task::{ROCK_FIELD_DISTANCE_M, Task};
+pub use task::{LayersTaskError, ROCK_FIELD_DISTANCE_M, Task};
 pub use truth::{Traversability, Truth};
 pub use world::{Bounds, Patch, World, WorldError};

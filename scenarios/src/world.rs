@@ -138,6 +138,15 @@ pub struct Bounds {
 }
 
 impl Bounds {
+    /// The outer border of a grid's cells.
+    pub fn of(geometry: &GridGeometry) -> Self {
+        let south_west_m = geometry.south_west_m();
+        let extent = |n: usize| n as f64 * geometry.resolution_m;
+        let north_east_m =
+            [south_west_m[0] + extent(geometry.n_cols), south_west_m[1] + extent(geometry.n_rows)];
+        Self { south_west_m, north_east_m }
+    }
+
     /// Whether the point lies inside or on the border.
     pub fn contains(&self, x_m: f64, y_m: f64) -> bool {
         (self.south_west_m[0]..=self.north_east_m[0]).contains(&x_m)
@@ -211,12 +220,7 @@ impl World {
 
     /// The outer border of the cells.
     pub fn bounds(&self) -> Bounds {
-        let geometry = self.geometry();
-        let south_west_m = geometry.south_west_m();
-        let extent = |n: usize| n as f64 * geometry.resolution_m;
-        let north_east_m =
-            [south_west_m[0] + extent(geometry.n_cols), south_west_m[1] + extent(geometry.n_rows)];
-        Bounds { south_west_m, north_east_m }
+        Bounds::of(self.geometry())
     }
 
     /// Height of the triangulated ground [m]; not a number where a coordinate is none.

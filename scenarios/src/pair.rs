@@ -1,0 +1,350 @@
+//! Start and goal: whether a vehicle can stand there and get from one to the other.
+
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+use std::f64::consts::TAU;
+use std::sync::Arc;
+
+use bicycle::Vehicle;
+use rand::RngExt;
+use rand_xoshiro::Xoshiro256PlusPlus;
+
+use crate::random::stream;
+use crate::{Bounds, Traversability, Truth, World};
+
+/// Headings in which the vehicle is tried: every 45 degrees, along the lattice's rows, columns and diagonals.
+const STEPS: [[i64; 2]; 8] = [[1, 0], [1, 1], [0, 1], [-1, 1], [-1, 0], [-1, -1], [0, -1], [1, -1]];
+/// Share of the attitude limits that counts as safe to stand on.
+const LIMIT_SHARE: f64 = 0.9;
+/// Traction below which a place counts as one the vehicle cannot leave.
+const TRACTION_MIN: f64 = 0.1;
+/// The search reaches this far around start and goal: a share of their distance, and never less than this [m].
+const DETOUR_SHARE: f64 = 0.75;
+const DETOUR_MIN_LENGTHS: f64 = 5.0;
+/// Pairs that are drawn, and pairs between which a way is searched, before none is found.
+const ATTEMPTS: usize = 400;
+const SEARCHES: usize = 12;
+
+/// One end of a drive.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum End {
+    /// Where it begins.
+    Start,
+    /// Where it is to end.
+    Goal,
+}
+
+impl std::fmt::Display for End {
+    fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        formatter.write_str(match self {
+            Self::Start => "start",
+            Self::Goal => "goal",
+        })
+    }
+}
+
+/// Why a pair of start and goal will not do.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum PairError {
+    /// Not inside the map.
+    #[error(
+        "{end}: expected a point of the map from ({:.1}, {:.1}) to ({:.1}, {:.1}) m, found ({:.1}, {:.1}) m",
+        map.south_west_m[0], map.south_west_m[1], map.north_east_m[0], map.north_east_m[1], at_m[0], at_m[1]
+    )]
+    OutOfMap {
+        /// Which end.
+        end: End,
+        /// Where it is [m].
+        at_m: [f64; 2],
+        /// The map.
+        map: Bounds,
+    },
+    /// The vehicle would touch an obstacle.
+    #[error("{end}: expected free ground, found an obstacle below the vehicle at ({:.1}, {:.1}) m", at_m[0], at_m[1])]
+    OnObstacle {
+        /// Which end.
+        end: End,
+        /// Where it is [m].
+        at_m: [f64; 2],
+    },
+    /// The vehicle would stand too steep.
+    #[error(
+        "{end}: expected roll and pitch up to {roll_max_deg:.0} and {pitch_max_deg:.0} degrees, found {roll_deg:.1} \
+         and {pitch_deg:.1} degrees at ({:.1}, {:.1}) m", at_m[0], at_m[1]
+    )]
+    TooSteep {
+        /// Which end.
+        end: End,
+        /// Where it is [m].
+        at_m: [f64; 2],
+        /// |roll| there [degrees].
+        roll_deg: f64,
+        /// |pitch| there [degrees].
+        pitch_deg: f64,
+        /// Largest |roll| that counts as safe to stand on [degrees].
+        roll_max_deg: f64,
+        /// Largest |pitch| that counts as safe to stand on [degrees].
+        pitch_max_deg: f64,
+    },
+    /// The wheels find no hold, or the vehicle hangs on its belly.
+    #[error("{end}: expected ground to drive on, found no traction at ({:.1}, {:.1}) m", at_m[0], at_m[1])]
+    NoTraction {
+        /// Which end.
+        end: End,
+        /// Where it is [m].
+        at_m: [f64; 2],
+    },
+    /// There is no way that keeps the limits.
+    #[error(
+        "goal: expected a way from the start on which the vehicle keeps its limits, found none within {within_m:.0} m \
+         of the two ends"
+    )]
+    Unreachable {
+        /// How far around the straight line was searched [m].
+        within_m: f64,
+    },
+    /// No pair was found.
+    #[error(
+        "expected a start and a goal {distance_m:.0} m apart with a way between them, found none in {ATTEMPTS} tries"
+    )]
+    NoPair {
+        /// Distance asked for [m].
+        distance_m: f64,
+    },
+}
+
+/// A start and a goal.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pair {
+    /// Rear axle's centre and heading: x [m], y [m], yaw [rad].
+    pub start: [f64; 3],
+    /// Where the rear axle's centre is to come [m].
+    pub goal_m: [f64; 2],
+}
+
+/// Whether the vehicle can stand at the start as it heads, stand at the goal in some heading, and get there: by a
+/// search over poses in which it keeps nine tenths of its attitude limits, touches no obstacle and finds traction.
+/// The search turns on the spot, so it is a necessary condition.
+pub fn check_pair(world: &Arc<World>, vehicle: &Vehicle, pair: &Pair) -> Result<(), PairError> {
+    Checker::new(world, vehicle).check(pair)
+}
+
+/// What is known of a pair beforehand.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct PairWish {
+    /// The start, if it is given: x [m], y [m], yaw [rad].
+    pub start: Option<[f64; 3]>,
+    /// The goal, if it is given [m].
+    pub goal_m: Option<[f64; 2]>,
+    /// How far apart the two shall be where one of them is free [m].
+    pub distance_m: f64,
+}
+
+/// Picks by the seed what of a pair is not given, so that it passes [`check_pair`]. A start that is picked heads for
+/// the goal.
+pub fn feasible_pair(
+    world: &Arc<World>,
+    vehicle: &Vehicle,
+    wish: &PairWish,
+    seed: u64,
+) -> Result<Pair, PairError> {
+    let checker = Checker::new(world, vehicle);
+    if let (Some(start), Some(goal_m)) = (wish.start, wish.goal_m) {
+        let pair = Pair { start, goal_m };
+        return checker.check(&pair).map(|()| pair);
+    }
+    if let Some([x_m, y_m, yaw_rad]) = wish.start {
+        checker.check_end(End::Start, [x_m, y_m], &[yaw_rad])?;
+    }
+    if let Some(goal_m) = wish.goal_m {
+        checker.check_end(End::Goal, goal_m, &std::array::from_fn::<_, 8, _>(heading_rad))?;
+    }
+    let mut rng = stream(seed, &[0x9A12]);
+    let candidates = std::iter::repeat_with(|| candidate(wish, &checker.map, &mut rng)).take(ATTEMPTS);
+    // To see that there is no way takes a search of everything around; to see that there is one does not.
+    let standing = candidates.filter(|pair| checker.check_ends(pair).is_ok()).take(SEARCHES);
+    let none = PairError::NoPair { distance_m: wish.distance_m };
+    standing.into_iter().find(|pair| checker.check_way(pair).is_ok()).ok_or(none)
+}
+
+fn candidate(wish: &PairWish, map: &Bounds, rng: &mut Xoshiro256PlusPlus) -> Pair {
+    let anywhere_m = [0, 1].map(|k| {
+        let share: f64 = rng.random();
+        map.south_west_m[k] + (map.north_east_m[k] - map.south_west_m[k]) * share
+    });
+    let yaw_rad: f64 = rng.random_range(0.0..TAU);
+    let away_m = [wish.distance_m * yaw_rad.cos(), wish.distance_m * yaw_rad.sin()];
+    match (wish.start, wish.goal_m) {
+        (Some(start), _) => Pair { start, goal_m: [start[0] + away_m[0], start[1] + away_m[1]] },
+        (None, goal_m) => {
+            let goal_m = goal_m.unwrap_or(anywhere_m);
+            Pair { start: [goal_m[0] - away_m[0], goal_m[1] - away_m[1], yaw_rad], goal_m }
+        }
+    }
+}
+
+struct Checker<'a> {
+    truth: Truth,
+    vehicle: &'a Vehicle,
+    /// Where the rear axle's centre may be: the vehicle's reach inside the world.
+    map: Bounds,
+    spacing_m: f64,
+}
+
+impl<'a> Checker<'a> {
+    fn new(world: &Arc<World>, vehicle: &'a Vehicle) -> Self {
+        let geometry = &vehicle.geometry;
+        let reach_m = geometry.length_m - geometry.rear_overhang_m;
+        let Bounds { south_west_m, north_east_m } = world.bounds();
+        let map = Bounds {
+            south_west_m: south_west_m.map(|v| v + reach_m),
+            north_east_m: north_east_m.map(|v| v - reach_m),
+        };
+        let spacing_m = (geometry.track_m.min(geometry.wheelbase_m) / 3.0).max(world.geometry().resolution_m);
+        Self { truth: Truth::new(vehicle, Arc::clone(world)), vehicle, map, spacing_m }
+    }
+
+    fn check(&self, pair: &Pair) -> Result<(), PairError> {
+        self.check_ends(pair)?;
+        self.check_way(pair)
+    }
+
+    fn check_ends(&self, pair: &Pair) -> Result<(), PairError> {
+        let [x_m, y_m, yaw_rad] = pair.start;
+        self.check_end(End::Start, [x_m, y_m], &[yaw_rad])?;
+        self.check_end(End::Goal, pair.goal_m, &std::array::from_fn::<_, 8, _>(heading_rad))
+    }
+
+    fn check_way(&self, pair: &Pair) -> Result<(), PairError> {
+        let distance_m = (pair.goal_m[0] - pair.start[0]).hypot(pair.goal_m[1] - pair.start[1]);
+        let within_m = (DETOUR_SHARE * distance_m).max(DETOUR_MIN_LENGTHS * self.vehicle.geometry.length_m);
+        if self.connects(pair, within_m) { Ok(()) } else { Err(PairError::Unreachable { within_m }) }
+    }
+
+    /// Whether the vehicle can stand at a point in one of the headings; else what is wrong with the best of them.
+    fn check_end(&self, end: End, at_m: [f64; 2], headings_rad: &[f64]) -> Result<(), PairError> {
+        if !self.map.contains(at_m[0], at_m[1]) {
+            return Err(PairError::OutOfMap { end, at_m, map: self.map });
+        }
+        let stands: Vec<_> =
+            headings_rad.iter().map(|yaw| self.truth.traversability(at_m[0], at_m[1], *yaw)).collect();
+        if stands.iter().any(|stand| self.is_safe(stand)) {
+            return Ok(());
+        }
+        let limits = &self.vehicle.limits;
+        let steepness = |stand: &Traversability| {
+            (stand.roll_rad.abs() / limits.roll_max_rad).max(stand.pitch_rad.abs() / limits.pitch_max_rad)
+        };
+        let free = stands.iter().filter(|stand| !stand.is_blocked);
+        let Some(best) = free.min_by(|a, b| steepness(a).total_cmp(&steepness(b))) else {
+            return Err(PairError::OnObstacle { end, at_m });
+        };
+        if steepness(best) <= LIMIT_SHARE {
+            return Err(PairError::NoTraction { end, at_m });
+        }
+        Err(PairError::TooSteep {
+            end,
+            at_m,
+            roll_deg: best.roll_rad.abs().to_degrees(),
+            pitch_deg: best.pitch_rad.abs().to_degrees(),
+            roll_max_deg: (LIMIT_SHARE * limits.roll_max_rad).to_degrees(),
+            pitch_max_deg: (LIMIT_SHARE * limits.pitch_max_rad).to_degrees(),
+        })
+    }
+
+    fn is_safe(&self, stand: &Traversability) -> bool {
+        let limits = &self.vehicle.limits;
+        !stand.is_blocked
+            && stand.roll_rad.abs() <= LIMIT_SHARE * limits.roll_max_rad
+            && stand.pitch_rad.abs() <= LIMIT_SHARE * limits.pitch_max_rad
+            && stand.linear_traction >= TRACTION_MIN
+    }
+
+    /// Best-first search over cells and headings: forwards or backwards along the heading, or an eighth of a turn.
+    fn connects(&self, pair: &Pair, within_m: f64) -> bool {
+        let lattice = Lattice::around(pair, within_m, self.spacing_m);
+        let mut seen = vec![false; lattice.n_nodes()];
+        let mut open = BinaryHeap::new();
+        let first = lattice.start;
+        seen[lattice.index(first)] = true;
+        open.push((Reverse(0), first));
+        while let Some((_, Node { cell, heading })) = open.pop() {
+            if lattice.steps_to_goal(cell) <= 1 {
+                return true;
+            }
+            let [east, north] = STEPS[heading];
+            let moved = |sign: i64| Node { cell: [cell[0] + sign * east, cell[1] + sign * north], heading };
+            let turned = |by: usize| Node { cell, heading: (heading + by) % 8 };
+            for next in [moved(1), moved(-1), turned(1), turned(7)] {
+                let [x_m, y_m] = lattice.at_m(next.cell);
+                if !lattice.holds(next.cell) || std::mem::replace(&mut seen[lattice.index(next)], true) {
+                    continue;
+                }
+                let stands = || self.truth.traversability(x_m, y_m, heading_rad(next.heading));
+                if self.map.contains(x_m, y_m) && self.is_safe(&stands()) {
+                    open.push((Reverse(lattice.steps_to_goal(next.cell)), next));
+                }
+            }
+        }
+        false
+    }
+}
+
+/// A pose of the search.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+struct Node {
+    cell: [i64; 2],
+    heading: usize,
+}
+
+/// The poses that a search may visit.
+struct Lattice {
+    south_west_m: [f64; 2],
+    spacing_m: f64,
+    n: [i64; 2],
+    start: Node,
+    goal: [i64; 2],
+}
+
+impl Lattice {
+    fn around(pair: &Pair, within_m: f64, spacing_m: f64) -> Self {
+        let [x_m, y_m, yaw_rad] = pair.start;
+        let low_m = [0, 1].map(|k| pair.start[k].min(pair.goal_m[k]) - within_m);
+        let high_m = [0, 1].map(|k| pair.start[k].max(pair.goal_m[k]) + within_m);
+        let cell = |at_m: [f64; 2]| [0, 1].map(|k| ((at_m[k] - low_m[k]) / spacing_m).round() as i64);
+        let start = cell([x_m, y_m]);
+        Self {
+            // The start lies on the lattice.
+            south_west_m: [x_m - start[0] as f64 * spacing_m, y_m - start[1] as f64 * spacing_m],
+            spacing_m,
+            n: [0, 1].map(|k| ((high_m[k] - low_m[k]) / spacing_m).ceil() as i64 + 1),
+            start: Node { cell: start, heading: (yaw_rad / TAU * 8.0).round().rem_euclid(8.0) as usize },
+            goal: cell(pair.goal_m),
+        }
+    }
+
+    fn n_nodes(&self) -> usize {
+        8 * (self.n[0] * self.n[1]) as usize
+    }
+
+    fn holds(&self, cell: [i64; 2]) -> bool {
+        (0..2).all(|k| (0..self.n[k]).contains(&cell[k]))
+    }
+
+    fn index(&self, node: Node) -> usize {
+        8 * (node.cell[1] * self.n[0] + node.cell[0]) as usize + node.heading
+    }
+
+    fn at_m(&self, cell: [i64; 2]) -> [f64; 2] {
+        [0, 1].map(|k| self.south_west_m[k] + cell[k] as f64 * self.spacing_m)
+    }
+
+    /// Moves of a chess king to the goal.
+    fn steps_to_goal(&self, cell: [i64; 2]) -> i64 {
+        (0..2).map(|k| (cell[k] - self.goal[k]).abs()).max().unwrap_or(0)
+    }
+}
+
+fn heading_rad(heading: usize) -> f64 {
+    heading as f64 * TAU / 8.0
+}
