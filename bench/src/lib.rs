@@ -1,6 +1,7 @@
 //! What the two costly parts of a control cycle cost on this machine: one update of the controller, and the risk map
 //! of the physics prior. Both are measured through the interface that a drive uses.
 
+pub mod closed_loop;
 pub mod control;
 mod error;
 pub mod prior_map;

@@ -1,0 +1,165 @@
+//! The closed loop that every drive and every navigation table runs: an episode of the plant and the navigator that
+//! decides in it.
+#![allow(clippy::disallowed_methods, reason = "what a cycle costs is measured here")]
+
+use std::sync::Arc;
+use std::time::Instant;
+
+use bicycle::{Decision, Model, Vehicle};
+use navigator::{Belief, Config, Navigator, NavigatorError, RiskOracle, Setup, Surface};
+use scenarios::{Episode, EpisodeConfig, EpisodeError, Task, Truth, World};
+use serde::{Deserialize, Serialize};
+use terrain::{GridGeometry, GridMap, SurfaceCell};
+use traversability::{CvarLevel, Risk};
+
+/// What the controller knows of the ground.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Method {
+    /// The physics prior on the map.
+    Physics,
+    /// No slip and full traction everywhere.
+    Nominal,
+    /// The plant's true traction and attitude.
+    Truth,
+}
+
+/// Where the controller's map comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum MapSource {
+    /// Fused online from simulated range scans.
+    Sensed,
+    /// The world itself.
+    Oracle,
+}
+
+/// Everything that one drive is made of.
+pub struct Drive<'a> {
+    /// Where, from where, where to.
+    pub task: Task,
+    /// The machine that is simulated.
+    pub vehicle: &'a Vehicle,
+    /// What the controller believes of it.
+    pub model: Model,
+    /// Settings of the pipeline.
+    pub config: Config,
+    /// Sensors, rules and faults.
+    pub episode: EpisodeConfig,
+    /// What the controller knows of the ground.
+    pub method: Method,
+    /// Where its map comes from.
+    pub map_source: MapSource,
+    /// Share of the worst outcomes to plan for.
+    pub level: CvarLevel,
+    /// Decides sensor noise and samples.
+    pub seed: u64,
+}
+
+/// Why a drive cannot begin or go on.
+#[derive(Debug, thiserror::Error)]
+pub enum DriveError {
+    /// The plant or its sensors.
+    #[error(transparent)]
+    Episode(#[from] EpisodeError),
+    /// The planner.
+    #[error(transparent)]
+    Navigator(#[from] NavigatorError),
+}
+
+/// One control cycle, and what it cost on this machine.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Cycle {
+    /// What was decided.
+    pub decision: Decision,
+    /// Time of mapping, risk map and cost to go [ms]; `None` in a cycle that renewed no map.
+    pub map_ms: Option<f64>,
+    /// Time of the controller [ms].
+    pub control_ms: f64,
+}
+
+/// A plant and its planner.
+pub struct ClosedLoop {
+    /// The plant's side.
+    pub episode: Episode,
+    /// The planner's side.
+    pub navigator: Navigator,
+}
+
+impl ClosedLoop {
+    /// Puts the vehicle at the start with a planner that has seen nothing.
+    pub fn new(drive: Drive<'_>) -> Result<Self, DriveError> {
+        let Drive { task, vehicle, model, config, episode, method, map_source, level, seed } = drive;
+        let belief = match method {
+            Method::Physics => Belief::Physics,
+            Method::Nominal => Belief::Nominal,
+            Method::Truth => Belief::Given(truth(vehicle, &task.world)),
+        };
+        let surface = match map_source {
+            MapSource::Sensed => Surface::Sensed,
+            MapSource::Oracle => Surface::Given(true_surface(&task.world, config.elevation.resolution_m)),
+        };
+        let (goal_m, tolerance_m) = (task.goal_m, task.goal_tolerance_m);
+        let navigator = Navigator::new(Setup {
+            vehicle,
+            model,
+            config,
+            belief,
+            surface,
+            level,
+            seed,
+            goal_m,
+            tolerance_m,
+        })?;
+        Ok(Self { episode: Episode::new(task, vehicle, episode, seed)?, navigator })
+    }
+
+    /// Observes, decides and drives on for one control cycle.
+    pub fn cycle(&mut self) -> Result<Cycle, DriveError> {
+        let observation = self.episode.observe();
+        let began = Instant::now();
+        let is_renewed = self.navigator.observe(&observation.odometry, observation.scan.as_deref())?;
+        let mapped = Instant::now();
+        let decision = self.navigator.decide(observation.valid_at_ns);
+        let decided = Instant::now();
+        self.episode.apply(&decision)?;
+        let milliseconds = |from: Instant, to: Instant| to.duration_since(from).as_secs_f64() * 1e3;
+        Ok(Cycle {
+            decision,
+            map_ms: is_renewed.then(|| milliseconds(began, mapped)),
+            control_ms: milliseconds(mapped, decided),
+        })
+    }
+}
+
+/// The plant's true traversability as risk: no distribution, hence the same at every CVaR level.
+fn truth(vehicle: &Vehicle, world: &Arc<World>) -> RiskOracle {
+    let truth = Truth::new(vehicle, Arc::clone(world));
+    Arc::new(move |x_m, y_m, yaw_rad| {
+        let there = truth.traversability(x_m, y_m, yaw_rad);
+        let risk = Risk {
+            linear_traction: there.linear_traction as f32,
+            angular_traction: there.angular_traction as f32,
+            roll_rad: there.roll_rad.abs() as f32,
+            pitch_rad: there.pitch_rad.abs() as f32,
+        };
+        if there.is_blocked { risk.blocked() } else { risk }
+    })
+}
+
+/// The world as a perfect map would show it.
+pub fn true_surface(world: &World, resolution_m: f64) -> GridMap<SurfaceCell> {
+    let bounds = world.bounds();
+    let first = bounds.south_west_m.map(|edge_m| (edge_m / resolution_m).ceil() as i64);
+    let last = bounds.north_east_m.map(|edge_m| (edge_m / resolution_m).floor() as i64);
+    let n = [0, 1].map(|axis| (last[axis] - first[axis]).max(0) as usize);
+    let geometry = GridGeometry { resolution_m, origin: first, n_rows: n[1], n_cols: n[0] };
+    let mut surface = GridMap::filled(geometry, SurfaceCell::UNKNOWN);
+    for (index, cell) in surface.values_mut().iter_mut().enumerate() {
+        let [x_m, y_m] = geometry.centre_m(geometry.cell(index));
+        let patch = world.patch(x_m, y_m);
+        *cell =
+            SurfaceCell::certain(world.height_m(x_m, y_m) as f32, patch.class, patch.vegetation_height_m);
+    }
+    surface
+}
