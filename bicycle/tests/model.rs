@@ -1,4 +1,5 @@
 //! The model against closed forms, and its packs against its reference.
+#![allow(clippy::unwrap_used, reason = "a test that cannot be set up has failed")]
 
 use bicycle::effect::{CATALOGUE, Effect};
 use bicycle::lanes::{Lanes, Portable, Real, Scalar};

@@ -376,3 +376,6 @@ fn settle<K: Kernel>(terminal: Real<K>, flight: &Flight<K>, chunk: &mut Chunk, f
     }
     kernel.store(&mut chunk.costs, first, total.1);
 }
+
+#[cfg(test)]
+mod tests;

@@ -133,3 +133,6 @@ fn plant_nominal(sampler: &Sampler<'_>, chunk: &mut Chunk) {
     }
     chunk.terms[CostTerm::Control as usize].0[0] = cost;
 }
+
+#[cfg(test)]
+mod tests;

@@ -11,7 +11,7 @@ const WORST_COST_S: f64 = 1e30;
 /// Halvings of the search for the temperature: the effective sample size is then met within one rollout in 1000.
 const N_HALVINGS: usize = 14;
 /// The search spans this factor around the last temperature.
-const SEARCH_FACTOR: f32 = 64.0;
+const SEARCH_FACTOR: f32 = 1024.0;
 
 /// What the weights of an iteration came to.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -125,3 +125,6 @@ fn search<K: Kernel>(kernel: K, chunks: &mut [Chunk], baseline_s: f32, (wanted, 
     }
     (low * high).sqrt().clamp(Temperature::LOWEST_S, Temperature::HIGHEST_S)
 }
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,221 @@
+//! Rollouts against a plain f64 loop over equation 2 and the map's own lookup, on every instruction set.
+#![allow(clippy::unwrap_used, reason = "a test that cannot be set up has failed")]
+
+use super::*;
+use crate::cost_to_go::CostToGoView;
+use crate::kernel::{Isa, Machine};
+use bicycle::{Limits, Model};
+use traversability::{GridGeometry, RiskMap};
+
+const N_STEPS: usize = 40;
+const STEP_S: f64 = 0.1;
+const WHEELBASE_M: f64 = 2.0;
+/// East, north [m], yaw [rad].
+const START: [f64; 3] = [1.2, -1.9, 0.6];
+const GOAL_M: [f64; 2] = [2.6, -1.2];
+
+fn machines() -> Vec<Machine> {
+    [Isa::Portable, Isa::Avx2, Isa::Avx512].into_iter().filter_map(Machine::find).collect()
+}
+
+fn stepper(resolution_m: f64) -> Stepper {
+    let limits = Limits {
+        speed_max_mps: 3.0,
+        reverse_speed_max_mps: 1.0,
+        steering_max_rad: 0.5,
+        steering_rate_max_radps: 1.0,
+        acceleration_max_mps2: 2.0,
+        lateral_acceleration_max_mps2: 1.0,
+        roll_max_rad: 0.5,
+        pitch_max_rad: 0.5,
+    };
+    let model = Model { wheelbase_m: WHEELBASE_M, limits, effects: Vec::new() };
+    Stepper::new(&model, STEP_S, resolution_m)
+}
+
+/// Ground whose risk changes by cell and yaw.
+fn map() -> RiskMap {
+    let mut map = RiskMap::constant(GridGeometry::centred(0.5, 60, 50, 1.0, -2.0), 13, Risk::NONE);
+    for (index, risk) in map.arrays_mut().0.iter_mut().enumerate() {
+        let wave = |factor: usize| ((index * factor) % 101) as f32 / 100.0;
+        *risk = Risk {
+            linear_traction: 0.5 + 0.5 * wave(7),
+            angular_traction: 0.4 + 0.6 * wave(13),
+            roll_rad: 0.55 * wave(29),
+            pitch_rad: 0.53 * wave(43),
+        };
+    }
+    map.close_border();
+    map
+}
+
+fn grid(map: &RiskMap) -> Grid<'_> {
+    let view = map.view();
+    let GridGeometry { n_rows, n_cols, .. } = view.geometry;
+    Grid { n_rows, n_cols, n_yaws: view.n_yaws, risks: view.risks, ground: view.ground }
+}
+
+const PRICES: Prices = Prices {
+    roll_max_rad: 0.5,
+    pitch_max_rad: 0.5,
+    attitude_s: 10.0,
+    lateral_max_mps2: 1.0,
+    lateral_s: 3.0,
+    reverse_s: 0.2,
+};
+
+/// Controls that differ from lane to lane and over time.
+fn control(lane: usize, t: usize) -> [f64; 2] {
+    let phase = lane as f64 * 0.37;
+    [1.2 + 1.7 * (0.13 * t as f64 + phase).sin(), 0.45 * (0.21 * t as f64 + 2.0 * phase).cos()]
+        .map(|value| f64::from(value as f32))
+}
+
+fn chunk() -> Chunk {
+    let mut chunk = Chunk::new(N_STEPS);
+    for (t, rows) in chunk.controls.iter_mut().enumerate() {
+        for lane in 0..CHUNK {
+            let [speed, steering] = control(lane, t);
+            (rows[0].0[lane], rows[1].0[lane]) = (speed as f32, steering as f32);
+        }
+    }
+    chunk
+}
+
+/// Terms of one rollout in f64, and how near it came to a place where rounding decides: a cell's or bin's edge.
+fn reference(map: &RiskMap, lane: usize, distance_s_per_m: f64) -> ([f64; CostTerm::COUNT], f64) {
+    let view = map.view();
+    let [mut x, mut y, mut yaw] = START;
+    let mut terms = [0.0; CostTerm::COUNT];
+    let mut margin = f64::INFINITY;
+    for t in 0..N_STEPS {
+        let [v, delta] = control(lane, t);
+        let risk = view.risk_at(x, y, yaw);
+        for place in [x / 0.5, y / 0.5, yaw / std::f64::consts::TAU * 13.0] {
+            margin = margin.min((place - place.round()).abs());
+        }
+        let yaw_rate = f64::from(risk.angular_traction) * v * delta.tan() / WHEELBASE_M;
+        x += STEP_S * f64::from(risk.linear_traction) * v * yaw.cos();
+        y += STEP_S * f64::from(risk.linear_traction) * v * yaw.sin();
+        yaw += STEP_S * yaw_rate;
+        let tilted = f64::from(risk.roll_rad) > 0.5 || f64::from(risk.pitch_rad) > 0.5;
+        terms[CostTerm::Attitude as usize] += if tilted { 10.0 } else { 0.0 };
+        terms[CostTerm::Lateral as usize] += if (v * yaw_rate).abs() > 1.0 { 3.0 } else { 0.0 };
+        margin = margin.min(((v * yaw_rate).abs() - 1.0).abs());
+        terms[CostTerm::Reverse as usize] += if v < 0.0 { 0.2 } else { 0.0 };
+        let distance_m = (x - GOAL_M[0]).hypot(y - GOAL_M[1]);
+        terms[CostTerm::Running as usize] += STEP_S + distance_s_per_m * distance_m;
+        margin = margin.min((distance_m - 0.5).abs());
+        if distance_m <= 0.5 {
+            return (terms, margin);
+        }
+    }
+    terms[CostTerm::Terminal as usize] = (x - GOAL_M[0]).hypot(y - GOAL_M[1]) / 2.0;
+    (terms, margin)
+}
+
+fn goal<'a>(map: &RiskMap, distance_s_per_m: f64, field: Option<TerminalField<'a>>) -> GoalTask<'a> {
+    let corner_m = map.geometry().south_west_m();
+    GoalTask {
+        x_cells: (GOAL_M[0] - corner_m[0]) / 0.5,
+        y_cells: (GOAL_M[1] - corner_m[1]) / 0.5,
+        tolerance_cells: 1.0,
+        step_s: STEP_S,
+        distance_s: 0.5 * distance_s_per_m,
+        rest_s: 0.5 / 2.0,
+        field,
+    }
+}
+
+fn scene<'a>(map: &'a RiskMap, stepper: &'a Stepper, task: Task<'a>) -> Scene<'a> {
+    let corner_m = map.geometry().south_west_m();
+    let start = Start {
+        x_cells: (START[0] - corner_m[0]) / 0.5,
+        y_cells: (START[1] - corner_m[1]) / 0.5,
+        turns: START[2] / std::f64::consts::TAU,
+        speed_mps: 0.0,
+        steering_rad: 0.0,
+    };
+    Scene { stepper, grid: grid(map), start, slots: &[], prices: PRICES, task }
+}
+
+/// Lanes whose f64 path comes within 1e-4 of an edge are left out: there the last bit decides.
+#[test]
+fn rollouts_cost_what_the_plain_loop_says() {
+    let (map, stepper) = (map(), stepper(0.5));
+    for distance_s_per_m in [0.0, 0.3] {
+        let task = Task::Goal(goal(&map, distance_s_per_m, None));
+        let scene = scene(&map, &stepper, task);
+        for machine in machines() {
+            let mut chunk = chunk();
+            machine.run(RollOut { scene: &scene, chunk: &mut chunk });
+            let (mut n_compared, mut n_arrived) = (0, 0);
+            for lane in 0..CHUNK {
+                let (expected, margin) = reference(&map, lane, distance_s_per_m);
+                if margin < 1e-4 {
+                    continue;
+                }
+                n_compared += 1;
+                n_arrived += usize::from(expected[CostTerm::Terminal as usize] == 0.0);
+                for (row, expected) in chunk.terms.iter().zip(expected) {
+                    assert!((f64::from(row.0[lane]) - expected).abs() < 2e-3, "{machine:?} lane {lane}");
+                }
+                let total: f64 = expected.iter().sum();
+                assert!((f64::from(chunk.costs.0[lane]) - total).abs() < 5e-3);
+            }
+            assert!(n_compared > 40 && n_arrived > 0, "{n_compared} compared, {n_arrived} arrived");
+        }
+    }
+}
+
+/// Straight ahead at 1 m/s on firm ground, 2 m to the goal with a tolerance of 0.5 m: 15 steps of 0.1 s count, and
+/// nothing that comes after.
+#[test]
+fn the_goal_latches() {
+    let map = RiskMap::constant(GridGeometry::centred(0.5, 60, 50, 1.0, -2.0), 13, Risk::NONE);
+    let stepper = stepper(0.5);
+    let corner_m = map.geometry().south_west_m();
+    let task = GoalTask {
+        x_cells: (START[0] + 2.01 - corner_m[0]) / 0.5,
+        y_cells: (START[1] - corner_m[1]) / 0.5,
+        ..goal(&map, 0.0, None)
+    };
+    let mut scene = scene(&map, &stepper, Task::Goal(task));
+    scene.start.turns = 0.0;
+    for machine in machines() {
+        let mut chunk = Chunk::new(N_STEPS);
+        chunk.controls.iter_mut().for_each(|rows| rows[0].0 = [1.0; CHUNK]);
+        machine.run(RollOut { scene: &scene, chunk: &mut chunk });
+        // 1.51 m until the rim: reached with the 16th step.
+        assert!(chunk.costs.0.iter().all(|cost| (cost - 1.6).abs() < 1e-4), "{}", chunk.costs.0[0]);
+    }
+}
+
+/// A field that is linear in x and y is interpolated exactly; the terminal cost is its value where the rollout ends.
+#[test]
+fn the_cost_to_go_field_is_interpolated_between_cells() {
+    let map = RiskMap::constant(GridGeometry::centred(0.5, 60, 50, 1.0, -2.0), 13, Risk::NONE);
+    let geometry = GridGeometry::centred(0.4, 90, 80, 1.3, -1.7);
+    let linear = |[x_m, y_m]: [f64; 2]| 7.0 + 0.3 * x_m - 0.2 * y_m;
+    let seconds: Vec<f32> =
+        (0..geometry.n_cells()).map(|index| linear(geometry.centre_m(geometry.cell(index))) as f32).collect();
+    let field = TerminalField::new(CostToGoView { geometry, seconds: &seconds }, map.geometry());
+    let stepper = stepper(0.5);
+    let task = GoalTask { x_cells: 1e6, ..goal(&map, 0.0, field) };
+    let scene = scene(&map, &stepper, Task::Goal(task));
+    for machine in machines() {
+        let mut chunk = chunk();
+        machine.run(RollOut { scene: &scene, chunk: &mut chunk });
+        for lane in 0..CHUNK {
+            let [mut x, mut y, mut yaw] = START;
+            for t in 0..N_STEPS {
+                let [v, delta] = control(lane, t);
+                x += STEP_S * v * yaw.cos();
+                y += STEP_S * v * yaw.sin();
+                yaw += STEP_S * v * delta.tan() / WHEELBASE_M;
+            }
+            let found = f64::from(chunk.terms[CostTerm::Terminal as usize].0[lane]);
+            assert!((found - linear([x, y])).abs() < 1e-3, "{found} {}", linear([x, y]));
+        }
+    }
+}
