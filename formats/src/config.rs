@@ -137,13 +137,16 @@ impl Refusal {
     }
 }
 
+fn covers(span: &Range<usize>, place: &Range<usize>) -> bool {
+    !place.is_empty() && span.start <= place.start && place.end <= span.end
+}
+
 /// Path of the deepest key whose key or value covers a place; empty for the document itself.
 fn path_of(table: &DeTable<'_>, place: &Range<usize>) -> String {
-    let covers = |span: Range<usize>| !place.is_empty() && span.start <= place.start && place.end <= span.end;
     let mut best = String::new();
     for (key, value) in table {
         let inner = path_in(value, place);
-        if inner.is_some() || covers(key.span()) || covers(value.span()) {
+        if inner.is_some() || covers(&key.span(), place) || covers(&value.span(), place) {
             best = format!("{}{}", key.get_ref(), inner.unwrap_or_default());
         }
     }
@@ -157,10 +160,9 @@ fn path_in(value: &Spanned<DeValue<'_>>, place: &Range<usize>) -> Option<String>
             Some(path_of(inner, place)).filter(|path| !path.is_empty()).map(|path| format!(".{path}"))
         }
         DeValue::Array(items) => items.iter().enumerate().find_map(|(index, item)| {
-            let span = item.span();
-            let here = !place.is_empty() && span.start <= place.start && place.end <= span.end;
             let inner = path_in(item, place);
-            (here || inner.is_some()).then(|| format!("[{index}]{}", inner.unwrap_or_default()))
+            (inner.is_some() || covers(&item.span(), place))
+                .then(|| format!("[{index}]{}", inner.unwrap_or_default()))
         }),
         _ => None,
     }

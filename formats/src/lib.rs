@@ -6,6 +6,7 @@
 mod config;
 mod drive_log_csv;
 mod elevation;
+mod overlay;
 mod recording;
 mod results;
 mod vehicle;
@@ -17,6 +18,7 @@ pub use drive_log_csv::{
 pub use elevation::{
     ElevationError, ElevationFile, ElevationLayers, PngScale, read_elevation, read_elevation_png,
 };
+pub use overlay::overlay;
 pub use recording::{DriveRecorder, McapDriveLog, McapReadError, RecordError, read_drive_log_mcap};
 pub use results::{OutputError, config_hash, prepare_out_dir, write_bytes_atomic, write_json_atomic};
 pub use vehicle::{
