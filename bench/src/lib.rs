@@ -4,6 +4,7 @@
 pub mod closed_loop;
 pub mod control;
 mod error;
+pub mod navigation;
 pub mod prior_map;
 mod spread;
 mod stopwatch;

@@ -8,7 +8,7 @@ use super::EpisodeError;
 use crate::{Motion, Plant, Task};
 
 /// How an episode ended.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Outcome {
     /// The rear axle's centre came within the tolerance of the goal.
