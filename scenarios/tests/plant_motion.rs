@@ -1,5 +1,5 @@
 //! The plant in motion on even ground, held against closed forms.
-#![allow(missing_docs)]
+#![allow(clippy::unwrap_used)]
 
 mod plant_machines;
 
@@ -61,10 +61,10 @@ fn locked_wheels_stop_within_v2_over_2_mu_g() {
 
 #[test]
 fn the_servo_slows_at_the_limit_of_acceleration() {
-    // 1.5 m/s2 from 6 m/s: 12 m; the lags of queue, motor and brake (0.05 s and 0.15 s) add 1.2 m at most.
+    // 1.5 m/s2 from 6 m/s: 12 m; the lags of queue, motor and servo (0.05 s, 0.15 s, 0.08 s) add 1.7 m at most.
     let [found_m, speed_mps] = stopping(&full_size(), 0.9, 6.0);
     let least_m = speed_mps * speed_mps / (2.0 * 1.5);
-    assert!((least_m..least_m + 0.2 * speed_mps).contains(&found_m), "{found_m} m from {speed_mps} m/s");
+    assert!((least_m..least_m + 0.28 * speed_mps).contains(&found_m), "{found_m} m from {speed_mps} m/s");
 }
 
 /// Acceleration up a slope at full throttle, all wheels slipping [m/s2].

@@ -1,5 +1,5 @@
 //! The plant at rest: loads, holding on slopes, settling, tipping over.
-#![allow(missing_docs)]
+#![allow(clippy::unwrap_used)]
 
 mod plant_machines;
 

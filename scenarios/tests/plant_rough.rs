@@ -1,5 +1,5 @@
 //! The plant on rocks, in plants, against walls and beyond the edge.
-#![allow(missing_docs)]
+#![allow(clippy::unwrap_used)]
 
 mod plant_machines;
 

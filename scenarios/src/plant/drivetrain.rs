@@ -39,7 +39,10 @@ pub(crate) struct Drivetrain {
     /// Share of the brake torque on each wheel.
     brake_share: [f64; 4],
     differential_nms: f64,
+    /// The commanded speed, ramped.
     reference_mps: f64,
+    /// The reference as the motor's response lets the vehicle follow it.
+    expected_mps: f64,
     integral_n: f64,
     drive_nm: f64,
     brake_nm: f64,
@@ -64,6 +67,7 @@ impl Drivetrain {
             brake_share: pairs(brake_rear),
             differential_nms: DIFFERENTIAL_S_PER_M * mean_load_n * radius_m * radius_m,
             reference_mps: 0.0,
+            expected_mps: 0.0,
             integral_n: 0.0,
             drive_nm: 0.0,
             brake_nm: 0.0,
@@ -100,32 +104,40 @@ impl Drivetrain {
     }
 
     /// Wanted drive and brake torque: proportional-integral control of the wheel speed with the acceleration of
-    /// the ramped reference fed forward.
+    /// the ramped reference fed forward; the parking brake when asked to stand still.
     fn servo(&mut self, commanded_mps: f64, mean_radps: f64, step_s: f64) -> (f64, f64) {
         let speed_mps = mean_radps * self.radius_m;
-        let most_mps = self.acceleration_max_mps2 * step_s;
-        let change_mps = (commanded_mps - self.reference_mps).clamp(-most_mps, most_mps);
-        self.reference_mps += change_mps;
+        let acceleration_mps2 = self.ramp(commanded_mps, step_s);
         if commanded_mps.abs() < PARKING_SPEED_MPS
             && self.reference_mps.abs() < PARKING_SPEED_MPS
             && speed_mps.abs() < STANDSTILL_MPS
         {
             self.integral_n = 0.0;
+            self.expected_mps = 0.0;
             return (0.0, self.brake_max_nm);
         }
         let servo_s = self.response_s + SERVO_TIME_S;
-        let gain = 0.5 * self.mass_kg / servo_s;
-        let error_mps = self.reference_mps - speed_mps;
-        let feed_n = self.mass_kg * change_mps / step_s;
-        let wanted_nm = (feed_n + gain * error_mps + self.integral_n) * self.radius_m;
+        let gain = self.mass_kg / servo_s;
+        let error_mps = self.expected_mps - speed_mps;
+        let wanted_n = self.mass_kg * acceleration_mps2 + gain * error_mps + self.integral_n;
         let forward = if self.reference_mps < 0.0 { -1.0 } else { 1.0 };
-        let power_nm = self.power_max_w / mean_radps.abs().max(1e-3);
-        let drive_max_nm = self.drive_max_nm.min(power_nm);
-        let along_nm = (forward * wanted_nm).clamp(-self.brake_max_nm, drive_max_nm);
+        let along_nm = forward * wanted_n * self.radius_m;
+        let drive_max_nm = self.drive_max_nm.min(self.power_max_w / mean_radps.abs().max(1e-3));
+        let limited_nm = along_nm.clamp(-self.brake_max_nm, drive_max_nm);
         // Integrates only while the actuators follow, or when that leads back to where they do.
-        if along_nm == forward * wanted_nm || (wanted_nm > 0.0) != (error_mps > 0.0) {
+        if limited_nm == along_nm || (wanted_n > 0.0) != (error_mps > 0.0) {
             self.integral_n += gain * error_mps * step_s / (INTEGRAL_RATIO * servo_s);
         }
-        if along_nm > 0.0 { (forward * along_nm, 0.0) } else { (0.0, -along_nm) }
+        if limited_nm > 0.0 { (forward * limited_nm, 0.0) } else { (0.0, -limited_nm) }
+    }
+
+    /// Moves the reference towards the command at the limit of acceleration and gives its acceleration [m/s2].
+    fn ramp(&mut self, commanded_mps: f64, step_s: f64) -> f64 {
+        let most_mps = self.acceleration_max_mps2 * step_s;
+        let change_mps = (commanded_mps - self.reference_mps).clamp(-most_mps, most_mps);
+        self.reference_mps += change_mps;
+        let share = step_s / (self.response_s + step_s);
+        self.expected_mps += share * (self.reference_mps - self.expected_mps);
+        change_mps / step_s
     }
 }

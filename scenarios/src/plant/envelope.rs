@@ -180,34 +180,37 @@ impl Envelope {
     fn segment(&self, start: Vector2<f64>, end: Vector2<f64>) -> Option<(Vector2<f64>, f64)> {
         let r = self.radius_m;
         let run = end - start;
+        let squares = [start.norm_squared(), end.norm_squared()];
         // Most pieces lie outside: told without roots and divisions.
-        let outside = |point: &Vector2<f64>| point.norm_squared() >= r * r;
         let beside = start.dot(&run) * end.dot(&run) >= 0.0;
-        if beside && outside(&start) && outside(&end) {
+        if beside && squares[0] >= r * r && squares[1] >= r * r {
             return None;
         }
         let tangent = run / run.norm();
         let normal = Vector2::new(-tangent.y, tangent.x);
         let mut d = -start.dot(&normal);
-        let half = (r * r - d * d).max(0.0).sqrt();
-        let a = start.dot(&tangent).max(-half);
-        let b = end.dot(&tangent).min(half);
-        if a >= b {
-            return None;
+        let [mut a, mut b] = [start.dot(&tangent), end.dot(&tangent)];
+        if squares[0].max(squares[1]) > r * r {
+            let half = (r * r - d * d).max(0.0).sqrt();
+            [a, b] = [a.max(-half), b.min(half)];
+            if a >= b {
+                return None;
+            }
         }
-        let nearest = if a < 0.0 && b > 0.0 { d } else { d.hypot(a.abs().min(b.abs())) };
+        let rho = |along: f64, d: f64| (d * d + along * along).sqrt();
+        let [mut rho_a, mut rho_b] = [rho(a, d), rho(b, d)];
+        let nearest = if a < 0.0 && b > 0.0 { d } else { rho_a.min(rho_b) };
         // With the hub in or almost in the ground the direction to it says nothing.
         if nearest < CORE_SHARE * r {
             d = CORE_SHARE * r;
+            [rho_a, rho_b] = [rho(a, d), rho(b, d)];
         }
-        let (rho_a, rho_b) = ((d * d + a * a).sqrt(), (d * d + b * b).sqrt());
         // asinh(b/d) - asinh(a/d), written so that a line through the hub does no harm.
         let ratio = if b <= 0.0 { (rho_a - a) / (rho_b - b) } else { (b + rho_b) / (a + rho_a) };
         let inward = d * (r * ratio.ln() - (b - a));
         let along = -(r * (rho_b - rho_a) - 0.5 * (rho_b * rho_b - rho_a * rho_a));
         let rim = r * (RIM_SHARE * r - nearest).max(0.0) * (b - a) / (2.0 * r);
-        let middle = 0.5 * (a + b);
-        Some((normal * (inward + rim) + tangent * along, (d * d + middle * middle).sqrt()))
+        Some((normal * (inward + rim) + tangent * along, rho(0.5 * (a + b), d)))
     }
 
     /// Rise of the ground per length along the axle, seen in the wheel's frame [-].

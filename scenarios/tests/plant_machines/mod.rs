@@ -1,5 +1,5 @@
 //! The machines and grounds that the plant is validated with.
-#![allow(dead_code, missing_docs)]
+#![allow(dead_code)]
 
 use std::sync::Arc;
 
@@ -77,12 +77,12 @@ pub fn full_size() -> Vehicle {
         limits: Limits {
             speed_max_mps: 30.0,
             reverse_speed_max_mps: 3.0,
-            steering_max_rad: 0.5236,
+            steering_max_rad: 30f64.to_radians(),
             steering_rate_max_radps: 0.6,
             acceleration_max_mps2: 1.5,
             lateral_acceleration_max_mps2: 3.0,
-            roll_max_rad: 0.5236,
-            pitch_max_rad: 0.5236,
+            roll_max_rad: 30f64.to_radians(),
+            pitch_max_rad: 30f64.to_radians(),
         },
         body: Body {
             mass_kg: 1360.0,
@@ -130,12 +130,12 @@ pub fn rc_car() -> Vehicle {
         limits: Limits {
             speed_max_mps: 5.0,
             reverse_speed_max_mps: 0.75,
-            steering_max_rad: 0.5236,
+            steering_max_rad: 30f64.to_radians(),
             steering_rate_max_radps: 4.0,
             acceleration_max_mps2: 2.5,
             lateral_acceleration_max_mps2: 4.0,
-            roll_max_rad: 0.5236,
-            pitch_max_rad: 0.7854,
+            roll_max_rad: 30f64.to_radians(),
+            pitch_max_rad: 45f64.to_radians(),
         },
         body: Body {
             mass_kg: 2.4,
