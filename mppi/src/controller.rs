@@ -1,21 +1,21 @@
 //! The controller: one decision per cycle.
 
+mod steps;
+
 use crate::chunk::Chunk;
-use crate::config::{Actuation, Config, ConfigError, Temperature};
+use crate::config::{Actuation, Config, ConfigError};
 use crate::diagnostics::Diagnostics;
 use crate::history::History;
 use crate::judgement::Judge;
 use crate::kernel::workers::Workers;
 use crate::kernel::{CHUNK, Machine, functions};
-use crate::objective::{Input, Objective, ReferenceStep, Terminal, TerminalField};
+use crate::objective::{Input, ReferenceStep};
 use crate::plan::Plan;
 use crate::recovery::{Mode, Watch};
-use crate::rollout::{GoalTask, Grid, MAX_SLOTS, Prices, RollOut, Scene, Start, Task};
-use crate::sampling::{Control, Sample, Sampler};
-use crate::summary::{Accumulate, Totals};
-use crate::weights::{Weigh, WeightSummary};
+use crate::rollout::MAX_SLOTS;
+use crate::summary::Totals;
+use crate::weights::WeightSummary;
 use bicycle::{Command, Decision, HoldReason, Model, State, Stepper, StopReason};
-use std::f64::consts::TAU;
 use traversability::RiskMapView;
 
 /// A part of a decision, for whoever measures where time goes.
@@ -157,8 +157,9 @@ impl Controller {
     fn plan_cycle(&mut self, input: &Input<'_>, observe: &mut impl FnMut(Phase)) -> Decision {
         self.plan.shift(input.elapsed_s / self.config.step_s);
         let mode = self.watch.observe(&input.state, input.elapsed_s);
+        self.recall_slots(input.state, self.config.delay_s);
         self.start = self.predict_start(input);
-        self.recall_slots();
+        self.recall_slots(self.start, 0.0);
         if std::mem::take(&mut self.is_fresh) {
             self.plan.hold([self.start.speed_mps as f32, self.start.steering_rad as f32]);
         }
@@ -182,183 +183,6 @@ impl Controller {
         let decision = self.judge(input, &summary);
         observe(Phase::Update);
         decision
-    }
-
-    /// The measured state, carried over the known delay by the commands that are already on their way.
-    fn predict_start(&self, input: &Input<'_>) -> State {
-        let mut state = input.state;
-        let n_steps = (self.config.delay_s / self.config.step_s).ceil() as usize;
-        if n_steps == 0 {
-            return state;
-        }
-        let step_s = self.config.delay_s / n_steps as f64;
-        let judge = Judge { stepper: &self.stepper, limits: &self.model.limits, map: input.map };
-        let mut memory = self.slots.map(f64::from);
-        for k in 0..n_steps {
-            // In force during this step: the command that was sent a delay ago.
-            let age_s = self.config.delay_s - (k as f64 + 0.5) * step_s;
-            let standing =
-                Command { speed_mps: state.speed_mps as f32, steering_rad: state.steering_rad as f32 };
-            let next = judge.step(&state, self.history.at(age_s).unwrap_or(standing), &mut memory, k);
-            let share = step_s / self.config.step_s;
-            state = between(&state, &next, share);
-        }
-        state
-    }
-
-    fn recall_slots(&mut self) {
-        let (history, start) = (&self.history, &self.start);
-        let standing = Command { speed_mps: start.speed_mps as f32, steering_rad: start.steering_rad as f32 };
-        let past = |age_s: f64| history.at(age_s).unwrap_or(standing);
-        let slots = &mut self.slots;
-        self.stepper.recall(&past, |slot, value| slots[slot] = value as f32);
-    }
-
-    /// Where the commands of the plan start from: the last command, held near the measured state.
-    fn start_control(&self) -> Control {
-        let limits = &self.model.limits;
-        let reached = [self.start.speed_mps, self.start.steering_rad];
-        let last = self
-            .history
-            .last()
-            .map_or(reached, |command| [f64::from(command.speed_mps), f64::from(command.steering_rad)]);
-        let reach = [limits.acceleration_max_mps2, limits.steering_rate_max_radps]
-            .map(|rate| rate * self.config.tracking_s);
-        [0, 1].map(|c| last[c].clamp(reached[c] - reach[c], reached[c] + reach[c]) as f32)
-    }
-
-    fn sample(&mut self, key: [u32; 4], mode: Mode) {
-        let limits = &self.model.limits;
-        let step_s = self.config.step_s;
-        let start = self.start_control();
-        self.plan.prepare(start, self.config.control_cost * f64::from(self.weighing_temperature_s()));
-        let change = match self.config.actuation {
-            Actuation::Instant => [f32::INFINITY; 2],
-            Actuation::Limited => [limits.acceleration_max_mps2, limits.steering_rate_max_radps]
-                .map(|rate| (rate * step_s) as f32),
-        };
-        let speed_max_mps = if mode == Mode::Onward { limits.speed_max_mps } else { 0.0 };
-        let sampler = Sampler {
-            steps: &self.plan.steps,
-            kept_noise: [self.plan.correlation(); 2],
-            kept_control: self.plan.kept_control(),
-            low: [-limits.reverse_speed_max_mps as f32, -limits.steering_max_rad as f32],
-            high: [speed_max_mps as f32, limits.steering_max_rad as f32],
-            change,
-            start,
-            key,
-        };
-        let machine = self.machine;
-        self.workers.run(&mut self.chunks, |index, chunk| {
-            machine.run(Sample { sampler: &sampler, index, chunk });
-        });
-    }
-
-    fn weighing_temperature_s(&self) -> f32 {
-        match self.config.temperature {
-            Temperature::Fixed { temperature_s } => temperature_s as f32,
-            Temperature::EffectiveSampleSize { .. } => self.temperature_s,
-        }
-    }
-
-    fn task<'a>(&self, input: &Input<'a>, mode: Mode) -> TaskOrder<'a> {
-        match (mode, input.objective) {
-            (Mode::BackUp { target_m }, _) => TaskOrder::Goal(target_m, 0.0, Terminal::StraightLine),
-            (Mode::Onward, Objective::Goal { goal_m, tolerance_m, terminal }) => {
-                TaskOrder::Goal(goal_m, tolerance_m, terminal)
-            }
-            (Mode::Onward, Objective::Path(path)) => TaskOrder::Path(path),
-        }
-    }
-
-    fn roll_out(&mut self, input: &Input<'_>, order: TaskOrder<'_>) {
-        let geometry = &input.map.geometry;
-        let (corner_m, cell_m) = (geometry.south_west_m(), geometry.resolution_m);
-        let cells = |at_m: [f64; 2]| [0, 1].map(|axis| (at_m[axis] - corner_m[axis]) / cell_m);
-        if let TaskOrder::Path(path) = order {
-            let passed_m = path.project([self.start.x_m, self.start.y_m]);
-            let (costs, step_s) = (&self.config.costs, self.config.step_s);
-            for (t, step) in self.reference.iter_mut().enumerate() {
-                let (at_m, tangent) = path.at(passed_m + path.speed_mps * step_s * (t + 1) as f64);
-                let [x_cells, y_cells] = cells(at_m);
-                let along_s = costs.path_along_s_per_m2 * cell_m * cell_m;
-                let across_s = costs.path_across_s_per_m2 * cell_m * cell_m;
-                *step = ReferenceStep { x_cells, y_cells, tangent, along_s, across_s };
-            }
-        }
-        let task = match order {
-            TaskOrder::Path(_) => Task::Path(&self.reference),
-            TaskOrder::Goal(goal_m, tolerance_m, terminal) => {
-                let [x_cells, y_cells] = cells(goal_m);
-                let field = match terminal {
-                    Terminal::StraightLine => None,
-                    Terminal::CostToGo(view) => TerminalField::new(view, geometry),
-                };
-                Task::Goal(GoalTask {
-                    x_cells,
-                    y_cells,
-                    tolerance_cells: tolerance_m / cell_m,
-                    step_s: self.config.step_s,
-                    distance_s: self.config.costs.distance_s_per_m * cell_m,
-                    rest_s: cell_m / self.config.costs.rest_speed_mps,
-                    field,
-                })
-            }
-        };
-        let [x_cells, y_cells] = cells([self.start.x_m, self.start.y_m]);
-        let scene = Scene {
-            stepper: &self.cell_stepper,
-            grid: grid(&input.map),
-            start: Start {
-                x_cells,
-                y_cells,
-                turns: (self.start.yaw_rad / TAU).rem_euclid(1.0),
-                speed_mps: self.start.speed_mps,
-                steering_rad: self.start.steering_rad,
-            },
-            slots: &self.slots[..self.cell_stepper.n_slots()],
-            prices: self.prices(),
-            task,
-        };
-        let machine = self.machine;
-        self.workers.run(&mut self.chunks, |_, chunk| machine.run(RollOut { scene: &scene, chunk }));
-    }
-
-    fn prices(&self) -> Prices {
-        let (limits, costs) = (&self.model.limits, &self.config.costs);
-        Prices {
-            roll_max_rad: limits.roll_max_rad,
-            pitch_max_rad: limits.pitch_max_rad,
-            attitude_s: costs.attitude_s,
-            lateral_max_mps2: limits.lateral_acceleration_max_mps2,
-            lateral_s: costs.lateral_s,
-            reverse_s: costs.reverse_s,
-        }
-    }
-
-    fn weigh(&mut self) -> WeightSummary {
-        let work = Weigh {
-            chunks: &mut self.chunks,
-            temperature: self.config.temperature,
-            last_s: self.temperature_s,
-        };
-        let summary = self.machine.run(work);
-        self.temperature_s = summary.temperature_s;
-        summary
-    }
-
-    /// The weighted mean of all rollouts becomes the plan. Chunks are added in their order, whoever computed them.
-    fn average(&mut self, summary: &WeightSummary) {
-        let machine = self.machine;
-        self.workers.run(&mut self.chunks, |_, chunk| machine.run(Accumulate { chunk }));
-        self.plan.nominal.fill([0.0; 2]);
-        for chunk in self.chunks.iter().filter(|chunk| !chunk.is_negligible) {
-            for (nominal, sum) in self.plan.nominal.iter_mut().zip(&chunk.sums) {
-                *nominal = [nominal[0] + sum[0], nominal[1] + sum[1]];
-            }
-        }
-        let share = 1.0 / summary.normalizer;
-        self.plan.nominal.iter_mut().flatten().for_each(|value| *value *= share);
     }
 
     fn describe(&mut self, summary: &WeightSummary, mode: Mode) {
@@ -429,13 +253,6 @@ impl Controller {
     }
 }
 
-/// What to sample for, in metres.
-#[derive(Clone, Copy)]
-enum TaskOrder<'a> {
-    Goal([f64; 2], f64, Terminal<'a>),
-    Path(crate::objective::ReferencePath<'a>),
-}
-
 /// Whether the arrays have the shape that the geometry says.
 fn is_usable(map: &RiskMapView<'_>) -> bool {
     let n_cells = map.geometry.n_cells();
@@ -445,31 +262,8 @@ fn is_usable(map: &RiskMapView<'_>) -> bool {
     !map.risks.is_empty() && shaped && indexable && resolution_m.is_finite() && resolution_m > 0.0
 }
 
-fn grid<'a>(map: &RiskMapView<'a>) -> Grid<'a> {
-    Grid {
-        n_rows: map.geometry.n_rows,
-        n_cols: map.geometry.n_cols,
-        n_yaws: map.n_yaws,
-        risks: map.risks,
-        ground: map.ground,
-    }
-}
-
 /// What stops a vehicle: no speed, the wheels as they are.
 fn standing(state: &State) -> Command {
     let steering_rad = if state.steering_rad.is_finite() { state.steering_rad as f32 } else { 0.0 };
     Command { speed_mps: 0.0, steering_rad }
-}
-
-/// The state a share of the way from one to the other; yaw the short way round.
-fn between(from: &State, to: &State, share: f64) -> State {
-    let blend = |from: f64, to: f64| from + share * (to - from);
-    let turn_rad = (to.yaw_rad - from.yaw_rad + TAU / 2.0).rem_euclid(TAU) - TAU / 2.0;
-    State {
-        x_m: blend(from.x_m, to.x_m),
-        y_m: blend(from.y_m, to.y_m),
-        yaw_rad: from.yaw_rad + share * turn_rad,
-        speed_mps: blend(from.speed_mps, to.speed_mps),
-        steering_rad: blend(from.steering_rad, to.steering_rad),
-    }
 }

@@ -248,3 +248,28 @@ fn an_attitude_that_is_not_a_number_counts_as_too_steep() {
     controller.decide(&input);
     assert_eq!(controller.diagnostics().n_feasible, 0);
 }
+
+/// Commands on their way for 0.3 s: the plan starts where they will have led. The oracle
+/// follows the three commands before the last with 2 m/s2.
+#[test]
+fn the_plan_starts_where_the_commands_on_their_way_lead() {
+    let config = Config { delay_s: 0.3, ..smooth() };
+    let map = level();
+    let mut controller = Controller::new(config, model(), 5).unwrap();
+    let mut sent = Vec::new();
+    for cycle in 0..4 {
+        let elapsed_s = if cycle == 0 { 0.0 } else { STEP_S };
+        let input =
+            Input { state: standing(), elapsed_s, map: map.view(), objective: goal([10.0, 0.0]), cycle };
+        let Decision::Drive(command) = controller.decide(&input) else { panic!("level ground") };
+        sent.push(f64::from(command.speed_mps));
+    }
+    let start = controller.nominal_trajectory(map.view())[0];
+    let (mut speed_mps, mut x_m) = (0.0f64, 0.0);
+    for command_mps in &sent[..3] {
+        speed_mps += (command_mps - speed_mps).clamp(-0.2, 0.2);
+        x_m += 0.1 * speed_mps;
+    }
+    assert!((start.speed_mps - speed_mps).abs() < 1e-6 && (start.x_m - x_m).abs() < 1e-3, "{start:?} {x_m}");
+    assert!(x_m > 0.02, "{sent:?}");
+}
