@@ -30,11 +30,13 @@ pub struct PriorConfig {
     /// Largest |roll| and |pitch| expected of unknown ground [rad]; a triangle falls from zero to here. Below
     /// the vehicle's limits the frontier can be approached at every CVaR level.
     pub unknown_attitude_rad: f64,
-    /// Added to the ground between the wheels before it is held against the ground clearance [m].
-    pub belly_margin_m: f64,
-    /// Traction of a vehicle whose belly would touch the ground is at most this, in [0, 1]; 1 turns the
-    /// check off.
-    pub high_centred_traction: f64,
+    /// A wheel stands on the first ground that a ball of this share of its radius touches, in [0, 1]; with 0 it
+    /// is the height under its centre, as in the paper.
+    pub wheel_envelope: f64,
+    /// Ground between the axles that rises above the plane of the wheels' contacts by more than the ground
+    /// clearance takes traction away, all of it from this many clearances on, above 1. A very large number turns
+    /// the check off.
+    pub high_centred_clearances: f64,
     /// Widens the footprint that must not touch an obstacle, on every side [m].
     pub obstacle_margin_m: f64,
 }
@@ -51,8 +53,8 @@ impl Default for PriorConfig {
             unknown_share_max: 0.5,
             unknown_traction: 0.3,
             unknown_attitude_rad: 25f64.to_radians(),
-            belly_margin_m: 0.0,
-            high_centred_traction: 0.0,
+            wheel_envelope: 1.0,
+            high_centred_clearances: 1.5,
             obstacle_margin_m: 0.0,
         }
     }
@@ -83,7 +85,7 @@ impl PriorConfig {
             ("uniform_weight", self.uniform_weight),
             ("unknown_share_max", self.unknown_share_max),
             ("unknown_traction", self.unknown_traction),
-            ("high_centred_traction", self.high_centred_traction),
+            ("wheel_envelope", self.wheel_envelope),
         ];
         check(&shares, "a number from 0 to 1", |v| (0.0..=1.0).contains(&v))?;
         let angles = [
@@ -98,7 +100,8 @@ impl PriorConfig {
         let positive =
             [("vegetation_height_max_m", self.vegetation_height_max_m), ("evidence", self.evidence)];
         check(&positive, "a finite number > 0", |v| v > 0.0)?;
-        check(&[("belly_margin_m", self.belly_margin_m)], "a finite number", |_| true)?;
+        let clearances = [("high_centred_clearances", self.high_centred_clearances)];
+        check(&clearances, "a finite number > 1", |v| v > 1.0)?;
         check(&[("obstacle_margin_m", self.obstacle_margin_m)], "a finite number >= 0", |v| v >= 0.0)
     }
 }
@@ -133,7 +136,8 @@ mod tests {
             (PriorConfig { vegetation_height_max_m: -0.2, ..default }, "vegetation_height_max_m"),
             (PriorConfig { evidence: 0.0, ..default }, "evidence"),
             (PriorConfig { unknown_share_max: -0.1, ..default }, "unknown_share_max"),
-            (PriorConfig { belly_margin_m: f64::INFINITY, ..default }, "belly_margin_m"),
+            (PriorConfig { wheel_envelope: 1.5, ..default }, "wheel_envelope"),
+            (PriorConfig { high_centred_clearances: 1.0, ..default }, "high_centred_clearances"),
             (PriorConfig { obstacle_margin_m: -1.0, ..default }, "obstacle_margin_m"),
         ];
         for (config, field) in wrong {

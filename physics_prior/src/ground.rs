@@ -1,9 +1,12 @@
 //! The surface made ready for wheels: padded, so that no footprint needs a bounds check; holes filled beside
 //! known ground, so that interpolation never meets one; counts summed along rows.
 
+use std::ops::Range;
+
 use rayon::prelude::*;
 use terrain::{Cell, GridGeometry, GridMap, SurfaceCell, TerrainClass};
 
+use crate::ball::Ball;
 use crate::lengths::Lengths;
 
 /// What wheels read of a cell, adjacent so that interpolation runs over all quantities at once.
@@ -75,14 +78,24 @@ fn is_known(cell: &SurfaceCell) -> bool {
 #[derive(Clone, Debug)]
 pub(crate) struct ContactGround {
     window: GridGeometry,
+    wheel: Ball,
     /// Distance of the heights that make the gradient [cells].
     baseline: i64,
     contacts: Vec<Contact>,
+    /// What a wheel stands on, minus infinity where unknown [m].
+    rests_m: Vec<f32>,
     /// What a belly may touch: level l holds the highest of the 2^l cells from each cell eastward, minus
     /// infinity where unknown [m].
     bumps_m: Vec<Vec<f32>>,
     /// Sums of the cells before each column, one more than columns per row.
     sums: Vec<Packed>,
+}
+
+/// Cells of the padded ground.
+#[derive(Clone)]
+struct Area {
+    rows: Range<usize>,
+    cols: Range<usize>,
 }
 
 impl ContactGround {
@@ -93,24 +106,25 @@ impl ContactGround {
         // A belly is longest along its diagonal.
         let widest_belly = cells(lengths.belly_diagonal_m()).ceil() as usize + 1;
         let n_levels = widest_belly.ilog2() as usize + 1;
-        let baseline = (cells(lengths.wheel_radius_m).round() as i64).max(1);
         Self {
             window,
-            baseline,
+            wheel: Ball::new(lengths.envelope_radius_m, window.resolution_m),
+            baseline: baseline(lengths, window.resolution_m),
             contacts: vec![Contact::NOWHERE; window.n_cells()],
+            rests_m: vec![f32::NEG_INFINITY; window.n_cells()],
             bumps_m: vec![vec![f32::NEG_INFINITY; window.n_cells()]; n_levels],
             sums: vec![0; window.n_rows * (window.n_cols + 1)],
         }
     }
 
+    /// How far a cell reads around itself [cells].
+    pub fn reach_of(lengths: &Lengths, resolution_m: f64) -> i64 {
+        Ball::new(lengths.envelope_radius_m, resolution_m).reach + baseline(lengths, resolution_m) + 1
+    }
+
     /// Where the cells lie.
     pub fn window(&self) -> &GridGeometry {
         &self.window
-    }
-
-    /// How far a change of the surface reaches [cells].
-    pub fn reach(&self) -> i64 {
-        self.baseline + 1
     }
 
     /// Position of a lattice cell, which must lie in the window.
@@ -120,35 +134,61 @@ impl ContactGround {
         row * self.window.n_cols + col
     }
 
-    /// Takes over the surface in the lattice rectangle from `min` to `max`, both inclusive.
+    /// Takes over what changed in the surface's lattice rectangle from `min` to `max`, both inclusive.
     pub fn read(&mut self, surface: &GridMap<SurfaceCell>, min: [i64; 2], max: [i64; 2]) {
         let [west, south] = self.window.origin;
-        let rows = clipped(min[1] - south, max[1] - south, self.window.n_rows);
-        let cols = clipped(min[0] - west, max[0] - west, self.window.n_cols);
-        let (n_cols, baseline) = (self.window.n_cols, self.baseline);
-        let lines = self.contacts.par_chunks_mut(n_cols).zip(self.bumps_m[0].par_chunks_mut(n_cols));
-        lines
-            .zip(self.sums.par_chunks_mut(n_cols + 1))
-            .enumerate()
-            .filter(|(row, _)| rows.contains(row))
-            .for_each(|(row, ((contacts, bumps_m), sums))| {
-                let reader = Reader { surface, baseline };
-                for col in cols.clone() {
-                    let lattice = [west + col as i64, south + row as i64];
-                    contacts[col] = reader.contact(lattice);
-                    bumps_m[col] = reader.height_m(lattice).unwrap_or(f32::NEG_INFINITY);
+        let reach = self.wheel.reach + self.baseline + 1;
+        let area = Area {
+            rows: clipped(min[1] - south - reach, max[1] - south + reach, self.window.n_rows),
+            cols: clipped(min[0] - west - reach, max[0] - west + reach, self.window.n_cols),
+        };
+        self.read_heights(surface, &area);
+        self.raise_levels(area.rows.clone());
+        self.rest_wheels(&area);
+        self.read_contacts(surface, &area);
+        self.fill_holes(&area);
+    }
+
+    fn read_heights(&mut self, surface: &GridMap<SurfaceCell>, area: &Area) {
+        let (n_cols, [west, south]) = (self.window.n_cols, self.window.origin);
+        let heights = self.bumps_m[0].par_chunks_mut(n_cols).zip(self.sums.par_chunks_mut(n_cols + 1));
+        heights.enumerate().filter(|(row, _)| area.rows.contains(row)).for_each(
+            |(row, (heights_m, sums))| {
+                let cell = |col: usize| cell_at(surface, [west + col as i64, south + row as i64]);
+                for col in area.cols.clone() {
+                    let cell = cell(col);
+                    heights_m[col] = if is_known(cell) { cell.height_m } else { f32::NEG_INFINITY };
                 }
-                for col in cols.start..n_cols {
-                    let lattice = [west + col as i64, south + row as i64];
-                    sums[col + 1] = sums[col] + packed(reader.cell(lattice));
+                for col in area.cols.start..n_cols {
+                    sums[col + 1] = sums[col] + packed(cell(col));
                 }
-            });
-        self.raise_levels(rows.clone());
-        self.fill_holes(rows, cols);
+            },
+        );
+    }
+
+    fn rest_wheels(&mut self, area: &Area) {
+        let (n_cols, wheel, heights_m) = (self.window.n_cols, &self.wheel, &self.bumps_m[0]);
+        let rows = self.rests_m.par_chunks_mut(n_cols).enumerate();
+        rows.filter(|(row, _)| area.rows.contains(row)).for_each(|(row, rests_m)| {
+            wheel.rest(heights_m, n_cols, row, &area.cols, rests_m);
+        });
+    }
+
+    fn read_contacts(&mut self, surface: &GridMap<SurfaceCell>, area: &Area) {
+        let (n_cols, [west, south]) = (self.window.n_cols, self.window.origin);
+        let rests =
+            Rests { heights_m: &self.rests_m, window: &self.window, baseline: self.baseline as isize };
+        let rows = self.contacts.par_chunks_mut(n_cols).enumerate();
+        rows.filter(|(row, _)| area.rows.contains(row)).for_each(|(row, contacts)| {
+            for col in area.cols.clone() {
+                let cell = cell_at(surface, [west + col as i64, south + row as i64]);
+                contacts[col] = rests.contact([col, row], cell);
+            }
+        });
     }
 
     /// Each level from the one below, whole rows.
-    fn raise_levels(&mut self, rows: std::ops::Range<usize>) {
+    fn raise_levels(&mut self, rows: Range<usize>) {
         let cells = rows.start * self.window.n_cols..rows.end * self.window.n_cols;
         for level in 1..self.bumps_m.len() {
             let (below, above) = self.bumps_m.split_at_mut(level);
@@ -164,9 +204,9 @@ impl ContactGround {
     }
 
     /// Gives unknown cells the mean of the known cells around them; they stay marked as unknown.
-    fn fill_holes(&mut self, rows: std::ops::Range<usize>, cols: std::ops::Range<usize>) {
-        for row in rows {
-            for col in cols.clone() {
+    fn fill_holes(&mut self, area: &Area) {
+        for row in area.rows.clone() {
+            for col in area.cols.clone() {
                 let index = row * self.window.n_cols + col;
                 if self.contacts[index].is_unknown() {
                     self.contacts[index] = self.mean_around(row, col);
@@ -226,57 +266,59 @@ impl ContactGround {
 }
 
 /// Overlap of an inclusive range with 0..n.
-pub(crate) fn clipped(first: i64, last: i64, n: usize) -> std::ops::Range<usize> {
+pub(crate) fn clipped(first: i64, last: i64, n: usize) -> Range<usize> {
     let start = first.clamp(0, n as i64) as usize;
     start..((last + 1).clamp(0, n as i64) as usize).max(start)
 }
 
-/// The surface by lattice indices, unknown beyond its window.
-struct Reader<'a> {
-    surface: &'a GridMap<SurfaceCell>,
-    baseline: i64,
+fn baseline(lengths: &Lengths, resolution_m: f64) -> i64 {
+    ((lengths.wheel_radius_m / resolution_m).round() as i64).max(1)
 }
 
-impl Reader<'_> {
-    fn cell(&self, lattice: [i64; 2]) -> &SurfaceCell {
-        let geometry = self.surface.geometry();
-        let [col, row] = [0, 1].map(|axis| lattice[axis] - geometry.origin[axis]);
-        let inside = (0..geometry.n_cols as i64).contains(&col) && (0..geometry.n_rows as i64).contains(&row);
-        if inside {
-            &self.surface[Cell { row: row as usize, col: col as usize }]
-        } else {
-            &SurfaceCell::UNKNOWN
-        }
+/// The surface by lattice indices, unknown beyond its window.
+fn cell_at(surface: &GridMap<SurfaceCell>, lattice: [i64; 2]) -> &SurfaceCell {
+    let geometry = surface.geometry();
+    let [col, row] = [0, 1].map(|axis| lattice[axis] - geometry.origin[axis]);
+    let inside = (0..geometry.n_cols as i64).contains(&col) && (0..geometry.n_rows as i64).contains(&row);
+    if inside { &surface[Cell { row: row as usize, col: col as usize }] } else { &SurfaceCell::UNKNOWN }
+}
+
+/// The surface on which wheels stand.
+struct Rests<'a> {
+    heights_m: &'a [f32],
+    window: &'a GridGeometry,
+    baseline: isize,
+}
+
+impl Rests<'_> {
+    fn height_m(&self, [col, row]: [usize; 2], east: isize, north: isize) -> Option<f32> {
+        let col = col.checked_add_signed(east).filter(|&col| col < self.window.n_cols)?;
+        let row = row.checked_add_signed(north).filter(|&row| row < self.window.n_rows)?;
+        let height_m = self.heights_m[row * self.window.n_cols + col];
+        height_m.is_finite().then_some(height_m)
     }
 
-    fn height_m(&self, lattice: [i64; 2]) -> Option<f32> {
-        let cell = self.cell(lattice);
-        is_known(cell).then_some(cell.height_m)
-    }
-
-    fn contact(&self, lattice: [i64; 2]) -> Contact {
-        let cell = self.cell(lattice);
-        if !is_known(cell) {
-            return Contact::NOWHERE;
-        }
+    fn contact(&self, place: [usize; 2], cell: &SurfaceCell) -> Contact {
+        let Some(height_m) = self.height_m(place, 0, 0) else { return Contact::NOWHERE };
         let finite = |value: f32, limit: f32| if value.is_nan() { limit } else { value.clamp(0.0, limit) };
         let mut values = [0.0; 8];
-        values[Contact::HEIGHT] = cell.height_m;
+        values[Contact::HEIGHT] = height_m;
         values[Contact::VARIANCE] = finite(cell.height_variance_m2, VARIANCE_MAX_M2);
         values[Contact::VEGETATION] = finite(cell.vegetation_height_m, f32::MAX);
-        values[Contact::GRADIENT_EAST] = self.gradient(lattice, [1, 0]);
-        values[Contact::GRADIENT_NORTH] = self.gradient(lattice, [0, 1]);
+        values[Contact::GRADIENT_EAST] = self.gradient(place, [1, 0]);
+        values[Contact::GRADIENT_NORTH] = self.gradient(place, [0, 1]);
         Contact { values }
     }
 
     /// Mean of the central differences on three parallel lines, as many as are known; a one-sided difference
     /// where none is, level where the cell stands alone.
-    fn gradient(&self, [x, y]: [i64; 2], [along_x, along_y]: [i64; 2]) -> f32 {
-        let (b, run_m) = (self.baseline, self.baseline as f32 * self.surface.geometry().resolution_m as f32);
-        let height_m = |along: i64, across: i64| {
-            self.height_m([x + along * along_x + across * along_y, y + along * along_y + across * along_x])
+    fn gradient(&self, place: [usize; 2], [east, north]: [isize; 2]) -> f32 {
+        let b = self.baseline;
+        let run_m = b as f32 * self.window.resolution_m as f32;
+        let height_m = |along: isize, across: isize| {
+            self.height_m(place, along * east + across * north, along * north + across * east)
         };
-        let central = |across: i64| Some((height_m(b, across)? - height_m(-b, across)?) / (2.0 * run_m));
+        let central = |across: isize| Some((height_m(b, across)? - height_m(-b, across)?) / (2.0 * run_m));
         let (mut sum, mut n_lines) = (0.0, 0.0);
         for difference in [-b, 0, b].into_iter().filter_map(central) {
             sum += difference;
@@ -286,7 +328,7 @@ impl Reader<'_> {
             return sum / n_lines;
         }
         let centre_m = height_m(0, 0);
-        let one_sided = |side: i64| Some((height_m(side * b, 0)? - centre_m?) / (side as f32 * run_m));
+        let one_sided = |side: isize| Some((height_m(side * b, 0)? - centre_m?) / (side as f32 * run_m));
         one_sided(1).or_else(|| one_sided(-1)).unwrap_or(0.0)
     }
 }

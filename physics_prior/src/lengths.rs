@@ -15,8 +15,10 @@ pub(crate) struct Lengths {
     /// wheel's radius beyond them, and as far short of the wheels' middle planes, about a tyre's half width.
     pub belly: Footprint,
     /// How far the ground under the belly may rise above the plane of the wheels' contacts [m].
-    pub bump_max_m: f32,
+    pub ground_clearance_m: f32,
     pub wheel_radius_m: f64,
+    /// Radius of the ball that stands for a wheel where it touches the ground [m].
+    pub envelope_radius_m: f64,
 }
 
 impl Lengths {
@@ -34,8 +36,9 @@ impl Lengths {
                 rear_m: 0.5 * geometry.wheel_radius_m,
                 half_width_m: (0.5 * (geometry.track_m - geometry.wheel_radius_m)).max(0.0),
             },
-            bump_max_m: (geometry.ground_clearance_m - prior.belly_margin_m) as f32,
+            ground_clearance_m: geometry.ground_clearance_m as f32,
             wheel_radius_m: geometry.wheel_radius_m,
+            envelope_radius_m: prior.wheel_envelope * geometry.wheel_radius_m,
         }
     }
 

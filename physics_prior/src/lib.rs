@@ -5,6 +5,8 @@
 //! - The slope of equation 15 is the absolute gradient along the heading under each wheel of a level vehicle;
 //!   "corresponds to 30 degrees" means the tangent. Loose ground counts as dirt.
 //! - Equation 17 takes the absolute angle; roll from the wheel pairs of each axle, pitch from those of each side.
+//! - A wheel stands on the first ground that a ball of its radius touches, not on the height under its centre;
+//!   contact heights and gradients are taken there.
 //! - A value becomes a distribution by splitting it between the two bins whose values enclose it, so that its
 //!   mean is the value and the risk map changes continuously with the ground.
 //! - The uniform distribution of equation 18 is replaced, for roll and pitch, by a triangle around the estimate;
@@ -12,14 +14,15 @@
 //! - A wheel over unknown ground has a low traction of its own, and its pairs an angle anywhere from level to a
 //!   moderate lean; a footprint that is mostly unknown counts as unknown under every wheel. The frontier can
 //!   therefore be approached, but known ground is preferred.
-//! - Ground between the wheels that rises above the plane of the contacts by more than the ground clearance
-//!   leaves the vehicle high-centred: the traction estimates fall to nothing.
+//! - Ground between the axles that rises above the plane of the contacts by more than the ground clearance takes
+//!   the weight off the wheels: the traction estimates fall, to nothing at one and a half times the clearance.
 
 #![allow(
     clippy::needless_range_loop,
     reason = "arithmetic in lanes: one index over several arrays of equal length"
 )]
 
+mod ball;
 mod belief;
 mod config;
 mod ground;

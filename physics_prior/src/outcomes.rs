@@ -51,7 +51,7 @@ pub(crate) struct Equations {
     spread_bins: f32,
     unknown_share_max: f32,
     unknown_traction: f32,
-    high_centred_traction: f32,
+    per_belly_depth_m: f32,
     /// Over the distance of each wheel pair [1/m].
     per_distance: [f32; 4],
 }
@@ -65,6 +65,9 @@ impl Equations {
         let slopes_rad = [config.linear_slope_max_rad, config.angular_slope_max_rad];
         let (track_m, wheelbase_m) = (lengths.wheels.track_m, lengths.wheels.wheelbase_m);
         let distances_m = [track_m, track_m, wheelbase_m, wheelbase_m];
+        let belly_depth_m = (config.high_centred_clearances - 1.0) * f64::from(lengths.ground_clearance_m);
+        // A vehicle without clearance loses everything at the first touch.
+        let per_belly_depth_m = (1.0 / belly_depth_m.max(1e-6)) as f32;
         let unknown_bins = config.unknown_attitude_rad as f32 / Bins::ATTITUDE_WIDTH_RAD;
         Self {
             uniform_weight: config.uniform_weight as f32,
@@ -74,7 +77,7 @@ impl Equations {
             spread_bins: config.attitude_spread_rad as f32 / Bins::ATTITUDE_WIDTH_RAD,
             unknown_share_max: config.unknown_share_max as f32,
             unknown_traction: config.unknown_traction as f32,
-            high_centred_traction: config.high_centred_traction as f32,
+            per_belly_depth_m,
             per_distance: distances_m.map(|distance_m| (1.0 / distance_m) as f32),
         }
     }
@@ -83,19 +86,19 @@ impl Equations {
     #[inline(always)]
     pub fn outcomes(&self, pose: &PoseGround) -> Outcomes {
         let all_unknown = pose.unknown_share > self.unknown_share_max;
-        let traction_max = if pose.high_centred { self.high_centred_traction } else { 1.0 };
+        let freedom = (1.0 - pose.belly_depth_m * self.per_belly_depth_m).max(0.0);
         let per_wheel = 0.25 * (1.0 - self.uniform_weight);
-        let mut outcomes = Outcomes { unknown: self.unknown_traction.min(traction_max), ..Outcomes::NONE };
+        let mut outcomes = Outcomes { unknown: self.unknown_traction * freedom, ..Outcomes::NONE };
         let mut known = [0.0; 4];
         for wheel in 0..4 {
             let contact = &pose.wheels[wheel].values;
             known[wheel] = if all_unknown { 0.0 } else { 1.0 - contact[Contact::UNKNOWN] };
             for lane in 0..2 {
                 let on_dirt = 1.0 - pose.slopes[wheel] * self.per_slope[lane];
-                outcomes.dirt[lane][wheel] = on_dirt.max(0.0).min(traction_max);
+                outcomes.dirt[lane][wheel] = on_dirt.max(0.0) * freedom;
             }
             let on_vegetation = 1.0 - contact[Contact::VEGETATION] * self.per_vegetation_m;
-            outcomes.vegetation[wheel] = on_vegetation.max(0.0).min(traction_max);
+            outcomes.vegetation[wheel] = on_vegetation.clamp(0.0, 1.0) * freedom;
             outcomes.dirt_probability[wheel] = per_wheel * known[wheel] * (1.0 - pose.vegetation_share);
             outcomes.vegetation_probability[wheel] = per_wheel * known[wheel] * pose.vegetation_share;
             outcomes.unknown_probability += per_wheel * (1.0 - known[wheel]);

@@ -15,8 +15,8 @@ pub(crate) struct PoseGround {
     pub vegetation_share: f32,
     /// Share of the footprint that is unknown.
     pub unknown_share: f32,
-    /// Whether the ground between the wheels reaches the belly.
-    pub high_centred: bool,
+    /// How far the ground between the axles would reach into the body, 0 where it does not [m].
+    pub belly_depth_m: f32,
 }
 
 /// A stencil laid on the ground at a base cell.
@@ -58,7 +58,7 @@ impl Placed<'_> {
             slopes,
             vegetation_share: counts.vegetation_255 as f32 / (255.0 * n_known.max(1) as f32),
             unknown_share: counts.unknown as f32 / self.stencil.n_footprint_cells as f32,
-            high_centred: self.is_high_centred(&wheels, lengths),
+            belly_depth_m: self.belly_depth_m(&wheels, lengths),
         }
     }
 
@@ -82,9 +82,10 @@ impl Placed<'_> {
         wheels
     }
 
-    /// Whether the ground under the belly rises too far above the plane that fits the four wheel contacts best.
+    /// Largest height of the ground under the belly above the plane that fits the four wheel contacts best,
+    /// raised by the clearance; not less than 0.
     #[inline(always)]
-    fn is_high_centred(&self, wheels: &[Contact; 4], lengths: &Lengths) -> bool {
+    fn belly_depth_m(&self, wheels: &[Contact; 4], lengths: &Lengths) -> f32 {
         let height_m = |wheel: usize| wheels[wheel].values[Contact::HEIGHT];
         let (front_left_m, rear_left_m, rear_right_m, front_right_m) =
             (height_m(0), height_m(1), height_m(2), height_m(3));
@@ -94,23 +95,30 @@ impl Placed<'_> {
         let per_left = 0.5 * (front_left_m + rear_left_m - front_right_m - rear_right_m) / track_m;
         let [cos, sin] = self.stencil.heading;
         let step_m = self.ground.window().resolution_m as f32 * (per_forward * cos - per_left * sin);
-        self.stencil.belly.iter().any(|BellySpan { span, start_m: [forward_m, left_m] }| {
+        let mut depth_m = 0.0;
+        for BellySpan { span, start_m: [forward_m, left_m] } in &self.stencil.belly {
             let plane_m = rear_m + per_forward * forward_m + per_left * left_m;
-            let limit = Line { start_m: plane_m + lengths.bump_max_m, step_m };
-            self.rises_above(span, limit)
-        })
+            let belly = Line { start_m: plane_m + lengths.ground_clearance_m, step_m };
+            depth_m = self.deepest_m(span, belly, depth_m);
+        }
+        depth_m
     }
 
-    /// Whether any cell of a span is higher than a line along it.
+    /// The larger of `least_m` and what any cell of a span rises above a line along it.
     #[inline(always)]
-    fn rises_above(&self, span: &Span, limit: Line) -> bool {
+    fn deepest_m(&self, span: &Span, line: Line, least_m: f32) -> f32 {
         let start = self.index(span.start);
-        let end_m = limit.start_m + (span.n_cells - 1) as f32 * limit.step_m;
-        if self.ground.highest_m(start, span.n_cells) <= limit.start_m.min(end_m) {
-            return false;
+        let end_m = line.start_m + (span.n_cells - 1) as f32 * line.step_m;
+        // Most rows are settled by their highest cell.
+        if self.ground.highest_m(start, span.n_cells) - line.start_m.min(end_m) <= least_m {
+            return least_m;
         }
-        let bumps_m = &self.ground.bumps_m()[start..start + span.n_cells];
-        bumps_m.iter().enumerate().any(|(k, &bump_m)| bump_m > limit.start_m + k as f32 * limit.step_m)
+        let mut deepest_m = least_m;
+        for (k, bump_m) in self.ground.bumps_m()[start..start + span.n_cells].iter().enumerate() {
+            let depth_m = bump_m - (line.start_m + k as f32 * line.step_m);
+            deepest_m = if depth_m > deepest_m { depth_m } else { deepest_m };
+        }
+        deepest_m
     }
 
     #[inline(always)]

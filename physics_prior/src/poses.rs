@@ -52,6 +52,7 @@ impl Poses {
         let own_cell = ratio.covered(0).end + 1;
         let around = Reach { min: [-own_cell; 2], max: [own_cell; 2] };
         let reach = stencils.iter().map(Stencil::reach).fold(around, Reach::union);
+        let reach = reach.grown(ContactGround::reach_of(&lengths, surface_resolution_m));
         let window = window(risk, ratio, reach, surface_resolution_m);
         let ground = ContactGround::unknown(window, &lengths);
         Self { judgement, ground, lengths, ratio, n_yaws, stencils, reach }
@@ -63,7 +64,7 @@ impl Poses {
         self.ground = ContactGround::unknown(window, &self.lengths);
     }
 
-    /// Whether the pose in the centre of a risk cell reads any surface cell from `min` to `max`, per axis.
+    /// Whether the pose in the centre of a risk cell depends on any surface cell from `min` to `max`, per axis.
     pub fn reads(&self, axis: usize, risk_index: i64, min: i64, max: i64) -> bool {
         let base = self.ratio.base(risk_index);
         base + self.reach.min[axis] <= max && base + self.reach.max[axis] >= min

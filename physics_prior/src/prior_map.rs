@@ -149,9 +149,8 @@ impl PriorMap {
             return Ok(());
         }
         let origin = surface.geometry().origin;
-        let reach = self.poses.ground.reach();
         let bounds = |axis: usize, range: &Range<usize>| {
-            [origin[axis] + range.start as i64 - reach, origin[axis] + range.end as i64 - 1 + reach]
+            [origin[axis] + range.start as i64, origin[axis] + range.end as i64 - 1]
         };
         let ([west, east], [south, north]) = (bounds(0, &changed.cols), bounds(1, &changed.rows));
         self.poses.ground.read(surface, [west, south], [east, north]);

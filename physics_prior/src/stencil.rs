@@ -62,6 +62,11 @@ impl Reach {
         self.max = std::array::from_fn(|axis| self.max[axis].max(offset[axis]));
     }
 
+    /// With a margin on every side.
+    pub fn grown(self, margin: i64) -> Self {
+        Self { min: self.min.map(|v| v - margin), max: self.max.map(|v| v + margin) }
+    }
+
     /// Everything within either.
     pub fn union(mut self, other: Self) -> Self {
         self.include(other.min);

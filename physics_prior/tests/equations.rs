@@ -7,7 +7,7 @@ use std::f64::consts::TAU;
 use common::*;
 use physics_prior::{Assumption, PriorConfig};
 use proptest::prelude::*;
-use terrain::{SurfaceCell, TerrainClass};
+use terrain::{GridGeometry, GridMap, SurfaceCell, TerrainClass, height_at};
 use traversability::{Bins, Pmf};
 
 /// The prior without its spread: distributions are the estimates themselves.
@@ -168,7 +168,7 @@ fn an_uncertain_height_widens_the_attitude_and_leaves_the_traction() {
 }
 
 #[test]
-fn ground_between_the_wheels_that_reaches_the_belly_stops() {
+fn ground_that_reaches_the_belly_takes_the_traction() {
     // A post half-way between the axles; the belly hangs 0.35 m above the plane of the wheels' contacts.
     let with_post = |height_m: f64| {
         let ground = surface(window(0.1, 80, 80), |x, y| {
@@ -178,10 +178,104 @@ fn ground_between_the_wheels_that_reaches_the_belly_stops() {
         prior_map(&TRUCK, &sharp(), &ground, 4).belief(2.0, 2.0, 0.0).unwrap()
     };
     let free = 1.0 - 0.1 / 30f32.to_radians().tan();
-    assert!((with_post(0.34).linear.mean(&Bins::TRACTION) - free).abs() < 1e-3);
-    assert_eq!(with_post(0.36).linear.mean(&Bins::TRACTION), 0.0);
-    assert_eq!(with_post(0.36).angular.mean(&Bins::TRACTION), 0.0);
-    assert_eq!(with_post(0.36).pitch, with_post(0.34).pitch);
+    // Depth over half a clearance: none, 0.0875 / 0.175, beyond.
+    for (height_m, left) in [(0.34, 1.0), (0.4375, 0.5), (0.53, 0.0)] {
+        let belief = with_post(height_m);
+        assert!((belief.linear.mean(&Bins::TRACTION) - left * free).abs() < 2e-3, "{height_m}");
+        assert_eq!(belief.pitch, with_post(0.0).pitch);
+    }
+    assert_eq!(with_post(0.53).angular.probabilities()[0], 1.0);
+}
+
+#[test]
+fn beyond_sixty_degrees_everything_lies_in_the_last_bin() {
+    let ground = surface(window(0.1, 40, 40), |x, _| open(70f64.to_radians().tan() * x));
+    for at in [0.05, 0.4, 1.0] {
+        let map = prior_map(&CAR, &physics(at), &ground, 4);
+        // Heading 45 degrees off: pitch and roll atan(tan 70 / sqrt 2) = 62.8 degrees, 15 degrees of spread.
+        let risk = map.risk_map().view().risk(middle(ground.geometry()), 0);
+        let belief = map.belief(2.05, 2.05, 45f64.to_radians()).unwrap();
+        assert!(close(risk, belief.risk(level(at)), 1e-4));
+        assert!(risk.pitch_rad <= Bins::ATTITUDE.values()[11] + 1e-6);
+        assert!(risk.pitch_rad > 55f32.to_radians() && risk.roll_rad > 55f32.to_radians());
+    }
+}
+
+#[test]
+fn a_wheel_stands_on_the_edge_of_a_step_before_its_centre_is_there() {
+    // A step of 0.3 m whose first cell's centre lies at x = 4.65, 0.25 m beyond the front wheels' at x = 4.4, so
+    // that wheels of 0.4 m stand 0.3 - (0.4 - sqrt(0.4^2 - 0.25^2)) = 0.2122 m high; y is on cell centres too.
+    let ground = surface(window(0.1, 80, 80), |x, _| open(if x > 4.6 { 0.3 } else { 0.0 }));
+    let belief = |wheel_envelope: f64| {
+        let prior = PriorConfig { uniform_weight: 0.0, wheel_envelope, ..PriorConfig::default() };
+        let assumption = Assumption::Physics { prior, level: level(1.0) };
+        prior_map(&TRUCK, &assumption, &ground, 4).belief(2.0, 2.0, 0.0).unwrap()
+    };
+    // Contact points lie on cell edges in x: the mean of the rests 0.2 and 0.3 m from the step.
+    let rest_m = |off_m: f32| (0.3 - (0.4 - (0.16 - off_m * off_m).sqrt())).max(0.0);
+    let expected = (0.5 * (rest_m(0.2) + rest_m(0.3)) / 2.4).atan();
+    assert!((belief(1.0).pitch.mean(&Bins::ATTITUDE) - expected).abs() < 1e-4);
+    assert_eq!(belief(0.0).pitch.probabilities()[0], 1.0);
+}
+
+#[test]
+fn the_belly_meets_the_highest_ground_under_it() {
+    let ground = rough_without_holes(window(0.1, 80, 80));
+    let prior = PriorConfig {
+        uniform_weight: 0.0,
+        linear_slope_max_rad: 89.99f64.to_radians(),
+        wheel_envelope: 0.0,
+        ..PriorConfig::default()
+    };
+    let map = prior_map(&TRUCK, &Assumption::Physics { prior, level: level(1.0) }, &ground, 1);
+    let mut n_touching = 0;
+    for step in 0..400 {
+        let (x, y) = (3.5 + 0.01 * (step % 37) as f64, 3.2 + 0.013 * (step % 41) as f64);
+        let yaw = 0.0157 * step as f64;
+        let depth_m = belly_depth_m(&ground, x, y, yaw);
+        // Half a clearance of 0.35 m on top takes everything; slopes take next to nothing.
+        let expected = (1.0 - depth_m / 0.175).clamp(0.0, 1.0);
+        let found = f64::from(map.belief(x, y, yaw).unwrap().linear.mean(&Bins::TRACTION));
+        assert!((found - expected).abs() < 3e-3, "{x} {y} {yaw}: {found} {expected}");
+        n_touching += u32::from(expected < 1.0);
+    }
+    assert!((50..350).contains(&n_touching), "{n_touching}");
+}
+
+/// Waves and bumps high enough to touch a belly now and then.
+fn rough_without_holes(geometry: GridGeometry) -> GridMap<SurfaceCell> {
+    surface(geometry, |x, y| {
+        let bump = (3.1 * x).sin() * (2.3 * y + 0.4).sin();
+        open(0.25 * (0.9 * x + 0.3 * y).sin() + if bump > 0.9 { 0.4 } else { 0.0 })
+    })
+}
+
+/// How far the ground reaches into the body of the truck: every cell under the belly against the regression
+/// plane of the four contacts.
+fn belly_depth_m(ground: &GridMap<SurfaceCell>, x: f64, y: f64, yaw: f64) -> f64 {
+    let (sin, cos) = yaw.sin_cos();
+    let points = [[2.4, 0.75], [0.0, 0.75], [0.0, -0.75], [2.4, -0.75]];
+    let heights = points.map(|[ahead, left]| {
+        f64::from(height_at(ground, x + cos * ahead - sin * left, y + sin * ahead + cos * left))
+    });
+    let mean = heights.iter().sum::<f64>() / 4.0;
+    let slope = |axis: usize, centre: f64| {
+        let off = points.map(|point| point[axis] - centre);
+        let product: f64 = off.iter().zip(&heights).map(|(off, height)| off * height).sum();
+        product / off.iter().map(|off| off * off).sum::<f64>()
+    };
+    let (per_ahead, per_left) = (slope(0, 1.2), slope(1, 0.0));
+    let geometry = ground.geometry();
+    let depths = (0..geometry.n_cells()).filter_map(|index| {
+        let [cell_x, cell_y] = geometry.centre_m(geometry.cell(index));
+        let ahead = cos * (cell_x - x) + sin * (cell_y - y);
+        let left = cos * (cell_y - y) - sin * (cell_x - x);
+        // From half a wheel's radius of 0.4 m behind the rear axle to as much before the front one.
+        let under = (-0.2..=2.6).contains(&ahead) && left.abs() <= 0.55;
+        let height = f64::from(ground.values()[index].height_m);
+        under.then_some(height - (mean + per_ahead * (ahead - 1.2) + per_left * left) - 0.35)
+    });
+    depths.fold(0.0, f64::max)
 }
 
 proptest! {

@@ -8,7 +8,7 @@ use common::*;
 use physics_prior::{Assumption, PriorConfig, PriorConfigError, PriorMap, PriorMapError};
 use proptest::prelude::*;
 use terrain::{Cell, CellRegion, GridGeometry, GridMap, SurfaceCell, TerrainClass};
-use traversability::{GroundFlags, Risk};
+use traversability::{Bins, GroundFlags, Risk};
 
 const NOMINAL: Assumption = Assumption::Nominal { obstacle_margin_m: 0.0 };
 
@@ -111,17 +111,20 @@ fn obstacles_block_every_pose_whose_footprint_touches_them() {
 }
 
 #[test]
-fn the_margin_widens_the_footprint() {
+fn the_margin_widens_the_footprint_on_every_side() {
     let geometry = window(0.1, 40, 40);
-    let mut ground = level_ground(geometry);
-    // Heading west from column 20 the rear lies 0.035 m behind the centre, x = 2.05; the post starts at x = 2.3.
-    ground[Cell { row: 20, col: 23 }] = SurfaceCell::certain(0.0, TerrainClass::Obstacle, 0.0);
-    let blocked = |obstacle_margin_m: f64| {
-        let map = prior_map(&CAR, &Assumption::Nominal { obstacle_margin_m }, &ground, 1);
-        map.risk_map().view().risk(Cell { row: 20, col: 20 }, 0).is_blocked()
-    };
-    assert!(!blocked(0.21));
-    assert!(blocked(0.22));
+    // Heading west from the centre of cell (20, 20) at (2.05, 2.05), the car reaches 0.295 m west, 0.035 m east and
+    // 0.125 m to either side; the obstacles' near edges lie 0.55, 0.25 and 0.25 m away.
+    let sides = [(20, 14, 0.255), (20, 23, 0.215), (23, 20, 0.125), (17, 20, 0.125)];
+    for (row, col, gap_m) in sides {
+        let mut ground = level_ground(geometry);
+        ground[Cell { row, col }] = SurfaceCell::certain(0.0, TerrainClass::Obstacle, 0.0);
+        let blocked = |obstacle_margin_m: f64| {
+            let map = prior_map(&CAR, &Assumption::Nominal { obstacle_margin_m }, &ground, 1);
+            map.risk_map().view().risk(Cell { row: 20, col: 20 }, 0).is_blocked()
+        };
+        assert!(!blocked(gap_m - 0.005) && blocked(gap_m + 0.005), "{row} {col}");
+    }
 }
 
 #[test]
@@ -132,9 +135,12 @@ fn the_nominal_map_is_full_traction_on_level_ground_whatever_the_ground() {
         let cell = ground.geometry().cell(index / 13);
         (1..39).contains(&cell.row) && (1..39).contains(&cell.col)
     };
-    let risks = map.risk_map().view().risks.iter().enumerate().filter(|(index, _)| inside(*index));
     let (mut n_free, mut n_blocked) = (0, 0);
-    for (_, &risk) in risks {
+    for (index, &risk) in map.risk_map().view().risks.iter().enumerate() {
+        if !inside(index) {
+            assert_eq!(risk, Risk::OUTSIDE);
+            continue;
+        }
         assert!(risk == Risk::NONE || risk == Risk::NONE.blocked());
         if risk.is_blocked() { n_blocked += 1 } else { n_free += 1 }
     }
@@ -170,6 +176,39 @@ fn unknown_ground_can_be_approached_and_is_never_preferred() {
     // In the mean: 0.2 * 0.5 of the uniform share and 0.8 * 0.3 of unknown ground.
     let mean = prior_map(&TRUCK, &physics(1.0), &ground, 8).risk_map().view().risk_at(9.1, 6.1, 0.1);
     assert!((mean.linear_traction - 0.34).abs() < 1e-5);
+}
+
+#[test]
+fn a_footprint_of_which_too_little_is_known_is_unknown_ground() {
+    // Only the ground within 0.3 m of the four contacts is known, for the truck heading east from (2, 2).
+    let contacts = [[4.4, 2.75], [2.0, 2.75], [2.0, 1.25], [4.4, 1.25]];
+    let ground = surface(window(0.1, 60, 60), |x, y| {
+        let near = contacts.iter().any(|[wheel_x, wheel_y]| (x - wheel_x).hypot(y - wheel_y) < 0.3);
+        if near { open(0.0) } else { SurfaceCell::UNKNOWN }
+    });
+    let mean_traction = |unknown_share_max: f64| {
+        let prior = PriorConfig { uniform_weight: 0.0, unknown_share_max, ..PriorConfig::default() };
+        let map = prior_map(&TRUCK, &Assumption::Physics { prior, level: level(1.0) }, &ground, 4);
+        map.belief(2.0, 2.0, 0.0).unwrap().linear.mean(&Bins::TRACTION)
+    };
+    assert!((mean_traction(0.5) - 0.3).abs() < 1e-6);
+    assert!((mean_traction(1.0) - 1.0).abs() < 1e-6);
+}
+
+#[test]
+fn beside_a_hole_heights_come_from_the_known_side() {
+    let mut ground = surface(window(0.1, 40, 40), |_, _| open(50.0));
+    ground[Cell { row: 20, col: 20 }] = SurfaceCell::UNKNOWN;
+    let prior = PriorConfig { uniform_weight: 0.0, ..PriorConfig::default() };
+    let map = prior_map(&CAR, &Assumption::Physics { prior, level: level(1.0) }, &ground, 4);
+    for step in 0..400 {
+        let (x_m, y_m) = (1.7 + 0.03 * (step % 20) as f64, 1.7 + 0.03 * (step / 20) as f64);
+        let belief = map.belief(x_m, y_m, 0.1 * step as f64).unwrap();
+        // Level where known, at most 25 degrees where not: nothing above the bin value 27.5.
+        for pmf in [belief.roll, belief.pitch] {
+            assert!(pmf.probabilities()[6..].iter().all(|p| *p < 1e-5), "{pmf:?}");
+        }
+    }
 }
 
 #[test]
@@ -239,14 +278,19 @@ fn a_moved_window_and_a_new_level_are_taken_over_whole() {
     let risk = GridGeometry { resolution_m: 0.1, origin: [0, 0], n_rows: 20, n_cols: 20 };
     let mut map = PriorMap::new(&CAR, &physics(0.4), 0.1, risk, 5).unwrap();
     map.update_all(&ground).unwrap();
-    map.place_at([25, 30]);
-    map.set_level(level(0.8));
     let nothing = CellRegion { rows: 0..0, cols: 0..0 };
+    let fresh = |at: f64, origin: [i64; 2]| {
+        let risk = GridGeometry { origin, ..risk };
+        let mut map = PriorMap::new(&CAR, &physics(at), 0.1, risk, 5).unwrap();
+        map.update_all(&ground).unwrap();
+        map
+    };
+    map.place_at([25, 30]);
     map.update_dirty(&ground, &nothing).unwrap();
-    let mut fresh =
-        PriorMap::new(&CAR, &physics(0.8), 0.1, GridGeometry { origin: [25, 30], ..risk }, 5).unwrap();
-    fresh.update_all(&ground).unwrap();
-    assert_eq!(map.risk_map(), fresh.risk_map());
+    assert_eq!(map.risk_map(), fresh(0.4, [25, 30]).risk_map());
+    map.set_level(level(0.8));
+    map.update_dirty(&ground, &nothing).unwrap();
+    assert_eq!(map.risk_map(), fresh(0.8, [25, 30]).risk_map());
     // Far from the surface everything is unknown, and nothing panics.
     map.place_at([-100_000, 7_000_000]);
     map.update_all(&ground).unwrap();
