@@ -14,7 +14,7 @@ use super::rest::{Rest, Stance};
 /// Friction of the body's panels on the ground [-].
 const PANEL_FRICTION: f64 = 0.5;
 /// Steps between checks whether a hull is near the ground.
-const CHECK_STEPS: u32 = 8;
+const CHECK_STEPS: u32 = 16;
 /// A hull counts as near the ground below this share of the ground clearance.
 const NEAR_SHARE: f64 = 0.25;
 /// Places along the vehicle at which its underside is held against the ground.

@@ -1,6 +1,6 @@
 //! How a wheel touches rough ground.
 //!
-//! The wheel is three discs side by side. Under each, the ground is a chain of straight segments; every piece of
+//! The wheel is a row of discs side by side. Under each, the ground is a chain of straight segments; every piece of
 //! ground inside the disc presses towards the hub with a force per length in proportion to how deep it lies under
 //! the tread. The force of a segment has a closed form and derives from a potential, so rolling over a rock and
 //! down again gains nothing. A tyre wraps around a sharp edge and sinks further onto it than onto a plane.
@@ -9,8 +9,12 @@ use nalgebra::{Vector2, Vector3};
 
 use super::ground::Ground;
 
-/// Discs across the tread.
-const N_SLICES: usize = 3;
+/// Widest piece of tread that one disc stands for, over the ground's cell: no grid point slips between discs [-].
+const SLICE_CELLS: f64 = 1.25;
+/// Longest step along the wheel from one asked height to the next, over the ground's cell [-].
+const STATION_CELLS: f64 = 0.75;
+/// The same over the wheel's radius [-].
+const STATION_SHARE: f64 = 0.25;
 /// Share of the radius at which the rim meets the ground: beyond, the tyre is squeezed flat.
 const RIM_SHARE: f64 = 0.5;
 /// Share of the radius below which the ground may not come to the hub in the closed form (it is singular there).
@@ -51,6 +55,8 @@ pub(crate) struct Envelope {
     width_m: f64,
     /// Places ahead of the hub at which the ground's height is asked [m].
     stations_m: Vec<f64>,
+    /// Discs along the axle [m].
+    slices_m: Vec<f64>,
     /// Force per length of ground and depth, all slices together [N/m2].
     stiffness_n_per_m2: f64,
 }
@@ -78,10 +84,10 @@ impl Disc {
 impl Envelope {
     /// A tyre of secant stiffness `stiffness_n_per_m` under `load_n` on a plane, on ground of `cell_m` cells.
     pub(crate) fn new(radius_m: f64, width_m: f64, stiffness_n_per_m: f64, load_n: f64, cell_m: f64) -> Self {
-        let n = (radius_m / (0.5 * cell_m).min(0.25 * radius_m)).ceil().min(12.0) as i32;
-        let spacing_m = radius_m / f64::from(n);
-        let stations_m = (-n..=n).map(|i| f64::from(i) * spacing_m).collect();
-        let mut envelope = Self { radius_m, width_m, stations_m, stiffness_n_per_m2: 1.0 };
+        let n = (radius_m / (STATION_CELLS * cell_m).min(STATION_SHARE * radius_m)).ceil().min(12.0) as i32;
+        let stations_m = (-n..=n).map(|i| f64::from(i) * radius_m / f64::from(n)).collect();
+        let slices_m = slices_m(width_m, cell_m);
+        let mut envelope = Self { radius_m, width_m, stations_m, slices_m, stiffness_n_per_m2: 1.0 };
         envelope.stiffness_n_per_m2 = load_n / envelope.force_on_plane_n(load_n / stiffness_n_per_m);
         envelope
     }
@@ -117,7 +123,7 @@ impl Envelope {
     /// How far the ground reaches above the unloaded tread, negative when the wheel is in the air [m].
     pub(crate) fn depth_m(&self, ground: &Ground, disc: &Disc) -> f64 {
         let mut deepest_m = f64::NEG_INFINITY;
-        for left_m in self.slices_m() {
+        for &left_m in &self.slices_m {
             let centre = disc.hub_m + disc.left * left_m;
             for &ahead_m in &self.stations_m {
                 let rim_m = (self.radius_m * self.radius_m - ahead_m * ahead_m).max(0.0).sqrt();
@@ -131,7 +137,7 @@ impl Envelope {
     /// Contact of the wheel with the ground, `None` in the air.
     pub(crate) fn touch(&self, ground: &Ground, disc: &Disc) -> Option<Contact> {
         let mut pressure = Pressure::default();
-        for left_m in self.slices_m() {
+        for &left_m in &self.slices_m {
             self.press_slice(ground, disc, left_m, &mut pressure);
         }
         if pressure.weight <= 0.0 {
@@ -144,12 +150,8 @@ impl Envelope {
         let cross_slope = self.cross_slope(ground, disc, &point_m);
         let force = disc.ahead * pressure.force.x + (disc.up - disc.left * cross_slope) * pressure.force.y;
         let magnitude = force.norm();
-        let force_n = magnitude * self.stiffness_n_per_m2 / N_SLICES as f64;
+        let force_n = magnitude * self.stiffness_n_per_m2 / self.slices_m.len() as f64;
         Some(Contact { point_m, normal: force / magnitude, force_n, loaded_radius_m })
-    }
-
-    fn slices_m(&self) -> [f64; N_SLICES] {
-        [-self.width_m / 3.0, 0.0, self.width_m / 3.0]
     }
 
     fn press_slice(&self, ground: &Ground, disc: &Disc, left_m: f64, pressure: &mut Pressure) {
@@ -223,6 +225,14 @@ impl Envelope {
         let run_m = (self.width_m + rise_m * disc.left.z).max(0.1 * self.width_m);
         (rise_m * disc.up.z / run_m).clamp(-CROSS_SLOPE_MAX, CROSS_SLOPE_MAX)
     }
+}
+
+/// Places of discs along the axle that resist rolling over like the whole tread does: the second moment of
+/// n evenly spread discs falls short of the tread's by 1 - 1/n^2.
+fn slices_m(width_m: f64, cell_m: f64) -> Vec<f64> {
+    let n = (width_m / (SLICE_CELLS * cell_m)).ceil().clamp(2.0, 5.0);
+    let spread_m = width_m / (1.0 - 1.0 / (n * n)).sqrt();
+    (0..n as i32).map(|i| ((f64::from(i) + 0.5) / n - 0.5) * spread_m).collect()
 }
 
 #[cfg(test)]
@@ -303,13 +313,14 @@ mod tests {
 
     #[test]
     fn rough_ground_presses_as_the_sum_over_its_points() {
-        // Kinks at the cell centres only, which every other station hits: the chain is the ground itself.
+        // Kinks at the cell centres only, every other of a finer tyre's stations: the chain is the ground itself.
+        let tyre = Envelope::new(RADIUS_M, 0.2, 200_000.0, 4000.0, 0.2 / 3.0);
         let heights_m = |x_m: f64| 0.05 * (9.0 * x_m).sin() + 0.03 * (23.0 * x_m).cos();
         let ground = ground(|x_m, _| heights_m(x_m));
         for step in 0..20 {
             let hub_m =
                 Vector3::new(0.05 + 0.1 * f64::from(step), 0.05, heights_m(0.1 * f64::from(step)) + 0.37);
-            let found = tyre().touch(&ground, &upright(hub_m));
+            let found = tyre.touch(&ground, &upright(hub_m));
             let mut sum = Vector3::zeros();
             let n = 80_000;
             let dx_m = 2.0 * RADIUS_M / f64::from(n);
@@ -321,7 +332,7 @@ mod tests {
                 let depth_m = (RADIUS_M - towards.norm()).max(0.0);
                 sum += towards.normalize() * (depth_m * dx_m * (1.0 + rise * rise).sqrt());
             }
-            let expected_n = sum * tyre().stiffness_n_per_m2;
+            let expected_n = sum * tyre.stiffness_n_per_m2;
             let found_n = found.map_or(Vector3::zeros(), |contact| contact.normal * contact.force_n);
             assert!((found_n - expected_n).norm() < 1.0 + 2e-3 * expected_n.norm(), "{found_n} {expected_n}");
         }
