@@ -134,7 +134,7 @@ impl CellState {
         self.fade_obstacle(highest_m, config);
         let rigid = touching.clone().filter(|p| p.is_rigid());
         let statistics = RigidStatistics::of(rigid.clone());
-        let is_wall = statistics.span_m() > config.wall_span_m;
+        let is_wall = statistics.span_m() > config.steep_span_m();
         for point in touching {
             self.take_evidence(point, is_wall);
         }

@@ -2,6 +2,9 @@
 
 use serde::{Deserialize, Serialize};
 
+/// Slope of the steepest ground that is still ground: the tangent of 70 degrees.
+const STEEPEST_GROUND: f64 = 2.747;
+
 /// How points become ground. Every length is in metres, every default is meant for a vehicle of 1 to 4 m
 /// with a spinning range sensor of 64 beams.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -34,8 +37,8 @@ pub struct ElevationConfig {
     pub own_body_m: f64,
     /// Points that hang higher than this above the ground do not touch the vehicle [m], > 0.
     pub clearance_m: f32,
-    /// Rigid points of one cell that span more than this are a wall or a trunk [m], > 0. On a cell that is
-    /// `d` across its diagonal, ground of slope s spans d tan(s).
+    /// Rigid points of one cell that span more than this, and more than ground of 70 degrees would across the
+    /// cell's diagonal, are a wall or a trunk [m], > 0.
     pub wall_span_m: f32,
     /// Standard deviation of the ground below vegetation when only plants were seen far and wide [m], > 0.
     pub hidden_ground_std_m: f32,
@@ -138,6 +141,12 @@ impl ElevationConfig {
         check(&positive, "a finite number > 0", |v| v.is_finite() && v > 0.0)?;
         check(&not_negative, "a finite number >= 0", |v| v.is_finite() && v >= 0.0)?;
         check(&[("recentre_m", self.recentre_m)], "a number > 0, infinity allowed", |v| v > 0.0)
+    }
+
+    /// Span of heights in a cell beyond which they belong to a wall [m].
+    pub(super) fn steep_span_m(&self) -> f32 {
+        let diagonal_m = std::f64::consts::SQRT_2 * self.resolution_m;
+        self.wall_span_m.max((STEEPEST_GROUND * diagonal_m) as f32)
     }
 
     /// Gap radius in whole cells.

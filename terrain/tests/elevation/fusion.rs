@@ -230,11 +230,15 @@ fn ground_far_above_a_false_low_return_is_believed_the_second_time() {
 #[test]
 fn a_steep_face_is_an_obstacle_whatever_its_name() {
     let mut map = plain_map(|_| {});
-    let face: Vec<f64> = (0..20).map(|i| 0.1 * f64::from(i)).collect();
+    let face: Vec<f64> = (0..26).map(|i| 0.1 * f64::from(i)).collect();
     map.fuse(&scan_of(column(&face, Open)), &HERE).unwrap();
     assert_eq!(at_spot(&map).class(), Obstacle);
     let mut map = plain_map(|_| {});
-    let hump: Vec<f64> = (0..8).map(|i| 0.1 * f64::from(i)).collect();
+    map.fuse(&scan_of(column(&[0.0, 0.05, 0.0, 0.02, 2.4], Open)), &HERE).unwrap();
+    assert_eq!(at_spot(&map).class(), Open, "a single high point is no face");
+    let mut map = plain_map(|_| {});
+    // 70 degrees across the diagonal of 0.71 m: 1.94 m.
+    let hump: Vec<f64> = (0..20).map(|i| 0.1 * f64::from(i)).collect();
     map.fuse(&scan_of(column(&hump, Open)), &HERE).unwrap();
     assert_eq!(at_spot(&map).class(), Open);
 }
