@@ -17,7 +17,7 @@ use serde::Serialize;
 use traversability::CvarLevel;
 
 use crate::closed_loop::{DriveError, Method};
-pub use drive::{DriveResult, name_of};
+pub use drive::{DriveResult, name_of, name_of_outcome};
 use drive::{Finished, Job};
 pub use row::{Row, WILSON_Z, wilson_interval};
 
@@ -39,6 +39,13 @@ pub struct Request {
     pub n_threads: usize,
     /// Instruction set of the controller.
     pub isa: Isa,
+}
+
+impl Request {
+    /// How many drives that are.
+    pub fn n_drives(&self) -> u64 {
+        jobs(self).len() as u64
+    }
 }
 
 /// All drives and what they add up to.
@@ -93,7 +100,7 @@ pub enum NavigationError {
         /// Method, level and seed.
         drive: String,
         /// Why.
-        source: BrokenDrive,
+        source: Box<BrokenDrive>,
     },
 }
 
@@ -193,11 +200,11 @@ fn drive_all(
     };
     let mut done: Vec<_> = pool.broadcast(work).into_iter().flatten().collect();
     done.sort_by_key(|(index, _)| *index);
-    done.into_iter()
-        .map(|(index, finished)| {
-            finished.map_err(|source| NavigationError::Drive { drive: jobs[index].to_string(), source })
-        })
-        .collect()
+    let told = |index: usize, source| NavigationError::Drive {
+        drive: jobs[index].to_string(),
+        source: Box::new(source),
+    };
+    done.into_iter().map(|(index, finished)| finished.map_err(|source| told(index, source))).collect()
 }
 
 #[cfg(test)]

@@ -6,7 +6,9 @@ mod values;
 
 use clap::{Parser, Subcommand};
 
-pub use bench::{BenchCommand, BenchControlArguments, BenchPriorMapArguments, BenchWork};
+pub use bench::{
+    BenchCommand, BenchControlArguments, BenchNavigationArguments, BenchPriorMapArguments, BenchWork,
+};
 pub use drive::{DriveArguments, InstructionSet, MapSource, Method, Pace};
 pub use values::{Goal, StartPose, WorldSource};
 
@@ -33,7 +35,7 @@ pub enum Command {
     /// Drive a simulated vehicle over rough ground to a goal
     #[command(long_about = drive::LONG_ABOUT)]
     Drive(Box<DriveArguments>),
-    /// Measure how fast the controller and the risk map are
+    /// Measure how fast the controller and the risk map are, and how often drives reach their goal
     Bench {
         /// What to measure.
         #[command(subcommand)]

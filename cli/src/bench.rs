@@ -1,10 +1,13 @@
 //! `surefoot bench`: what was asked, handed to the benchmarks, and their result shown and written.
 
+mod navigation;
+
 use ::bench::{BenchError, control, prior_map};
 use serde::Serialize;
 
 use crate::arguments::{BenchControlArguments, BenchPriorMapArguments, BenchWork};
 use crate::{UsageError, output};
+pub(crate) use navigation::run_navigation;
 
 pub(crate) fn run_control(arguments: &BenchControlArguments) -> anyhow::Result<()> {
     let json = arguments.json.as_deref();

@@ -42,6 +42,9 @@ fn dispatch(command: Command) -> anyhow::Result<()> {
         Command::Drive(drive) => drive::run(&drive),
         Command::Bench { command: BenchCommand::Control(control) } => bench::run_control(&control),
         Command::Bench { command: BenchCommand::PriorMap(prior_map) } => bench::run_prior_map(&prior_map),
+        Command::Bench { command: BenchCommand::Navigation(navigation) } => {
+            bench::run_navigation(&navigation)
+        }
     }
 }
 

@@ -6,6 +6,7 @@ mod canvas;
 mod colour;
 mod legend;
 mod map;
+mod navigation_table;
 mod relief;
 mod strips;
 mod view;
@@ -18,6 +19,7 @@ use terrain::GridMap;
 
 use canvas::{Anchor, Canvas, TextStyle};
 use colour::Rgb;
+pub use navigation_table::draw_navigation_table;
 
 /// One drive, as far as a picture needs it. All positions are in the map frame.
 #[derive(Clone, Debug)]

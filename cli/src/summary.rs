@@ -158,7 +158,7 @@ impl Summary {
 }
 
 /// A reason as it stands in the JSON, with spaces.
-fn name_of(reason: StopReason) -> String {
+pub(crate) fn name_of(reason: StopReason) -> String {
     let name = serde_json::to_string(&reason).unwrap_or_default();
     name.trim_matches('"').replace('_', " ")
 }

@@ -51,3 +51,47 @@ fn prior_map_reports_whole_and_changed_maps() {
         assert!(printed["ms"][part]["median"].as_f64().is_some_and(|ms| ms > 0.0), "{part} in {printed}");
     }
 }
+
+#[test]
+fn navigation_writes_table_and_picture() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let path = |name: &str| folder.path().join(name);
+    let (out, copy) = (path("out"), path("copy.json"));
+    let words =
+        ["bench", "navigation", "--methods", "physics", "--alpha", "0.4", "--seeds", "1", "--threads", "1"];
+    let mut words = words.to_vec();
+    words.extend(["--time-limit", "1", "--isa", "portable"]);
+    words.extend(["--out", out.to_str().expect("UTF-8"), "--json", copy.to_str().expect("UTF-8")]);
+    let output = surefoot(&words);
+    assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+    assert!(output.stderr.is_empty(), "no bar without a terminal");
+    let told = String::from_utf8_lossy(&output.stdout);
+    assert!(told.contains("0 of 1") && told.contains("time limit passed after 1.0 s"), "{told}");
+
+    let bytes = std::fs::read(out.join("navigation.json")).expect("the table");
+    assert_eq!(bytes, std::fs::read(&copy).expect("the copy"));
+    let table: Value = serde_json::from_slice(&bytes).expect("JSON");
+    let (row, drive) = (&table["rows"][0], &table["drives"][0]);
+    assert_eq!((&table["n_seeds"], &table["isa"], &row["n"]), (&1.into(), &"portable".into(), &1.into()));
+    assert_eq!((&row["outcomes"]["timeout"], &row["median_time_to_goal_s"]), (&1.into(), &Value::Null));
+    // z^2 / (n + z^2) with z = 1.96 and n = 1.
+    assert!((row["wilson_high"].as_f64().expect("a number") - 0.7935).abs() < 1e-4, "{row}");
+    assert_eq!((&drive["method"], &drive["alpha"]), (&"physics".into(), &0.4.into()));
+    assert!(drive["failed_at_m"][1].is_number() && table["revision"].is_string(), "{table}");
+    assert_eq!(&std::fs::read(out.join("navigation.png")).expect("the picture")[..8], b"\x89PNG\r\n\x1a\n");
+}
+
+#[test]
+fn navigation_refuses_what_cannot_be_driven() {
+    for (words, part) in [
+        (["--seeds", "0"], "--seeds: expected a number of seeds from 1 to 1000, found \"0\""),
+        (["--alpha", "0.4,2"], "--alpha: expected a number above 0 and at most 1, found \"2\""),
+        (["--methods", "physics,luck"], "--methods: expected physics, nominal, truth, found \"luck\""),
+        (["--out", "/dev/null"], "--out: "),
+    ] {
+        let output = surefoot(&[["bench", "navigation"].as_slice(), &words].concat());
+        let told = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{told}");
+        assert!(told.contains(part) && told.lines().count() == 1, "{told}");
+    }
+}

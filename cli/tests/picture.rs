@@ -3,12 +3,16 @@
 
 #![allow(clippy::expect_used, reason = "helpers of tests may fail as tests do")]
 
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 
+use bench::closed_loop::Method;
+use bench::navigation::{DriveResult, Report, Row};
 use bicycle::Vehicle;
-use cli::picture::{DrivePicture, PathSample, RiskLayer, draw_drive};
+use cli::picture::{DrivePicture, PathSample, RiskLayer, draw_drive, draw_navigation_table};
 use scenarios::{
-    ARENA_GOAL_M, ARENA_START, ArenaConfig, RockFieldConfig, RockMap, Split, World, arena, rock_field,
+    ARENA_GOAL_M, ARENA_START, ArenaConfig, Outcome, RockFieldConfig, RockMap, Split, World, arena,
+    rock_field,
 };
 use terrain::GridMap;
 
@@ -179,4 +183,60 @@ fn folder_in_place_of_the_file_is_told() {
     };
     let error = draw_drive(&picture, &page(".")).expect_err("a folder is no file");
     assert!(error.to_string().contains("expected a file that can be written"), "{error}");
+}
+
+/// A table in which every way to fail occurs, the more often the further down.
+fn made_up_table(n_seeds: u64) -> Report {
+    let failures = [
+        Outcome::Stuck,
+        Outcome::Timeout,
+        Outcome::AttitudeLimit,
+        Outcome::Stopped,
+        Outcome::RolledOver,
+        Outcome::OutOfBounds,
+    ];
+    let rows = [
+        (Method::Truth, None),
+        (Method::Physics, Some(0.4)),
+        (Method::Physics, Some(0.6)),
+        (Method::Physics, Some(0.8)),
+        (Method::Nominal, None),
+    ];
+    let drive = |row: usize, seed: u64| {
+        let draw = (seed * 7 + row as u64 * 3) % 11;
+        let outcome = if draw < 1 + 2 * row as u64 { failures[(draw % 6) as usize] } else { Outcome::Goal };
+        DriveResult {
+            method: rows[row].0,
+            alpha: rows[row].1,
+            seed,
+            outcome,
+            time_s: 41.0 + draw as f64,
+            path_length_m: 44.0,
+            distance_to_goal_m: 1.0,
+            largest_roll_deg: 14.0,
+            largest_pitch_deg: 15.0,
+            failed_at_m: (outcome != Outcome::Goal).then_some([20.0, 30.0]),
+            stops: BTreeMap::new(),
+        }
+    };
+    let drives: Vec<_> = (0..5).flat_map(|row| (1..=n_seeds).map(move |seed| drive(row, seed))).collect();
+    Report {
+        world: "rocks",
+        vehicle: "pietra_full_size",
+        n_seeds,
+        time_limit_s: 120.0,
+        isa: mppi::Isa::Portable,
+        config_hash: String::new(),
+        rows: drives.chunks(n_seeds as usize).filter_map(Row::of).collect(),
+        drives,
+    }
+}
+
+#[test]
+fn navigation_table_of_one_and_many_seeds() {
+    for n_seeds in [1, 20, 200] {
+        let path = page(&format!("navigation_{n_seeds}.png"));
+        draw_navigation_table(&made_up_table(n_seeds), &path).expect("a page");
+        assert_eq!(png_size(&path)[0], 1600);
+    }
 }

@@ -64,6 +64,19 @@ pub fn name_of(method: Method) -> &'static str {
     }
 }
 
+/// How a drive ended, in a word or two.
+pub fn name_of_outcome(outcome: Outcome) -> &'static str {
+    match outcome {
+        Outcome::Goal => "goal reached",
+        Outcome::RolledOver => "rolled over",
+        Outcome::AttitudeLimit => "attitude limit exceeded",
+        Outcome::Stuck => "stuck",
+        Outcome::OutOfBounds => "out of bounds",
+        Outcome::Timeout => "time limit passed",
+        Outcome::Stopped => "stopped",
+    }
+}
+
 impl fmt::Display for Job {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         formatter.write_str(name_of(self.method))?;

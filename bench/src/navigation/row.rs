@@ -37,7 +37,7 @@ pub struct Row {
 
 impl Row {
     /// Of the drives of one method and level; `None` of no drive.
-    pub(super) fn of(drives: &[DriveResult]) -> Option<Self> {
+    pub fn of(drives: &[DriveResult]) -> Option<Self> {
         let first = drives.first()?;
         let mut outcomes = BTreeMap::new();
         for drive in drives {

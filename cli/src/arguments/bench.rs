@@ -1,10 +1,10 @@
-//! `surefoot bench control` and `surefoot bench prior-map`.
+//! `surefoot bench control`, `surefoot bench prior-map` and `surefoot bench navigation`.
 
 use std::path::PathBuf;
 
 use clap::{Args, Subcommand, ValueEnum};
 
-use super::values;
+use super::{Method, values};
 
 /// What can be measured.
 #[derive(Clone, Debug, Subcommand)]
@@ -15,6 +15,9 @@ pub enum BenchCommand {
     /// The risk map of the physics prior, whole and after a part of the ground has changed
     #[command(long_about = PRIOR_MAP_ABOUT)]
     PriorMap(BenchPriorMapArguments),
+    /// Drives over the default rock field, with every method and risk tolerance
+    #[command(long_about = NAVIGATION_ABOUT)]
+    Navigation(BenchNavigationArguments),
 }
 
 /// How to measure the controller.
@@ -85,6 +88,59 @@ impl BenchPriorMapArguments {
     }
 }
 
+/// Which drives to do.
+#[derive(Args, Clone, Debug)]
+#[command(after_long_help = NAVIGATION_AFTER_HELP)]
+pub struct BenchNavigationArguments {
+    /// What the controller knows of the ground, separated by commas
+    #[arg(
+        long,
+        value_enum,
+        value_name = "METHOD,..",
+        value_delimiter = ',',
+        default_value = "truth,physics,nominal"
+    )]
+    pub methods: Vec<Method>,
+
+    /// Risk tolerances of physics in (0, 1], separated by commas; truth and nominal know none and are driven once
+    #[arg(long, value_name = "LEVEL,..", value_delimiter = ',', value_parser = values::cvar_level,
+          default_value = "0.4,0.6,0.8", allow_hyphen_values = true)]
+    pub alpha: Vec<f64>,
+
+    /// Drive with the seeds 1 to N, at most 1000
+    #[arg(long, value_name = "N", value_parser = values::seed_count, default_value = "20",
+          allow_hyphen_values = true)]
+    pub seeds: u64,
+
+    /// Give up a drive after this much simulated time [s]
+    #[arg(long, value_name = "SECONDS", value_parser = values::duration_s, default_value = "120",
+          allow_hyphen_values = true)]
+    pub time_limit: f64,
+
+    /// Drives at a time, 1 to 256 [default: the machine's threads]; the result does not depend on it
+    #[arg(long, value_name = "N", value_parser = values::thread_count, allow_hyphen_values = true)]
+    pub threads: Option<usize>,
+
+    /// Instruction set of the controller; auto takes the best the machine has
+    #[arg(long, value_enum, default_value_t = super::InstructionSet::Auto)]
+    pub isa: super::InstructionSet,
+
+    /// Folder for navigation.json and navigation.png; made if missing, earlier files are replaced
+    #[arg(long, value_name = "DIR", default_value = "surefoot-out")]
+    pub out: PathBuf,
+
+    /// Write the result to this file too
+    #[arg(long, value_name = "FILE")]
+    pub json: Option<PathBuf>,
+}
+
+impl BenchNavigationArguments {
+    /// Drives at a time: as asked, else as many as the machine runs threads at once.
+    pub fn n_threads(&self) -> usize {
+        self.threads.unwrap_or_else(values::machine_threads)
+    }
+}
+
 const CONTROL_ABOUT: &str = "\
 Measures one update of the controller that `surefoot drive` uses: 1024 rollouts of 50 steps over a risk map of \
 81 x 96 cells and 13 yaws, with fresh noise every update.";
@@ -92,6 +148,22 @@ Measures one update of the controller that `surefoot drive` uses: 1024 rollouts 
 const PRIOR_MAP_ABOUT: &str = "\
 Measures the risk map of the physics prior over 81 x 96 cells and 13 yaws: built whole, and brought up to date \
 after one contiguous block of 2 % of the cells has changed.";
+
+const NAVIGATION_ABOUT: &str = "\
+Drives 40 m over the default rock field again and again: every method, every risk tolerance, the same seeds. Says how \
+often the goal was reached, with the 95 % Wilson interval, how long that took, and how every other drive failed. \
+The exit code is 0 once all drives are done, however they ended.";
+
+const NAVIGATION_AFTER_HELP: &str = "\
+Writes navigation.png, and navigation.json with
+  rows    of each method and alpha: n, n_goal, success, wilson_low, wilson_high, median_time_to_goal_s, outcomes
+  drives  of each seed too: outcome, time_s, path_length_m, distance_to_goal_m, largest_roll_deg,
+          largest_pitch_deg, failed_at_m, stops
+
+Example, minutes to half an hour:
+  surefoot bench navigation
+Example, a few seconds:
+  surefoot bench navigation --methods physics --alpha 0.6 --seeds 2 --time-limit 5";
 
 const CONTROL_AFTER_HELP: &str = "\
 Prints JSON, and with --json writes it to a file too:

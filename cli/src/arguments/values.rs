@@ -112,6 +112,11 @@ pub(super) fn update_count(word: &str) -> Result<usize, String> {
     count(word, 10_000_000, "updates")
 }
 
+/// A number of seeds.
+pub(super) fn seed_count(word: &str) -> Result<u64, String> {
+    count(word, 1000, "seeds").map(|n| n as u64)
+}
+
 fn count(word: &str, most: usize, of: &str) -> Result<usize, String> {
     word.trim()
         .parse()
