@@ -14,11 +14,16 @@ const STATIONS: [f64; 9] = [-0.95, -0.75, -0.5, -0.25, 0.0, 0.25, 0.5, 0.75, 0.9
 const RIM: [f64; 9] = [0.312, 0.661, 0.866, 0.968, 1.0, 0.968, 0.866, 0.661, 0.312];
 /// Where the body's underside is compared with the ground: over the wheelbase, and over the width.
 const BELLY_ALONG: [f64; 5] = [0.1, 0.3, 0.5, 0.7, 0.9];
-const BELLY_ACROSS: [f64; 3] = [-0.45, 0.0, 0.45];
+const BELLY_ACROSS: [f64; 5] = [-0.45, -0.22, 0.0, 0.22, 0.45];
+/// How far ahead of the bumper ground counts as touched: whoever drives on meets it at once. Over the length.
+const BUMPER_AHEAD: f64 = 0.03;
+const N_UNDERSIDE: usize = (BELLY_ALONG.len() + 2) * BELLY_ACROSS.len();
 /// Stiffness of the travel stops over that of the spring [-].
 const STOP_RATIO: f64 = 10.0;
-/// Stiffness of the belly over that of a wheel [-].
-const BELLY_RATIO: f64 = 20.0;
+/// Stiffness of each point of the underside over that of a wheel [-].
+const BELLY_RATIO: f64 = 10.0;
+/// Ground within this share of the clearance may touch the belly once the springs have given way [-].
+const NEAR_SHARE: f64 = 0.6;
 /// A lifted wheel keeps this share of its stiffness, so that the balance stays solvable [-].
 const LIFTED_SHARE: f64 = 1e-3;
 /// Largest sine of roll or pitch: whoever stands steeper has fallen over [-].
@@ -48,7 +53,7 @@ pub(super) struct Statics {
     cog_height_m: f64,
     /// Hub above the ground under the static load [m].
     hub_height_m: f64,
-    underside: Vec<Underside>,
+    underside: [Underside; N_UNDERSIDE],
 }
 
 /// The vehicle at rest at a pose.
@@ -105,14 +110,36 @@ impl Place {
     }
 }
 
-/// The highest point of the belly's contact with the ground.
+/// Sums over all contacts and gravity.
 #[derive(Clone, Copy)]
-struct BellyContact {
-    at_m: [f64; 2],
-    /// Height at which the hub plane would just touch [m].
-    touch_m: f64,
-    depth_m: f64,
+struct Forces {
+    /// Upward force [N], its moments over the distance ahead and to the left [N m].
+    balance: Vector3<f64>,
+    /// Derivative of the balance by heave, pitch sine and left rise.
+    stiffness: Matrix3<f64>,
+    load_n: [f64; 4],
+    belly_n: f64,
 }
+
+impl Forces {
+    /// Adds an upward force at a point of the body that stiffens with depth.
+    #[inline]
+    fn push(&mut self, [ahead_m, left_m]: [f64; 2], force_n: f64, n_per_m: f64) {
+        let arm = Vector3::new(1.0, ahead_m, left_m);
+        self.balance += arm * force_n;
+        self.stiffness += arm * Vector3::new(-1.0, ahead_m, -left_m).transpose() * n_per_m;
+    }
+
+    /// How far from equilibrium, over the weight [-].
+    fn excess(&self, statics: &Statics) -> f64 {
+        let arm_m = statics.vehicle.geometry.wheelbase_m;
+        let scaled = Vector3::new(self.balance.x, self.balance.y / arm_m, self.balance.z / arm_m);
+        scaled.norm() / statics.weight_n
+    }
+}
+
+/// Height at which the hubs' plane would just touch, for each point of the underside [m].
+type Touches = [f64; N_UNDERSIDE];
 
 /// A point of the body's underside.
 #[derive(Clone, Copy, Debug)]
@@ -124,19 +151,19 @@ struct Underside {
 }
 
 /// The belly between the axles; what hangs over front and rear ends at hub height, out of the ground's way.
-fn underside(vehicle: &Vehicle, hub_height_m: f64) -> Vec<Underside> {
+fn underside(vehicle: &Vehicle, hub_height_m: f64) -> [Underside; N_UNDERSIDE] {
     let geometry = &vehicle.geometry;
     let belly_m = hub_height_m - geometry.ground_clearance_m;
-    let ends = [-geometry.rear_overhang_m, geometry.length_m - geometry.rear_overhang_m];
-    let places = BELLY_ALONG.map(|along| (along * geometry.wheelbase_m, belly_m));
-    let bumpers = ends.map(|ahead_m| (ahead_m, belly_m.min(0.0)));
-    places
-        .into_iter()
-        .chain(bumpers)
-        .flat_map(|(ahead_m, below_m)| {
-            BELLY_ACROSS.map(|across| Underside { at_m: [ahead_m, across * geometry.width_m], below_m })
-        })
-        .collect()
+    let front_m = (1.0 + BUMPER_AHEAD) * geometry.length_m - geometry.rear_overhang_m;
+    let ends_m = [-geometry.rear_overhang_m, front_m];
+    std::array::from_fn(|index| {
+        let (place, across) = (index / BELLY_ACROSS.len(), BELLY_ACROSS[index % BELLY_ACROSS.len()]);
+        let (ahead_m, below_m) = match BELLY_ALONG.get(place) {
+            Some(along) => (along * geometry.wheelbase_m, belly_m),
+            None => (ends_m[place - BELLY_ALONG.len()], belly_m.min(0.0)),
+        };
+        Underside { at_m: [ahead_m, across * geometry.width_m], below_m }
+    })
 }
 
 impl WheelSpring {
@@ -211,13 +238,10 @@ impl Statics {
         // Where the wheels touch depends on the attitude and the attitude on where they touch: twice suffices.
         for _ in 0..2 {
             let ground_m = self.wheels_on_ground(world, &place, &mut stand);
-            self.balance(&ground_m, None, &mut stand);
-            if let Some(belly) = self.belly_contact(world, &place, &stand) {
-                self.balance(&ground_m, Some(&belly), &mut stand);
-                let [x_m, y_m] = place.at(belly.at_m[0], belly.at_m[1]);
-                let [east, north] = world.gradient(x_m, y_m);
-                stand.belly_slope = place.cos * east + place.sin * north;
-            }
+            let touches = self.touches(world, &place, &stand);
+            self.balance(&ground_m, touches.as_ref(), &mut stand);
+            let deepest = touches.and_then(|touches| self.deepest(&touches, &stand));
+            stand.belly_slope = deepest.map_or(0.0, |at_m| self.belly_slope(world, &place, at_m));
         }
         stand
     }
@@ -280,52 +304,77 @@ impl Statics {
             *hub_m = 0.7 * left.max(right) + 0.3 * left.min(right) + RIM[k] * radius_m * lean;
         }
         let best = (0..9).fold(4, |best, k| if hub_m[k] > hub_m[best] { k } else { best });
-        let station = between_stations(&hub_m, best).clamp(-0.95, 0.95);
-        [hub_m[best], station / (1.0 - station * station).sqrt(), station * radius_m]
+        let slope = slope_at_contact(&hub_m.map(|hub_m| hub_m / radius_m), best, lean);
+        [hub_m[best], slope, slope / slope.hypot(1.0) * radius_m]
     }
 
-    /// Newton's iteration on heave, pitch and roll until springs and gravity balance.
-    fn balance(&self, ground_m: &[f64; 4], belly: Option<&BellyContact>, stand: &mut Stand) {
-        for _ in 0..12 {
-            let upright = stand.upright();
-            let (mut balance, mut stiffness) = (Vector3::zeros(), Matrix3::zeros());
-            let mut push = |at: [f64; 2], [force_n, n_per_m]: [f64; 2]| {
-                let arm = Vector3::new(1.0, at[0], at[1]);
-                balance += arm * force_n;
-                stiffness += arm * Vector3::new(-1.0, at[0], -at[1]).transpose() * (n_per_m * upright);
-                force_n
-            };
-            let rises_m: [f64; 4] =
-                std::array::from_fn(|i| (ground_m[i] - self.plane_m(stand, self.wheel_m[i])) * upright);
-            for i in 0..4 {
-                let (other, sign) = (i ^ 1, if i % 2 == 0 { 1.0 } else { -1.0 });
-                let law = self.springs[i].at(rises_m[i]);
-                let anti_roll_n = self.anti_roll_n_per_m[i / 2] * (rises_m[i & !1] - rises_m[i | 1]) * sign;
-                let carries = law[0] > 0.0 && self.springs[other].at(rises_m[other])[0] > 0.0;
-                let bar_n = if carries { anti_roll_n.max(-law[0]) } else { 0.0 };
-                stand.load_n[i] = push(self.wheel_m[i], [law[0] + bar_n, law[1]]);
+    /// Newton's iteration on heave, pitch and roll until springs and gravity balance; a step that overshoots a wheel's
+    /// lift-off or the belly's touch is halved.
+    fn balance(&self, ground_m: &[f64; 4], touches: Option<&Touches>, stand: &mut Stand) {
+        let mut forces = self.forces(ground_m, touches, stand);
+        for _ in 0..16 {
+            if forces.excess(self) < 1e-3 {
+                break;
             }
-            stand.belly_n = belly.map_or(0.0, |belly| {
-                let depth_m = (belly.touch_m - self.plane_m(stand, belly.at_m)) * upright;
-                let n_per_m = BELLY_RATIO * self.springs[0].stiffness_n_per_m;
-                push(belly.at_m, if depth_m > 0.0 { [n_per_m * depth_m, n_per_m] } else { [0.0, 0.0] })
-            });
-            // Gravity, and the friction at the contacts that holds the body on the slope.
-            let tipping_nm = self.weight_n * self.cog_height_m;
-            balance -= Vector3::new(
-                self.weight_n * upright,
-                self.weight_n * self.cog_ahead_m * upright + tipping_nm * stand.pitch_sine,
+            let Some(step) = forces.stiffness.lu().solve(&forces.balance) else { break };
+            let mut share = 1.0;
+            loop {
+                let mut trial = *stand;
+                trial.axle_m -= share * step[0];
+                trial.pitch_sine = (trial.pitch_sine - share * step[1]).clamp(-SINE_MAX, SINE_MAX);
+                trial.left_rise = (trial.left_rise - share * step[2]).clamp(-SINE_MAX, SINE_MAX);
+                let after = self.forces(ground_m, touches, &trial);
+                share *= 0.5;
+                if after.excess(self) < forces.excess(self) || share < 0.05 {
+                    (*stand, forces) = (trial, after);
+                    break;
+                }
+            }
+        }
+        stand.load_n = forces.load_n;
+        stand.belly_n = forces.belly_n;
+    }
+
+    /// What the ground and gravity do to a body that stands so.
+    fn forces(&self, ground_m: &[f64; 4], touches: Option<&Touches>, stand: &Stand) -> Forces {
+        let upright = stand.upright();
+        let mut forces = self.gravity(stand);
+        let rises_m: [f64; 4] =
+            std::array::from_fn(|i| (ground_m[i] - self.plane_m(stand, self.wheel_m[i])) * upright);
+        let laws = [0, 1, 2, 3].map(|i: usize| self.springs[i].at(rises_m[i]));
+        for i in 0..4 {
+            let (left, right) = (i & !1, i | 1);
+            let sign = if i == left { 1.0 } else { -1.0 };
+            let bar_n = sign * self.anti_roll_n_per_m[i / 2] * (rises_m[left] - rises_m[right]);
+            let carries = laws[left][0] > 0.0 && laws[right][0] > 0.0;
+            let force_n = if carries { (laws[i][0] + bar_n).max(0.0) } else { laws[i][0] };
+            forces.load_n[i] = force_n;
+            forces.push(self.wheel_m[i], force_n, laws[i][1] * upright);
+        }
+        let n_per_m = BELLY_RATIO * self.springs[0].stiffness_n_per_m;
+        for (point, touch_m) in self.underside.iter().zip(touches.into_iter().flatten()) {
+            let depth_m = (touch_m - self.plane_m(stand, point.at_m)) * upright;
+            if depth_m > 0.0 {
+                forces.belly_n += n_per_m * depth_m;
+                forces.push(point.at_m, n_per_m * depth_m, n_per_m * upright);
+            }
+        }
+        forces
+    }
+
+    /// Gravity, and the friction at the contacts that holds the body on the slope.
+    fn gravity(&self, stand: &Stand) -> Forces {
+        let weight_n = self.weight_n * stand.upright();
+        let tipping_nm = self.weight_n * self.cog_height_m;
+        Forces {
+            balance: -Vector3::new(
+                weight_n,
+                weight_n * self.cog_ahead_m + tipping_nm * stand.pitch_sine,
                 -tipping_nm * stand.left_rise,
-            );
-            stiffness[(1, 1)] -= tipping_nm;
-            stiffness[(2, 2)] += tipping_nm;
-            let Some(step) = stiffness.lu().solve(&balance) else { return };
-            stand.axle_m -= step[0];
-            stand.pitch_sine = (stand.pitch_sine - step[1]).clamp(-SINE_MAX, SINE_MAX);
-            stand.left_rise = (stand.left_rise - step[2]).clamp(-SINE_MAX, SINE_MAX);
-            if balance[0].abs() < 1e-3 * self.weight_n && step.norm() < 1e-4 {
-                return;
-            }
+            ),
+            stiffness: Matrix3::from_diagonal(&Vector3::new(0.0, -tipping_nm, tipping_nm)),
+            load_n: [0.0; 4],
+            belly_n: 0.0,
         }
     }
 
@@ -335,33 +384,62 @@ impl Statics {
         stand.axle_m - ahead_m * stand.pitch_sine + left_m * stand.left_rise
     }
 
-    /// Where the ground reaches deepest into the body.
-    fn belly_contact(&self, world: &World, place: &Place, stand: &Stand) -> Option<BellyContact> {
-        let upright = stand.upright();
-        let pitch_cosine = stand.pitch_cosine();
-        let mut deepest: Option<BellyContact> = None;
-        for &Underside { at_m, below_m } in &self.underside {
+    /// Rise of the ground at a point of the underside along the heading. A bumper is stopped by the face it has reached,
+    /// however flat the top behind that is.
+    fn belly_slope(&self, world: &World, place: &Place, [ahead_m, left_m]: [f64; 2]) -> f64 {
+        let geometry = &self.vehicle.geometry;
+        let run_m = 2.0 * BUMPER_AHEAD * geometry.length_m;
+        let before_m = if ahead_m > geometry.wheelbase_m { run_m } else { 0.5 * run_m };
+        let [from_m, to_m] = [ahead_m - before_m, ahead_m - before_m + run_m].map(|ahead_m| {
+            let [x_m, y_m] = place.at(ahead_m, left_m);
+            world.height_m(x_m, y_m)
+        });
+        (to_m - from_m) / run_m
+    }
+
+    /// Where the underside would touch; nothing when the ground is far below all of it.
+    fn touches(&self, world: &World, place: &Place, stand: &Stand) -> Option<Touches> {
+        let (upright, pitch_cosine) = (stand.upright(), stand.pitch_cosine());
+        let touches = self.underside.map(|Underside { at_m, below_m }| {
             let [x_m, y_m] = place.at(at_m[0] * pitch_cosine, at_m[1] * upright / pitch_cosine);
-            let touch_m = world.height_m(x_m, y_m) + below_m * upright;
-            let depth_m = touch_m - self.plane_m(stand, at_m);
-            if depth_m > deepest.map_or(0.0, |deepest| deepest.depth_m) {
-                deepest = Some(BellyContact { at_m, touch_m, depth_m });
-            }
-        }
-        deepest
+            world.height_m(x_m, y_m) + below_m * upright
+        });
+        let near_m = NEAR_SHARE * self.vehicle.geometry.ground_clearance_m;
+        let mut places = self.underside.iter().zip(&touches);
+        let is_near = places.any(|(point, touch_m)| touch_m - self.plane_m(stand, point.at_m) > -near_m);
+        is_near.then_some(touches)
+    }
+
+    /// Where the ground reaches deepest into the body, if it does.
+    fn deepest(&self, touches: &Touches, stand: &Stand) -> Option<[f64; 2]> {
+        let depths_m = self
+            .underside
+            .iter()
+            .zip(touches)
+            .map(|(point, touch_m)| (point.at_m, touch_m - self.plane_m(stand, point.at_m)));
+        depths_m
+            .filter(|(_, depth_m)| *depth_m > 0.0)
+            .max_by(|a, b| a.1.total_cmp(&b.1))
+            .map(|(at_m, _)| at_m)
     }
 }
 
-/// Place of the maximum of the parabola through a station and its neighbours, over the radius.
-fn between_stations(value: &[f64; 9], best: usize) -> f64 {
-    if best == 0 || best == 8 {
-        return STATIONS[best];
+/// Rise of the ground where a wheel touches it, from the hub's heights over the radius at all stations, the highest
+/// one known: the ground is a chain of straight pieces, and the rim lies on a piece where it has the piece's slope,
+/// or else on the kink between two.
+fn slope_at_contact(hub: &[f64; 9], best: usize, lean: f64) -> f64 {
+    let ground_rise = |from: usize, to: usize| {
+        let ground = |k: usize| hub[k] - RIM[k] * lean;
+        (ground(to) - ground(from)) / (STATIONS[to] - STATIONS[from])
+    };
+    let rim_rise = STATIONS[best] / RIM[best] * lean;
+    let behind = if best > 0 { ground_rise(best - 1, best) } else { rim_rise };
+    let ahead = if best < 8 { ground_rise(best, best + 1) } else { rim_rise };
+    if behind < rim_rise {
+        behind
+    } else if ahead > rim_rise {
+        ahead
+    } else {
+        rim_rise
     }
-    let (before, after) = (STATIONS[best] - STATIONS[best - 1], STATIONS[best + 1] - STATIONS[best]);
-    let (fall_before, fall_after) = (value[best] - value[best - 1], value[best] - value[best + 1]);
-    let curvature = fall_before * after + fall_after * before;
-    if curvature <= 0.0 {
-        return STATIONS[best];
-    }
-    STATIONS[best] + 0.5 * (fall_before * after * after - fall_after * before * before) / curvature
 }
