@@ -158,8 +158,7 @@ pub fn true_surface(world: &World, resolution_m: f64) -> GridMap<SurfaceCell> {
     for (index, cell) in surface.values_mut().iter_mut().enumerate() {
         let [x_m, y_m] = geometry.centre_m(geometry.cell(index));
         let patch = world.patch(x_m, y_m);
-        *cell =
-            SurfaceCell::certain(world.height_m(x_m, y_m) as f32, patch.class, patch.vegetation_height_m);
+        *cell = SurfaceCell::certain(world.height_m(x_m, y_m) as f32, patch.class, patch.vegetation_height_m);
     }
     surface
 }

@@ -1,12 +1,264 @@
 //! `surefoot drive`: world, vehicle, navigator and episode, tied together.
+#![allow(clippy::disallowed_methods, reason = "--pace real follows the wall clock")]
 
-use crate::arguments::DriveArguments;
+mod record;
+mod scene;
+
+use std::collections::BTreeMap;
+use std::time::{Duration, Instant};
+
+use bench::closed_loop::{self, ClosedLoop, Cycle, Drive};
+use bicycle::{Decision, StopReason};
+use formats::{config_hash, write_json_atomic};
+use scenarios::EpisodeConfig;
+use traversability::CvarLevel;
+
+use crate::arguments::{DriveArguments, Goal, MapSource, Method, Pace, StartPose};
 use crate::output::OutputFiles;
-use crate::{WorkFailed, interrupt};
+use crate::picture::{DrivePicture, RiskLayer, draw_drive};
+use crate::progress::{DriveProgress, ProgressLine};
+use crate::summary::{Milliseconds, Outcome, Summary, revision};
+use crate::{UsageError, interrupt};
+use record::{KnownRisk, Recording, path_samples};
+use scene::Scene;
 
 pub(crate) fn run(arguments: &DriveArguments) -> anyhow::Result<()> {
     arguments.bush_height_m()?;
-    OutputFiles::prepare(arguments)?;
+    let scene = scene::prepare(arguments)?;
+    let files = OutputFiles::prepare(arguments)?;
+    let config_hash = config_hash(&(&scene.config, &scene.model, &scene.vehicle))?;
+    let about = about(arguments, &scene, &config_hash);
+    let mut closed = ClosedLoop::new(drive(arguments, &scene)?).map_err(UsageError::from_input)?;
+    let mut recording = Recording::create(&files.recording, about).map_err(UsageError::from_input)?;
+    recording.goal(&scene.task.world, scene.task.goal_m)?;
     interrupt::catch_interrupts()?;
-    Err(WorkFailed("drive: this build has no plant to drive".to_owned()).into())
+    let kept = follow(arguments, &scene, &mut closed, &mut recording)?;
+    recording.finish()?;
+    let summary = summarise(arguments, &scene, &closed, &kept.tally, config_hash);
+    for path in &files.summaries {
+        write_json_atomic(path, &summary)?;
+    }
+    draw(&scene, &closed, &kept.known, &summary, &files)?;
+    println!("{summary}");
+    for path in files.summaries.iter().chain([&files.recording, &files.picture]) {
+        println!("  {}", path.display());
+    }
+    Ok(summary.verdict()?)
+}
+
+/// What the cycles leave behind.
+struct Kept {
+    tally: Tally,
+    known: KnownRisk,
+}
+
+/// Times and stops over a drive.
+#[derive(Default)]
+struct Tally {
+    control_ms: Vec<f64>,
+    map_ms: Vec<f64>,
+    deadline_misses: u64,
+    stops: BTreeMap<StopReason, u64>,
+    is_interrupted: bool,
+}
+
+impl Tally {
+    fn count(&mut self, cycle: &Cycle, cycle_s: f64) {
+        self.control_ms.push(cycle.control_ms);
+        self.map_ms.extend(cycle.map_ms);
+        if cycle.control_ms + cycle.map_ms.unwrap_or(0.0) > 1e3 * cycle_s {
+            self.deadline_misses += 1;
+        }
+        if let Decision::Stop(reason) = cycle.decision {
+            *self.stops.entry(reason).or_default() += 1;
+        }
+    }
+}
+
+fn drive<'a>(arguments: &DriveArguments, scene: &'a Scene) -> Result<Drive<'a>, UsageError> {
+    let mut episode = EpisodeConfig::for_vehicle(&scene.vehicle);
+    episode.rules.time_limit_s = arguments.time_limit;
+    Ok(Drive {
+        task: scene.task.clone(),
+        vehicle: &scene.vehicle,
+        model: scene.model.clone(),
+        config: scene.config.clone(),
+        episode,
+        method: match arguments.method {
+            Method::Physics => closed_loop::Method::Physics,
+            Method::Nominal => closed_loop::Method::Nominal,
+            Method::Truth => closed_loop::Method::Truth,
+        },
+        map_source: match arguments.map_source() {
+            MapSource::Sensed => closed_loop::MapSource::Sensed,
+            MapSource::Oracle => closed_loop::MapSource::Oracle,
+        },
+        level: CvarLevel::new(arguments.alpha).map_err(UsageError::from_input)?,
+        seed: arguments.seed,
+    })
+}
+
+/// Drives to the end, whatever it is.
+fn follow(
+    arguments: &DriveArguments,
+    scene: &Scene,
+    closed: &mut ClosedLoop,
+    recording: &mut Recording,
+) -> anyhow::Result<Kept> {
+    let [x_m, y_m, _] = scene.task.start;
+    let progress = ProgressLine::new(scene.task.distance_to_goal_m(x_m, y_m));
+    let known = KnownRisk::new(&scene.task.world, scene.config.risk_resolution_m(), &scene.vehicle.limits);
+    let mut kept = Kept { tally: Tally::default(), known };
+    let began = Instant::now();
+    while closed.episode.outcome().is_none() {
+        let cycle = closed.cycle()?;
+        kept.tally.count(&cycle, closed.episode.cycle_s());
+        if let Some(map) = closed.navigator.risk_map().filter(|_| cycle.map_ms.is_some()) {
+            kept.known.update(&map);
+        }
+        recording.cycle(closed, &cycle)?;
+        progress.update(&told(closed, &cycle));
+        if interrupt::interrupted() {
+            kept.tally.is_interrupted = true;
+            closed.episode.interrupt();
+        }
+        if arguments.pace == Pace::Real {
+            let due = began + Duration::from_secs_f64(closed.episode.time_s());
+            std::thread::sleep(due.saturating_duration_since(Instant::now()));
+        }
+    }
+    progress.finish();
+    Ok(kept)
+}
+
+fn told(closed: &ClosedLoop, cycle: &Cycle) -> DriveProgress {
+    let motion = closed.episode.motion();
+    DriveProgress {
+        distance_to_goal_m: closed.episode.task().distance_to_goal_m(motion.pose.x_m, motion.pose.y_m),
+        simulated_s: closed.episode.time_s(),
+        speed_mps: motion.velocity_mps[0],
+        control_ms: cycle.control_ms,
+    }
+}
+
+fn about(arguments: &DriveArguments, scene: &Scene, config_hash: &str) -> BTreeMap<String, String> {
+    let pairs = [
+        ("vehicle", scene.vehicle.name.clone()),
+        ("world", scene.task.world.name.clone()),
+        ("seed", arguments.seed.to_string()),
+        ("alpha", arguments.alpha.to_string()),
+        ("method", format!("{:?}", arguments.method).to_lowercase()),
+        ("config_hash", config_hash.to_owned()),
+        ("revision", revision().to_owned()),
+    ];
+    pairs.into_iter().map(|(key, value)| (key.to_owned(), value)).collect()
+}
+
+fn summarise(
+    arguments: &DriveArguments,
+    scene: &Scene,
+    closed: &ClosedLoop,
+    tally: &Tally,
+    config_hash: String,
+) -> Summary {
+    let episode = &closed.episode;
+    let outcome = episode.outcome().map_or(Outcome::Stopped, Outcome::from);
+    let pose = episode.motion().pose;
+    let [x_m, y_m, yaw_rad] = scene.task.start;
+    let goal_m = scene.task.goal_m;
+    Summary {
+        outcome,
+        reason: reason(outcome, tally, &pose),
+        time_to_goal_s: (outcome == Outcome::Goal).then(|| episode.time_s()),
+        duration_s: episode.time_s(),
+        path_length_m: episode.path_length_m(),
+        distance_to_goal_m: scene.task.distance_to_goal_m(pose.x_m, pose.y_m),
+        largest_roll_deg: episode.largest_roll_rad().to_degrees(),
+        largest_pitch_deg: episode.largest_pitch_rad().to_degrees(),
+        cycles: episode.n_cycles(),
+        control_ms: Milliseconds::from_samples(&tally.control_ms),
+        map_ms: Milliseconds::from_samples(&tally.map_ms),
+        deadline_misses: tally.deadline_misses,
+        stops: tally.stops.clone(),
+        seed: arguments.seed,
+        vehicle: scene.vehicle.name.clone(),
+        world: scene.task.world.name.clone(),
+        start: StartPose { x_m, y_m, yaw_rad },
+        goal: Goal { x_m: goal_m[0], y_m: goal_m[1] },
+        method: arguments.method,
+        alpha: arguments.alpha,
+        isa: format!("{:?}", closed.navigator.controller().diagnostics().isa).to_lowercase(),
+        threads: arguments.n_threads(),
+        config_hash,
+        revision: revision().to_owned(),
+    }
+}
+
+/// Why it did not end at the goal, for a person.
+fn reason(outcome: Outcome, tally: &Tally, pose: &terrain::Pose) -> String {
+    let place = format!("at ({:.1}, {:.1}) m", pose.x_m, pose.y_m);
+    match outcome {
+        Outcome::Goal => String::new(),
+        Outcome::RolledOver | Outcome::AttitudeLimit => format!(
+            "roll {:.0} deg, pitch {:.0} deg {place}",
+            pose.roll_rad.to_degrees(),
+            pose.pitch_rad.to_degrees()
+        ),
+        Outcome::Stopped if tally.is_interrupted => format!("interrupted by the user {place}"),
+        Outcome::Stopped => match tally.stops.iter().max_by_key(|(_, count)| **count) {
+            Some((reason, count)) => format!("{reason:?} in {count} cycles {place}"),
+            None => place,
+        },
+        Outcome::Stuck | Outcome::OutOfBounds | Outcome::Timeout => place,
+    }
+}
+
+fn draw(
+    scene: &Scene,
+    closed: &ClosedLoop,
+    known: &KnownRisk,
+    summary: &Summary,
+    files: &OutputFiles,
+) -> anyhow::Result<()> {
+    let driven = path_samples(closed);
+    let seen = terrain::GridMap::from_values(
+        *known.traction.geometry(),
+        known.traction.values().iter().map(|value| !value.is_nan()).collect(),
+    );
+    let title = format!("{}: {}", summary.vehicle, summary.outcome);
+    let subtitles = [format!(
+        "{}, method {:?}, alpha {}, seed {}: {:.1} m in {:.1} s, largest roll {:.0} deg, largest pitch {:.0} deg",
+        summary.world,
+        summary.method,
+        summary.alpha,
+        summary.seed,
+        summary.path_length_m,
+        summary.duration_s,
+        summary.largest_roll_deg,
+        summary.largest_pitch_deg
+    )];
+    let failure = summary.outcome.to_string();
+    let [x_m, y_m, _] = scene.task.start;
+    Ok(draw_drive(
+        &DrivePicture {
+            title: &title,
+            subtitles: &subtitles,
+            world: &scene.task.world,
+            risk: Some(RiskLayer {
+                values: &known.traction,
+                label: "worst expected traction, mean of headings [-]",
+                harmless: 0.9,
+                worst: 0.0,
+            }),
+            known: seen.as_ref(),
+            driven: &driven,
+            planned: &[],
+            start_m: [x_m, y_m],
+            goal_m: scene.task.goal_m,
+            goal_radius_m: scene.task.goal_tolerance_m,
+            failure: (summary.outcome != Outcome::Goal).then_some(failure.as_str()),
+            vehicle: &scene.vehicle,
+        },
+        &files.picture,
+    )?)
 }

@@ -8,40 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::WorkFailed;
 use crate::arguments::{Goal, Method, StartPose};
-
-/// How a drive ended.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Outcome {
-    /// The goal was reached.
-    Goal,
-    /// The vehicle lies on its side.
-    RolledOver,
-    /// Roll or pitch went beyond the vehicle's limit.
-    AttitudeLimit,
-    /// The vehicle stopped getting anywhere.
-    Stuck,
-    /// The vehicle left the world.
-    OutOfBounds,
-    /// The time limit passed.
-    Timeout,
-    /// The controller stopped for good, or the user did.
-    Stopped,
-}
-
-impl fmt::Display for Outcome {
-    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        formatter.pad(match self {
-            Self::Goal => "goal reached",
-            Self::RolledOver => "rolled over",
-            Self::AttitudeLimit => "attitude limit exceeded",
-            Self::Stuck => "stuck",
-            Self::OutOfBounds => "out of bounds",
-            Self::Timeout => "time limit passed",
-            Self::Stopped => "stopped",
-        })
-    }
-}
+pub use scenarios::Outcome;
 
 /// Distribution of a duration over the cycles of a drive.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]

@@ -27,6 +27,20 @@ pub enum Outcome {
     Stopped,
 }
 
+impl std::fmt::Display for Outcome {
+    fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        formatter.pad(match self {
+            Self::Goal => "goal reached",
+            Self::RolledOver => "rolled over",
+            Self::AttitudeLimit => "attitude limit exceeded",
+            Self::Stuck => "stuck",
+            Self::OutOfBounds => "out of bounds",
+            Self::Timeout => "time limit passed",
+            Self::Stopped => "stopped",
+        })
+    }
+}
+
 /// When an episode ends.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]

@@ -27,7 +27,8 @@ pub fn drive_log(trace: &[TraceRow], run: &str) -> Result<DriveLog, DriveLogErro
 }
 
 impl TraceRow {
-    fn drive_row(&self) -> DriveRow {
+    /// The row of a drive log that it stands for.
+    pub fn drive_row(&self) -> DriveRow {
         let Motion { pose, velocity_mps, angular_rate_radps, specific_force_mps2, .. } = self.motion;
         [
             (Column::X, pose.x_m),
