@@ -155,6 +155,16 @@ fn a_scan_is_the_same_for_any_number_of_threads() {
     assert_ne!(sensor.scan(&pose, 5, 7).points, with(1).points);
 }
 
+#[test]
+fn a_ray_along_the_edge_of_a_tile_gets_on() {
+    // The eye stands on the edges of the skyline's tiles and looks along them: 2 million such rays would take hours
+    // if each crept along its edge.
+    let world = world(|_, _| 0.0, |_, _| GROUND);
+    let config = RangeSensorConfig { n_azimuths: 4, n_beams: 2000, elevation_rad: [-0.8, 0.8], ..EXACT };
+    let points = scan(config, &world, &Pose { x_m: 2.0, y_m: -4.0, ..Pose::default() }).points;
+    assert!(points.len() > 3000, "{}", points.len());
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(24))]
     /// The skyline only skips: no return lies below the ground, and no ray passes through it on its way.

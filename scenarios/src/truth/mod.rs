@@ -3,6 +3,7 @@
 //! The plant's dynamics are the reference; this is its quasi-static limit, cheap enough to be asked a million times
 //! for one map, as the upper bound that no learned or assumed traversability can beat.
 
+mod ground;
 mod obstacles;
 mod stand;
 mod traction;
@@ -12,8 +13,10 @@ use std::sync::Arc;
 use bicycle::Vehicle;
 
 use crate::World;
+use ground::Ground;
 use obstacles::ObstacleCount;
 use stand::Statics;
+use traction::Footing;
 
 /// What the ground does to a vehicle at one pose.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -35,18 +38,24 @@ pub struct Traversability {
 pub struct Truth {
     world: Arc<World>,
     statics: Statics,
+    ground: Ground,
     obstacles: ObstacleCount,
 }
 
 impl Truth {
     /// Puts a vehicle into a world. The vehicle is taken as validated.
     pub fn new(vehicle: &Vehicle, world: Arc<World>) -> Self {
-        Self { statics: Statics::new(vehicle), obstacles: ObstacleCount::of(&world), world }
+        Self {
+            statics: Statics::new(vehicle),
+            ground: Ground::of(&world),
+            obstacles: ObstacleCount::of(&world),
+            world,
+        }
     }
 
     /// Traversability with the rear axle's centre above (`x_m`, `y_m`).
     pub fn traversability(&self, x_m: f64, y_m: f64, yaw_rad: f64) -> Traversability {
-        let stand = self.statics.stand(&self.world, x_m, y_m, yaw_rad);
+        let stand = self.statics.stand(&self.ground, x_m, y_m, yaw_rad);
         let (pitch_rad, roll_rad) = (stand.pitch_rad(), stand.roll_rad());
         if self.obstacles.touches(&self.world, &self.statics.vehicle.geometry, [x_m, y_m, yaw_rad]) {
             let (linear_traction, angular_traction) = (0.0, 0.0);
@@ -58,7 +67,10 @@ impl Truth {
                 is_blocked: true,
             };
         }
-        let [linear_traction, angular_traction] = self.statics.traction(&stand);
+        let [linear_traction, angular_traction] = self.statics.traction(&Footing {
+            stand: &stand,
+            patch: stand.contact_m.map(|[x_m, y_m]| self.world.patch(x_m, y_m)),
+        });
         Traversability { linear_traction, angular_traction, roll_rad, pitch_rad, is_blocked: false }
     }
 }

@@ -3,15 +3,17 @@
 use bicycle::{Axle, Vehicle};
 use nalgebra::{Matrix3, Vector3};
 
-use crate::{Patch, World};
+use super::ground::Ground;
 
 /// Acceleration of gravity [m/s2].
 pub(super) const GRAVITY_MPS2: f64 = 9.81;
 
 /// Places along a wheel where the ground is taken, over its radius.
-const STATIONS: [f64; 9] = [-0.95, -0.75, -0.5, -0.25, 0.0, 0.25, 0.5, 0.75, 0.95];
+const STATIONS: [f64; 9] = [-0.96, -0.72, -0.48, -0.24, 0.0, 0.24, 0.48, 0.72, 0.96];
+/// Between two of them.
+const STATION_STEP: f64 = 0.24;
 /// Depth of the rim below the hub at these places, over the radius: sqrt(1 - station^2).
-const RIM: [f64; 9] = [0.312, 0.661, 0.866, 0.968, 1.0, 0.968, 0.866, 0.661, 0.312];
+const RIM: [f64; 9] = [0.28, 0.694, 0.8773, 0.9708, 1.0, 0.9708, 0.8773, 0.694, 0.28];
 /// Where the body's underside is compared with the ground: over the wheelbase, and over the width.
 const BELLY_ALONG: [f64; 5] = [0.1, 0.3, 0.5, 0.7, 0.9];
 const BELLY_ACROSS: [f64; 5] = [-0.45, -0.22, 0.0, 0.22, 0.45];
@@ -24,6 +26,9 @@ const STOP_RATIO: f64 = 10.0;
 const BELLY_RATIO: f64 = 10.0;
 /// Ground within this share of the clearance may touch the belly once the springs have given way [-].
 const NEAR_SHARE: f64 = 0.6;
+/// The contacts are taken anew for an attitude that differs by more than this from the one they were taken for [-].
+const TURN_MIN: f64 = 0.05;
+const PASSES: usize = 3;
 /// A lifted wheel keeps this share of its stiffness, so that the balance stays solvable [-].
 const LIFTED_SHARE: f64 = 1e-3;
 /// Largest sine of roll or pitch: whoever stands steeper has fallen over [-].
@@ -69,8 +74,8 @@ pub(super) struct Stand {
     pub load_n: [f64; 4],
     /// Rise of the ground under each wheel along the heading [-].
     pub slope: [f64; 4],
-    /// Ground under each wheel.
-    pub patch: [Patch; 4],
+    /// Where each wheel touches, in the map [m].
+    pub contact_m: [[f64; 2]; 4],
     /// Load on the belly [N], and the ground's rise there along the heading [-].
     pub belly_n: f64,
     pub belly_slope: f64,
@@ -231,27 +236,30 @@ impl Statics {
     }
 
     /// Finds the equilibrium with the rear axle's centre above a point of the map.
-    pub(super) fn stand(&self, world: &World, x_m: f64, y_m: f64, yaw_rad: f64) -> Stand {
+    pub(super) fn stand(&self, ground: &Ground, x_m: f64, y_m: f64, yaw_rad: f64) -> Stand {
         let (sin, cos) = yaw_rad.sin_cos();
         let place = Place { x_m, y_m, cos, sin };
-        let mut stand = self.first_guess(world, &place);
-        // Where the wheels touch depends on the attitude and the attitude on where they touch: twice suffices.
-        for _ in 0..2 {
-            let ground_m = self.wheels_on_ground(world, &place, &mut stand);
-            let touches = self.touches(world, &place, &stand);
+        let mut stand = self.first_guess(ground, &place);
+        // Where the wheels touch depends on the attitude, and the attitude on where they touch.
+        let touches = self.touches(ground, &place, &stand);
+        for _ in 0..PASSES {
+            let guess = stand;
+            let ground_m = self.wheels_on_ground(ground, &place, &mut stand);
             self.balance(&ground_m, touches.as_ref(), &mut stand);
             let deepest = touches.and_then(|touches| self.deepest(&touches, &stand));
-            stand.belly_slope = deepest.map_or(0.0, |at_m| self.belly_slope(world, &place, at_m));
+            stand.belly_slope = deepest.map_or(0.0, |at_m| self.belly_slope(ground, &place, at_m));
+            let turned =
+                (stand.pitch_sine - guess.pitch_sine).abs().max((stand.left_rise - guess.left_rise).abs());
+            if turned < TURN_MIN {
+                break;
+            }
         }
         stand
     }
 
     /// The plane through the ground's heights below the wheels.
-    fn first_guess(&self, world: &World, place: &Place) -> Stand {
-        let height_m = self.wheel_m.map(|[ahead_m, left_m]| {
-            let [x_m, y_m] = place.at(ahead_m, left_m);
-            world.height_m(x_m, y_m)
-        });
+    fn first_guess(&self, ground: &Ground, place: &Place) -> Stand {
+        let height_m = self.wheel_m.map(|[ahead_m, left_m]| ground.height_m(place.at(ahead_m, left_m)));
         let geometry = &self.vehicle.geometry;
         let [front_left, front_right, rear_left, rear_right] = height_m;
         let pitch = 0.5 * (rear_left + rear_right - front_left - front_right) / geometry.wheelbase_m;
@@ -262,14 +270,14 @@ impl Statics {
             left_rise: roll / roll.hypot(1.0),
             load_n: self.springs.map(|spring| spring.rest_n),
             slope: [0.0; 4],
-            patch: [*world.patch(place.x_m, place.y_m); 4],
+            contact_m: [[0.0; 2]; 4],
             belly_n: 0.0,
             belly_slope: 0.0,
         }
     }
 
     /// Height of each hub on its ground, unloaded tyre less static deflection, for wheels tilted as `stand` is [m].
-    fn wheels_on_ground(&self, world: &World, place: &Place, stand: &mut Stand) -> [f64; 4] {
+    fn wheels_on_ground(&self, ground: &Ground, place: &Place, stand: &mut Stand) -> [f64; 4] {
         let upright = stand.upright();
         let (pitch_cosine, radius_m) = (stand.pitch_cosine(), self.vehicle.geometry.wheel_radius_m);
         let roll_cosine = upright / pitch_cosine;
@@ -280,29 +288,33 @@ impl Statics {
             // The hub's place, and the foot of a wheel that leans out of the vertical by the roll.
             let hub_ahead_m = pitch_cosine * ahead_m + roll_sine * stand.pitch_sine * left_m;
             let foot_left_m = roll_cosine * left_m + roll_sine * radius_m;
-            let contact = self.rim_contact(world, place, [hub_ahead_m, foot_left_m], roll_cosine);
+            let contact = self.rim_contact(ground, place, [hub_ahead_m, foot_left_m], roll_cosine);
             stand.slope[i] = contact[1];
-            let [x_m, y_m] = place.at(hub_ahead_m + contact[2], foot_left_m);
-            stand.patch[i] = *world.patch(x_m, y_m);
+            stand.contact_m[i] = place.at(hub_ahead_m + contact[2], foot_left_m);
             contact[0] - sunk_m
         })
     }
 
     /// Height of the hub of an unloaded wheel on the ground, the ground's rise at the contact, and how far the contact
     /// is ahead of the hub.
-    fn rim_contact(&self, world: &World, place: &Place, [ahead_m, left_m]: [f64; 2], lean: f64) -> [f64; 3] {
+    fn rim_contact(
+        &self,
+        ground: &Ground,
+        place: &Place,
+        [ahead_m, left_m]: [f64; 2],
+        lean: f64,
+    ) -> [f64; 3] {
         let radius_m = self.vehicle.geometry.wheel_radius_m;
         let side_m = 0.3 * self.vehicle.wheel.width_m;
-        let mut hub_m = [0.0; 9];
-        for (k, hub_m) in hub_m.iter_mut().enumerate() {
-            let station_m = ahead_m + STATIONS[k] * radius_m;
-            let [left, right] = [left_m + side_m, left_m - side_m].map(|left_m| {
-                let [x_m, y_m] = place.at(station_m, left_m);
-                world.height_m(x_m, y_m)
-            });
-            // A tread half on a step is carried by the higher half, but sinks in a little.
-            *hub_m = 0.7 * left.max(right) + 0.3 * left.min(right) + RIM[k] * radius_m * lean;
-        }
+        let step_m = STATION_STEP * radius_m;
+        let [left_m, right_m] = [left_m + side_m, left_m - side_m].map(|left_m| {
+            let first_m = place.at(ahead_m + STATIONS[0] * radius_m, left_m);
+            ground.run_m::<9>(first_m, [place.cos * step_m, place.sin * step_m])
+        });
+        // A tread half on a step is carried by the higher half, but sinks in a little.
+        let hub_m: [f64; 9] = std::array::from_fn(|k| {
+            0.7 * left_m[k].max(right_m[k]) + 0.3 * left_m[k].min(right_m[k]) + RIM[k] * radius_m * lean
+        });
         let best = (0..9).fold(4, |best, k| if hub_m[k] > hub_m[best] { k } else { best });
         let slope = slope_at_contact(&hub_m.map(|hub_m| hub_m / radius_m), best, lean);
         [hub_m[best], slope, slope / slope.hypot(1.0) * radius_m]
@@ -386,23 +398,21 @@ impl Statics {
 
     /// Rise of the ground at a point of the underside along the heading. A bumper is stopped by the face it has reached,
     /// however flat the top behind that is.
-    fn belly_slope(&self, world: &World, place: &Place, [ahead_m, left_m]: [f64; 2]) -> f64 {
+    fn belly_slope(&self, ground: &Ground, place: &Place, [ahead_m, left_m]: [f64; 2]) -> f64 {
         let geometry = &self.vehicle.geometry;
         let run_m = 2.0 * BUMPER_AHEAD * geometry.length_m;
         let before_m = if ahead_m > geometry.wheelbase_m { run_m } else { 0.5 * run_m };
-        let [from_m, to_m] = [ahead_m - before_m, ahead_m - before_m + run_m].map(|ahead_m| {
-            let [x_m, y_m] = place.at(ahead_m, left_m);
-            world.height_m(x_m, y_m)
-        });
+        let [from_m, to_m] = [ahead_m - before_m, ahead_m - before_m + run_m]
+            .map(|ahead_m| ground.height_m(place.at(ahead_m, left_m)));
         (to_m - from_m) / run_m
     }
 
     /// Where the underside would touch; nothing when the ground is far below all of it.
-    fn touches(&self, world: &World, place: &Place, stand: &Stand) -> Option<Touches> {
+    fn touches(&self, ground: &Ground, place: &Place, stand: &Stand) -> Option<Touches> {
         let (upright, pitch_cosine) = (stand.upright(), stand.pitch_cosine());
         let touches = self.underside.map(|Underside { at_m, below_m }| {
-            let [x_m, y_m] = place.at(at_m[0] * pitch_cosine, at_m[1] * upright / pitch_cosine);
-            world.height_m(x_m, y_m) + below_m * upright
+            let point_m = place.at(at_m[0] * pitch_cosine, at_m[1] * upright / pitch_cosine);
+            ground.height_m(point_m) + below_m * upright
         });
         let near_m = NEAR_SHARE * self.vehicle.geometry.ground_clearance_m;
         let mut places = self.underside.iter().zip(&touches);
@@ -430,7 +440,7 @@ impl Statics {
 fn slope_at_contact(hub: &[f64; 9], best: usize, lean: f64) -> f64 {
     let ground_rise = |from: usize, to: usize| {
         let ground = |k: usize| hub[k] - RIM[k] * lean;
-        (ground(to) - ground(from)) / (STATIONS[to] - STATIONS[from])
+        (ground(to) - ground(from)) / STATION_STEP
     };
     let rim_rise = STATIONS[best] / RIM[best] * lean;
     let behind = if best > 0 { ground_rise(best - 1, best) } else { rim_rise };
