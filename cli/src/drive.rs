@@ -246,7 +246,7 @@ fn draw(
             world: &scene.task.world,
             risk: Some(RiskLayer {
                 values: &known.traction,
-                label: "worst expected traction, mean of headings [-]",
+                label: "worst traction [-]",
                 harmless: 0.9,
                 worst: 0.0,
             }),

@@ -163,7 +163,7 @@ impl Default for Config {
             },
             delay_s: 0.0,
             tracking_s: 0.5,
-            recovery: Recovery { patience_s: 4.0, progress_m: 0.3, distance_m: 1.5, duration_s: 4.0 },
+            recovery: Recovery { patience_s: 2.0, progress_m: 0.25, distance_m: 1.5, duration_s: 4.0 },
         }
     }
 }

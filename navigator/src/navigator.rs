@@ -7,7 +7,7 @@ use traversability::{CvarLevel, RiskMapView};
 
 use crate::Config;
 use crate::guard::{Guard, Jump};
-use crate::risk::{Belief, RiskLayer};
+use crate::risk::{Belief, RiskLayer, StuckPose};
 
 /// Standard deviation of the ground height assumed below a vehicle that has seen nothing yet [m].
 const ASSUMED_HEIGHT_STD_M: f64 = 0.05;
@@ -182,9 +182,10 @@ impl Navigator {
         let (Some(map), Some(odometry)) = (self.risk.view(), self.odometry) else {
             return Decision::Hold(HoldReason::NoMap);
         };
+        let was_recovering = self.controller.diagnostics().is_recovering;
         let elapsed_s =
             self.decided_at_ns.map_or(0.0, |then_ns| now_ns.saturating_sub(then_ns) as f64 * 1e-9);
-        self.controller.decide(&Input {
+        let decision = self.controller.decide(&Input {
             state: odometry.state(),
             elapsed_s,
             map,
@@ -194,7 +195,12 @@ impl Navigator {
                 terminal: Terminal::CostToGo(self.cost_to_go.view()),
             },
             cycle: self.cycle,
-        })
+        });
+        if self.controller.diagnostics().is_recovering && !was_recovering {
+            let [x_m, y_m, _] = odometry.position_m;
+            self.risk.note_stuck(StuckPose { position_m: [x_m, y_m], yaw_rad: odometry.attitude_rad[2] });
+        }
+        decision
     }
 
     fn map(&mut self, odometry: &Odometry, scan: &Scan, is_first: bool) -> Result<bool, NavigatorError> {
@@ -232,6 +238,7 @@ impl Navigator {
     /// The localisation moved, the vehicle did not: what was mapped moves along.
     fn follow_jump(&mut self, odometry: &Odometry, jump: &Jump) -> Result<(), NavigatorError> {
         self.n_jumps += 1;
+        self.risk.shift_stuck([jump.step_m[0], jump.step_m[1]]);
         let after = pose(odometry);
         let [x_m, y_m, z_m] = jump.step_m;
         let before = Pose { x_m: after.x_m - x_m, y_m: after.y_m - y_m, z_m: after.z_m - z_m, ..after };

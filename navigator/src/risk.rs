@@ -1,5 +1,6 @@
 //! The risk map that the controller drives on, from whatever is believed of the ground.
 
+use std::f64::consts::TAU;
 use std::sync::Arc;
 
 use bicycle::Geometry;
@@ -22,10 +23,29 @@ pub enum Belief {
     Given(RiskOracle),
 }
 
+/// Where the vehicle got stuck, heading this way: proof that the map promised too much there.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct StuckPose {
+    pub position_m: [f64; 2],
+    pub yaw_rad: f64,
+}
+
+/// Poses around a [`StuckPose`] that count as blocked, over the vehicle's length: how far around a point ahead of it.
+const STUCK_AHEAD: f64 = 0.2;
+const STUCK_RADIUS: f64 = 0.25;
+/// Stuck poses that are remembered.
+const STUCK_MAX: usize = 32;
+/// Headings within this of the one that got stuck count as blocked [rad].
+const STUCK_YAW_RAD: f64 = std::f64::consts::FRAC_PI_4;
+
 /// A risk map and what it is made with.
 pub(crate) struct RiskLayer {
     prior: PriorMap,
-    given: Option<(RiskOracle, RiskMap)>,
+    oracle: Option<RiskOracle>,
+    stuck: Vec<StuckPose>,
+    length_m: f64,
+    /// What is believed, less the poses that proved stuck.
+    map: RiskMap,
     recentre_cells: i64,
     is_filled: bool,
 }
@@ -47,15 +67,16 @@ impl RiskLayer {
         let window = &config.risk_map;
         let resolution_m = config.risk_resolution_m();
         let grid = GridGeometry::centred(resolution_m, window.n_rows, window.n_cols, 0.0, 0.0);
-        let given = match belief {
-            Belief::Given(oracle) => {
-                Some((Arc::clone(oracle), RiskMap::constant(grid, window.n_yaws, Risk::OUTSIDE)))
-            }
+        let oracle = match belief {
+            Belief::Given(oracle) => Some(Arc::clone(oracle)),
             Belief::Physics | Belief::Nominal => None,
         };
         Ok(Self {
             prior: PriorMap::new(geometry, &assumption, config.elevation.resolution_m, grid, window.n_yaws)?,
-            given,
+            oracle,
+            stuck: Vec::with_capacity(STUCK_MAX),
+            length_m: geometry.length_m,
+            map: RiskMap::constant(grid, window.n_yaws, Risk::OUTSIDE),
             recentre_cells: (window.recentre_m / resolution_m).ceil() as i64,
             is_filled: false,
         })
@@ -63,8 +84,23 @@ impl RiskLayer {
 
     /// The map, once there was an update.
     pub fn view(&self) -> Option<RiskMapView<'_>> {
-        let map = self.given.as_ref().map_or(self.prior.risk_map(), |(_, map)| map);
-        self.is_filled.then(|| map.view())
+        self.is_filled.then(|| self.map.view())
+    }
+
+    /// Remembers a pose that proved impassable; of very many, the oldest is forgotten.
+    pub fn note_stuck(&mut self, pose: StuckPose) {
+        if self.stuck.len() == STUCK_MAX {
+            self.stuck.remove(0);
+        }
+        self.stuck.push(pose);
+        block(&mut self.map, &pose, self.length_m);
+    }
+
+    /// The localisation moved by a step, and what was remembered in its frame moves along.
+    pub fn shift_stuck(&mut self, step_m: [f64; 2]) {
+        for pose in &mut self.stuck {
+            pose.position_m = [0, 1].map(|axis| pose.position_m[axis] + step_m[axis]);
+        }
     }
 
     /// Follows the vehicle and takes over what changed of the surface.
@@ -80,8 +116,18 @@ impl RiskLayer {
         } else {
             self.prior.update_all(surface)?;
         }
-        if let Some((oracle, map)) = &mut self.given {
-            ask(oracle, self.prior.risk_map().view(), map);
+        let known = self.prior.risk_map().view();
+        self.map.place_at(known.geometry.origin);
+        match &self.oracle {
+            Some(oracle) => ask(oracle, known, &mut self.map),
+            None => {
+                let (risks, ground) = self.map.arrays_mut();
+                risks.copy_from_slice(known.risks);
+                ground.copy_from_slice(known.ground);
+            }
+        }
+        for pose in &self.stuck {
+            block(&mut self.map, pose, self.length_m);
         }
         self.is_filled = true;
         Ok(())
@@ -94,8 +140,32 @@ impl RiskLayer {
         let is_far = |axis: usize| (wanted.origin[axis] - now.origin[axis]).abs() >= self.recentre_cells;
         if !self.is_filled || is_far(0) || is_far(1) {
             self.prior.place_at(wanted.origin);
-            if let Some((_, map)) = &mut self.given {
-                map.place_at(wanted.origin);
+        }
+    }
+}
+
+/// Blocks the poses in and just ahead of one that proved stuck, in headings close to its own: another way past the
+/// same place stays open, and so does the way back.
+fn block(map: &mut RiskMap, stuck: &StuckPose, length_m: f64) {
+    let view = map.view();
+    let (geometry, n_yaws) = (view.geometry, view.n_yaws);
+    let turned = |bin: usize| {
+        let turn = (view.yaw_rad(bin) - stuck.yaw_rad).rem_euclid(TAU);
+        turn.min(TAU - turn)
+    };
+    let bins: Vec<usize> = (0..n_yaws).filter(|&bin| turned(bin) <= STUCK_YAW_RAD).collect();
+    let ahead_m = STUCK_AHEAD * length_m;
+    let centre_m = [
+        stuck.position_m[0] + ahead_m * stuck.yaw_rad.cos(),
+        stuck.position_m[1] + ahead_m * stuck.yaw_rad.sin(),
+    ];
+    let (risks, _) = map.arrays_mut();
+    for index in 0..geometry.n_cells() {
+        let [x_m, y_m] = geometry.centre_m(geometry.cell(index));
+        if (x_m - centre_m[0]).hypot(y_m - centre_m[1]) <= STUCK_RADIUS * length_m {
+            for bin in &bins {
+                let risk = &mut risks[index * n_yaws + bin];
+                *risk = risk.blocked();
             }
         }
     }
@@ -118,4 +188,21 @@ fn ask(oracle: &RiskOracle, known: RiskMapView<'_>, map: &mut RiskMap) {
             };
         }
     });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_stuck_pose_blocks_what_lies_ahead_in_its_heading_and_leaves_the_way_back() {
+        let grid = GridGeometry::centred(0.25, 41, 41, 0.0, 0.0);
+        let mut map = RiskMap::constant(grid, 16, Risk::NONE);
+        block(&mut map, &StuckPose { position_m: [0.0, 0.0], yaw_rad: 0.2 }, 3.4);
+        let view = map.view();
+        assert!(view.risk_at(0.0, 0.0, 0.2).is_blocked() && view.risk_at(1.2, 0.2, 0.2).is_blocked());
+        assert!(!view.risk_at(0.0, 0.0, 0.2 + std::f64::consts::PI).is_blocked(), "turned around");
+        assert!(!view.risk_at(-1.5, -0.3, 0.2).is_blocked(), "backed up");
+        assert!(!view.risk_at(0.0, 2.0, 0.2).is_blocked(), "passing beside it");
+    }
 }

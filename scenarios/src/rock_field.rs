@@ -104,7 +104,7 @@ impl Default for RockFieldConfig {
             rolling_wavelength_m: [5.0, 25.0],
             friction_variation: 0.08,
             test_height_scale: 2.2,
-            pad_radius_m: 3.5,
+            pad_radius_m: 5.0,
         }
     }
 }
