@@ -36,5 +36,5 @@ pub use sensor_imu::{IMU_PERIOD_NS, Imu, ImuConfig};
 pub use sensor_odometry::{OdometryConfig, OdometrySensor};
 pub use sensor_range::{RangeSensor, RangeSensorConfig, RangeSensorError};
 pub use task::{LayersTaskError, ROCK_FIELD_DISTANCE_M, Task};
-pub use truth::{Traversability, Truth};
+pub use truth::{Traversability, Truth, TruthField};
 pub use world::{Bounds, Patch, World, WorldError};

@@ -8,8 +8,8 @@ pub(super) struct Ground {
     height_m: Vec<f32>,
     first_centre_m: [f64; 2],
     cells_per_m: f64,
-    n_rows: u32,
-    n_cols: u32,
+    n_rows: usize,
+    n_cols: usize,
     /// Column and row of the last centres.
     last: [f32; 2],
 }
@@ -21,8 +21,8 @@ impl Ground {
             height_m: world.heights.values().to_vec(),
             first_centre_m: geometry.south_west_m().map(|edge_m| edge_m + 0.5 * geometry.resolution_m),
             cells_per_m: 1.0 / geometry.resolution_m,
-            n_rows: geometry.n_rows as u32,
-            n_cols: geometry.n_cols as u32,
+            n_rows: geometry.n_rows,
+            n_cols: geometry.n_cols,
             last: [(geometry.n_cols - 1) as f32, (geometry.n_rows - 1) as f32],
         }
     }
@@ -37,9 +37,35 @@ impl Ground {
     /// The same at `N` points `step_m` apart.
     #[inline]
     pub(super) fn run_m<const N: usize>(&self, first_m: [f64; 2], step_m: [f64; 2]) -> [f64; N] {
-        let [col, row] = self.in_cells(first_m);
-        let [col_step, row_step] = step_m.map(|step_m| step_m * self.cells_per_m);
-        std::array::from_fn(|k| self.at_cells(col + k as f64 * col_step, row + k as f64 * row_step))
+        let first = self.in_cells(first_m);
+        let step = step_m.map(|step_m| step_m * self.cells_per_m);
+        let end = [first[0] + (N - 1) as f64 * step[0], first[1] + (N - 1) as f64 * step[1]];
+        let inside = |[col, row]: [f64; 2]| {
+            col >= 0.0 && row >= 0.0 && col < f64::from(self.last[0]) && row < f64::from(self.last[1])
+        };
+        if !(inside(first) && inside(end)) {
+            return std::array::from_fn(|k| {
+                let k = k as f64;
+                self.at_cells(first[0] + k * step[0], first[1] + k * step[1])
+            });
+        }
+        self.run_inside(first, step)
+    }
+
+    /// A run whose ends lie inside: whole numbers of 1/65536 cells, so that no step converts or checks a number.
+    #[inline]
+    fn run_inside<const N: usize>(&self, first: [f64; 2], step: [f64; 2]) -> [f64; N] {
+        const ONE: f64 = 65536.0;
+        let [mut col, mut row] = first.map(|first| (first * ONE) as i64);
+        let [col_step, row_step] = step.map(|step| (step * ONE) as i64);
+        let mut heights_m = [0.0; N];
+        for height_m in &mut heights_m {
+            let share = |place: i64| (place & 0xFFFF) as f32 * (1.0 / ONE as f32);
+            *height_m = self.in_square((row >> 16) as usize, (col >> 16) as usize, share(col), share(row));
+            col += col_step;
+            row += row_step;
+        }
+        heights_m
     }
 
     #[inline]
@@ -47,18 +73,26 @@ impl Ground {
         [(x_m - self.first_centre_m[0]) * self.cells_per_m, (y_m - self.first_centre_m[1]) * self.cells_per_m]
     }
 
-    #[inline(always)]
+    #[inline]
     fn at_cells(&self, col: f64, row: f64) -> f64 {
-        let col = (col as f32).clamp(0.0, self.last[0]);
-        let row = (row as f32).clamp(0.0, self.last[1]);
-        let (west, south) = ((col as u32).min(self.n_cols - 2), (row as u32).min(self.n_rows - 2));
-        let (u, v) = (col - west as f32, row - south as f32);
-        let start = (south * self.n_cols + west) as usize;
+        let place = |place: f64, n: usize, last: f32| {
+            let place = (place as f32).max(0.0).min(last);
+            let index = (place as usize).min(n - 2);
+            (index, place - index as f32)
+        };
+        let (west, u) = place(col, self.n_cols, self.last[0]);
+        let (south, v) = place(row, self.n_rows, self.last[1]);
+        self.in_square(south, west, u, v)
+    }
+
+    /// Height in the square whose south-west corner is this centre, at these shares of the way east and north.
+    #[inline(always)]
+    fn in_square(&self, south: usize, west: usize, u: f32, v: f32) -> f64 {
+        let start = south * self.n_cols + west;
         // One check of the bounds for all four.
-        let n_cols = self.n_cols as usize;
-        let square = &self.height_m[start..start + n_cols + 2];
+        let square = &self.height_m[start..start + self.n_cols + 2];
         let (south_west, south_east) = (square[0], square[1]);
-        let (north_west, north_east) = (square[n_cols], square[n_cols + 1]);
+        let (north_west, north_east) = (square[self.n_cols], square[self.n_cols + 1]);
         // The fold runs from south-west to north-east; both sides are computed, a branch would miss half the time.
         let below = south_west + u * (south_east - south_west) + v * (north_east - south_east);
         let above = south_west + v * (north_west - south_west) + u * (north_east - north_west);

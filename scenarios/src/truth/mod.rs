@@ -3,6 +3,7 @@
 //! The plant's dynamics are the reference; this is its quasi-static limit, cheap enough to be asked a million times
 //! for one map, as the upper bound that no learned or assumed traversability can beat.
 
+mod field;
 mod ground;
 mod obstacles;
 mod stand;
@@ -13,6 +14,7 @@ use std::sync::Arc;
 use bicycle::Vehicle;
 
 use crate::World;
+pub use field::TruthField;
 use ground::Ground;
 use obstacles::ObstacleCount;
 use stand::Statics;

@@ -16,10 +16,11 @@ const STATION_STEP: f64 = 0.24;
 const RIM: [f64; 9] = [0.28, 0.694, 0.8773, 0.9708, 1.0, 0.9708, 0.8773, 0.694, 0.28];
 /// Where the body's underside is compared with the ground: over the wheelbase, and over the width.
 const BELLY_ALONG: [f64; 5] = [0.1, 0.3, 0.5, 0.7, 0.9];
-const BELLY_ACROSS: [f64; 5] = [-0.45, -0.22, 0.0, 0.22, 0.45];
+const BELLY_ACROSS: [f64; N_ACROSS] = [-0.45, -0.225, 0.0, 0.225, 0.45];
+const N_ACROSS: usize = 5;
 /// How far ahead of the bumper ground counts as touched: whoever drives on meets it at once. Over the length.
 const BUMPER_AHEAD: f64 = 0.03;
-const N_UNDERSIDE: usize = (BELLY_ALONG.len() + 2) * BELLY_ACROSS.len();
+const N_UNDERSIDE: usize = (BELLY_ALONG.len() + 2) * N_ACROSS;
 /// Stiffness of the travel stops over that of the spring [-].
 const STOP_RATIO: f64 = 10.0;
 /// Stiffness of each point of the underside over that of a wheel [-].
@@ -162,7 +163,7 @@ fn underside(vehicle: &Vehicle, hub_height_m: f64) -> [Underside; N_UNDERSIDE] {
     let front_m = (1.0 + BUMPER_AHEAD) * geometry.length_m - geometry.rear_overhang_m;
     let ends_m = [-geometry.rear_overhang_m, front_m];
     std::array::from_fn(|index| {
-        let (place, across) = (index / BELLY_ACROSS.len(), BELLY_ACROSS[index % BELLY_ACROSS.len()]);
+        let (place, across) = (index / N_ACROSS, BELLY_ACROSS[index % N_ACROSS]);
         let (ahead_m, below_m) = match BELLY_ALONG.get(place) {
             Some(along) => (along * geometry.wheelbase_m, belly_m),
             None => (ends_m[place - BELLY_ALONG.len()], belly_m.min(0.0)),
@@ -410,10 +411,16 @@ impl Statics {
     /// Where the underside would touch; nothing when the ground is far below all of it.
     fn touches(&self, ground: &Ground, place: &Place, stand: &Stand) -> Option<Touches> {
         let (upright, pitch_cosine) = (stand.upright(), stand.pitch_cosine());
-        let touches = self.underside.map(|Underside { at_m, below_m }| {
-            let point_m = place.at(at_m[0] * pitch_cosine, at_m[1] * upright / pitch_cosine);
-            ground.height_m(point_m) + below_m * upright
-        });
+        let (along, across) = (pitch_cosine, upright / pitch_cosine);
+        let mut touches = [0.0; N_UNDERSIDE];
+        let rows = self.underside.as_chunks::<N_ACROSS>().0;
+        for (row, touches) in rows.iter().zip(touches.as_chunks_mut::<N_ACROSS>().0) {
+            let [first_m, next_m] =
+                [row[0], row[1]].map(|point| place.at(point.at_m[0] * along, point.at_m[1] * across));
+            let step_m = [next_m[0] - first_m[0], next_m[1] - first_m[1]];
+            *touches =
+                ground.run_m::<N_ACROSS>(first_m, step_m).map(|height_m| height_m + row[0].below_m * upright);
+        }
         let near_m = NEAR_SHARE * self.vehicle.geometry.ground_clearance_m;
         let mut places = self.underside.iter().zip(&touches);
         let is_near = places.any(|(point, touch_m)| touch_m - self.plane_m(stand, point.at_m) > -near_m);
