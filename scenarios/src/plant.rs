@@ -4,6 +4,9 @@
 //! What no model of ours knows: load that moves between the wheels, friction that falls with load, forces that
 //! build up over a distance, wheels that wrap around rocks, per-cell friction, differentials, a speed servo.
 //!
+//! Simplified: the body carries the wheels' mass; along its strut a wheel has that mass once more, without weight,
+//! so that it can hop. Struts are straight and upright in the body; gyroscopic torques of the wheels are left out.
+//!
 //! Deterministic: the same vehicle, world, start and commands give the same bits.
 
 mod chassis;
@@ -122,7 +125,8 @@ pub struct Plant {
 }
 
 impl Plant {
-    /// Length of a step [s].
+    /// Length of a step [s]. Over 6 m of hills the end of the drive is off by 2 mm (full size) or 8 mm (RC car)
+    /// from that of eight times finer steps, and the error halves with the step.
     pub const STEP_S: f64 = 1e-3;
 
     /// Puts the vehicle on the ground with its rear axle's centre at `start` = (x [m], y [m], yaw [rad]),

@@ -7,6 +7,15 @@ use bicycle::{Command, Vehicle};
 use plant_machines::*;
 use scenarios::{Plant, Stribeck};
 
+/// Runs on until something has happened; fails after two minutes.
+fn drive_until(plant: &mut Plant, happened: impl Fn(&Plant) -> bool) {
+    let done = (0..12_000).any(|_| {
+        plant.advance(0.01);
+        happened(plant)
+    });
+    assert!(done, "{:?}", plant.motion());
+}
+
 #[test]
 fn coasting_distance_follows_from_rolling_resistance() {
     // Down a ramp without motor or brakes, then out on the level: with c = 0.02 + 0 and the wheels' inertia
@@ -15,13 +24,9 @@ fn coasting_distance_follows_from_rolling_resistance() {
     vehicle.limits.steering_max_rad = 0.1;
     let world = world_of(200.0, 0.5, Stribeck::ASPHALT, |x_m, _| if x_m < 0.0 { -0.1 * x_m } else { 0.0 });
     let mut plant = Plant::new(&vehicle, world, [-20.0, 0.0, 0.0]).unwrap();
-    while plant.pose().x_m < 5.0 {
-        plant.advance(0.1);
-    }
+    drive_until(&mut plant, |plant| plant.pose().x_m > 5.0);
     let first = plant.motion();
-    while plant.motion().velocity_mps[0] > 2.0 {
-        plant.advance(0.1);
-    }
+    drive_until(&mut plant, |plant| plant.motion().velocity_mps[0] < 2.0);
     let last = plant.motion();
     let squares = first.velocity_mps[0].powi(2) - last.velocity_mps[0].powi(2);
     let expected_m = squares * (1.0 + 4.0 * 5.0 / 0.44f64.powi(2) / 1500.0) / (2.0 * 0.02 * G);
@@ -36,9 +41,7 @@ fn stopping(vehicle: &Vehicle, friction: f32, speed_mps: f32) -> [f64; 2] {
     drive(&mut plant, speed_mps, 0.0, 12.0);
     let first = plant.motion();
     drive(&mut plant, 0.0, 0.0, 0.0);
-    while plant.motion().velocity_mps[0] > 1e-3 {
-        plant.advance(0.01);
-    }
+    drive_until(&mut plant, |plant| plant.motion().velocity_mps[0] < 1e-3);
     [plant.pose().x_m - first.pose.x_m, first.velocity_mps[0]]
 }
 
