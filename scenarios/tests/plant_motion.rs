@@ -1,6 +1,7 @@
 //! The plant in motion on even ground, held against closed forms.
 #![allow(clippy::unwrap_used)]
 
+#[allow(dead_code)] // each test file takes what it needs
 mod plant_machines;
 
 use bicycle::{Command, Vehicle};

@@ -1,6 +1,7 @@
 //! The plant at rest: loads, holding on slopes, settling, tipping over.
 #![allow(clippy::unwrap_used)]
 
+#[allow(dead_code)] // each test file takes what it needs
 mod plant_machines;
 
 use bicycle::Vehicle;

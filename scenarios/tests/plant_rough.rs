@@ -1,6 +1,7 @@
 //! The plant on rocks, in plants, against walls and beyond the edge.
 #![allow(clippy::unwrap_used)]
 
+#[allow(dead_code)] // each test file takes what it needs
 mod plant_machines;
 
 use std::sync::Arc;

@@ -1,5 +1,5 @@
 //! The machines and grounds that the plant is validated with.
-#![allow(dead_code)]
+#![allow(clippy::unwrap_used)]
 
 use std::sync::Arc;
 
