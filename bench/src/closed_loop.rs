@@ -2,14 +2,14 @@
 //! decides in it.
 #![allow(clippy::disallowed_methods, reason = "what a cycle costs is measured here")]
 
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
 use bicycle::{Decision, Model, Vehicle};
 use navigator::{Belief, Config, Navigator, NavigatorError, RiskOracle, Setup, Surface};
-use scenarios::{Episode, EpisodeConfig, EpisodeError, Task, Truth, World};
+use scenarios::{Episode, EpisodeConfig, EpisodeError, Task, Traversability, Truth, TruthField, World};
 use serde::{Deserialize, Serialize};
-use terrain::{GridGeometry, GridMap, SurfaceCell};
+use terrain::{Cell, GridGeometry, GridMap, SurfaceCell};
 use traversability::{CvarLevel, Risk};
 
 /// What the controller knows of the ground.
@@ -93,7 +93,7 @@ impl ClosedLoop {
         let belief = match method {
             Method::Physics => Belief::Physics,
             Method::Nominal => Belief::Nominal,
-            Method::Truth => Belief::Given(truth(vehicle, &task.world)),
+            Method::Truth => Belief::Given(truth(vehicle, &task.world, &config)),
         };
         let surface = match map_source {
             MapSource::Sensed => Surface::Sensed,
@@ -133,18 +133,32 @@ impl ClosedLoop {
 }
 
 /// The plant's true traversability as risk: no distribution, hence the same at every CVaR level.
-fn truth(vehicle: &Vehicle, world: &Arc<World>) -> RiskOracle {
+fn truth(vehicle: &Vehicle, world: &Arc<World>, config: &Config) -> RiskOracle {
     let truth = Truth::new(vehicle, Arc::clone(world));
-    Arc::new(move |x_m, y_m, yaw_rad| {
-        let there = truth.traversability(x_m, y_m, yaw_rad);
-        let risk = Risk {
-            linear_traction: there.linear_traction as f32,
-            angular_traction: there.angular_traction as f32,
-            roll_rad: there.roll_rad.abs() as f32,
-            pitch_rad: there.pitch_rad.abs() as f32,
-        };
-        if there.is_blocked { risk.blocked() } else { risk }
+    let field = TruthField::new(truth, config.risk_resolution_m(), config.risk_map.n_yaws);
+    let field = Mutex::new(field);
+    Arc::new(move |window, n_yaws, risks| {
+        // A field that was poisoned by a panic elsewhere is still a cache of true values.
+        let mut field = field.lock().unwrap_or_else(PoisonError::into_inner);
+        field.prepare(window);
+        for (index, risks) in risks.chunks_mut(n_yaws).enumerate() {
+            let Cell { row, col } = window.cell(index);
+            let place = [window.origin[0] + col as i64, window.origin[1] + row as i64];
+            if let Some(there) = field.at(place) {
+                risks.iter_mut().zip(there).for_each(|(risk, there)| *risk = risk_of(there));
+            }
+        }
     })
+}
+
+fn risk_of(there: &Traversability) -> Risk {
+    let risk = Risk {
+        linear_traction: there.linear_traction as f32,
+        angular_traction: there.angular_traction as f32,
+        roll_rad: there.roll_rad.abs() as f32,
+        pitch_rad: there.pitch_rad.abs() as f32,
+    };
+    if there.is_blocked { risk.blocked() } else { risk }
 }
 
 /// The world as a perfect map would show it.

@@ -6,11 +6,12 @@ use bicycle::{Odometry, StopReason};
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct GuardConfig {
-    /// Oldest odometry to act on [s].
+    /// Oldest odometry to act on, and longest gap to reckon over [s].
     pub odometry_age_max_s: f64,
     /// Oldest scan to drive on [s].
     pub scan_age_max_s: f64,
-    /// Longest time that odometry may repeat itself to the last bit while the vehicle is told to move [s].
+    /// Longest time that pose and velocity may repeat themselves to the last bit while the vehicle is told to
+    /// move [s].
     pub frozen_max_s: f64,
     /// Shortest horizontal step beyond dead reckoning that counts as a correction of the localisation [m].
     pub jump_min_m: f64,
@@ -48,6 +49,7 @@ pub struct Guard {
     config: GuardConfig,
     last: Option<Odometry>,
     changed_at_ns: u64,
+    /// Of the last usable scan; of the first odometry as long as none has come.
     scan_at_ns: Option<u64>,
     commanded_mps: f32,
 }
@@ -64,12 +66,16 @@ impl Guard {
             return Err(StopReason::NonFiniteInput);
         }
         let last = self.last.replace(*odometry);
-        let repeats =
-            last.is_some_and(|last| Odometry { valid_at_ns: odometry.valid_at_ns, ..last } == *odometry);
+        let repeats = last.is_some_and(|last| is_same_place(&last, odometry));
+        self.scan_at_ns.get_or_insert(odometry.valid_at_ns);
+        let gap_s = age_s(odometry.valid_at_ns, self.changed_at_ns);
         if !repeats || self.commanded_mps == 0.0 && !self.is_frozen(odometry.valid_at_ns) {
             self.changed_at_ns = odometry.valid_at_ns;
         }
-        Ok(last.and_then(|last| self.jump(&last, odometry)))
+        // After a gap nobody knows how far it drove: a step then is motion.
+        Ok(last
+            .filter(|_| gap_s <= self.config.odometry_age_max_s)
+            .and_then(|last| self.jump(&last, odometry)))
     }
 
     /// Notes a scan that held usable points.
@@ -112,6 +118,16 @@ impl Guard {
         ];
         (step_m[0].hypot(step_m[1]) > self.config.jump_min_m).then_some(Jump { step_m })
     }
+}
+
+/// Whether pose and velocity are the same to the last bit. Wheels and steering are measured by others: they go on
+/// when the localisation freezes.
+fn is_same_place(last: &Odometry, next: &Odometry) -> bool {
+    let told = |odometry: &Odometry| {
+        let Odometry { position_m, attitude_rad, velocity_mps, yaw_rate_radps, .. } = *odometry;
+        (position_m, attitude_rad, velocity_mps, yaw_rate_radps)
+    };
+    told(last) == told(next)
 }
 
 fn age_s(now_ns: u64, then_ns: u64) -> f64 {
@@ -171,10 +187,28 @@ mod tests {
     }
 
     #[test]
+    fn first_scan_must_come_within_its_age_limit() {
+        let mut guard = Guard::new(GuardConfig::default());
+        for cycle in 3..14 {
+            guard.admit_odometry(&driving(cycle)).unwrap();
+            // The first odometry came at 0.3 s, at 1.3 s it is exactly the limit of 1 s ago.
+            assert_eq!(guard.check(cycle * CYCLE_NS), Ok(()));
+        }
+        guard.admit_odometry(&driving(14)).unwrap();
+        assert_eq!(guard.check(14 * CYCLE_NS), Err(StopReason::StaleScan));
+        guard.note_scan(14 * CYCLE_NS);
+        assert_eq!(guard.check(14 * CYCLE_NS), Ok(()));
+    }
+
+    #[test]
     fn odometry_that_repeats_while_moving_is_frozen_until_it_changes() {
         let mut guard = guard_after(5);
         for cycle in 5..11 {
-            guard.admit_odometry(&Odometry { valid_at_ns: cycle * CYCLE_NS, ..driving(4) }).unwrap();
+            // The wheels' own sensor still counts.
+            let wheel_speed_mps = 1.0 + 0.01 * cycle as f64;
+            let frozen = Odometry { valid_at_ns: cycle * CYCLE_NS, wheel_speed_mps, ..driving(4) };
+            guard.admit_odometry(&frozen).unwrap();
+            guard.note_scan(cycle * CYCLE_NS);
         }
         // Last change at 0.4 s, now 1.0 s: 0.6 s > 0.5 s.
         assert_eq!(guard.check(10 * CYCLE_NS), Err(StopReason::StaleOdometry));
@@ -195,6 +229,7 @@ mod tests {
         let mut guard = Guard::new(GuardConfig::default());
         for cycle in 0..30 {
             guard.admit_odometry(&Odometry { valid_at_ns: cycle * CYCLE_NS, ..Odometry::default() }).unwrap();
+            guard.note_scan(cycle * CYCLE_NS);
         }
         assert_eq!(guard.check(29 * CYCLE_NS), Ok(()));
     }
@@ -207,5 +242,23 @@ mod tests {
         jumped.position_m[1] -= 0.8;
         let Ok(Some(jump)) = guard.admit_odometry(&jumped) else { panic!("a step of 1 m must be a jump") };
         assert!((jump.step_m[0] - 0.6).abs() < 1e-9 && (jump.step_m[1] + 0.8).abs() < 1e-9);
+    }
+
+    #[test]
+    fn step_after_a_gap_is_motion() {
+        // Told at 0.4 s that it drives with 1 m/s, then nothing; braked meanwhile, it stands 0.4 m further on.
+        let mut guard = guard_after(5);
+        let standing = |cycle| Odometry {
+            valid_at_ns: cycle * CYCLE_NS,
+            position_m: [0.8, 0.0, 0.0],
+            ..Odometry::default()
+        };
+        assert_eq!(guard.admit_odometry(&standing(30)), Ok(None));
+        // The same after a freeze.
+        let mut guard = guard_after(5);
+        for cycle in 5..30 {
+            guard.admit_odometry(&Odometry { valid_at_ns: cycle * CYCLE_NS, ..driving(4) }).unwrap();
+        }
+        assert_eq!(guard.admit_odometry(&standing(30)), Ok(None));
     }
 }

@@ -133,6 +133,10 @@ impl Navigator {
             Ok(Some(jump)) => self.follow_jump(odometry, &jump)?,
             Ok(None) => {}
         }
+        if self.given.is_some() {
+            // What was given whole never gets old.
+            self.guard.note_scan(odometry.valid_at_ns);
+        }
         let is_first = self.odometry.replace(*odometry).is_none();
         match (scan, is_first) {
             (Some(scan), _) => self.map(odometry, scan, is_first),
@@ -210,8 +214,6 @@ impl Navigator {
             if report.n_points > report.n_rejected_non_finite {
                 self.guard.note_scan(scan.valid_at_ns);
             }
-        } else {
-            self.guard.note_scan(scan.valid_at_ns);
         }
         self.renew(odometry, is_first)
     }

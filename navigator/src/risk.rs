@@ -9,8 +9,9 @@ use rayon::prelude::*;
 use terrain::{CellRegion, GridGeometry, GridMap, SurfaceCell};
 use traversability::{CvarLevel, Risk, RiskMap, RiskMapView};
 
-/// Risk of a pose of the body frame, from x [m], y [m] and yaw [rad].
-pub type RiskOracle = Arc<dyn Fn(f64, f64, f64) -> Risk + Send + Sync>;
+/// Fills a window, shape [row, col, yaw], with the risk of the poses of the body frame that a [`RiskMap`] of this
+/// geometry and number of yaws stands for.
+pub type RiskOracle = Arc<dyn Fn(&GridGeometry, usize, &mut [Risk]) + Send + Sync>;
 
 /// What is believed of the ground.
 #[derive(Clone)]
@@ -41,7 +42,8 @@ const STUCK_YAW_RAD: f64 = std::f64::consts::FRAC_PI_4;
 /// A risk map and what it is made with.
 pub(crate) struct RiskLayer {
     prior: PriorMap,
-    oracle: Option<RiskOracle>,
+    /// Who knows, and the answer for the present window.
+    oracle: Option<(RiskOracle, Vec<Risk>)>,
     stuck: Vec<StuckPose>,
     length_m: f64,
     /// What is believed, less the poses that proved stuck.
@@ -68,7 +70,9 @@ impl RiskLayer {
         let resolution_m = config.risk_resolution_m();
         let grid = GridGeometry::centred(resolution_m, window.n_rows, window.n_cols, 0.0, 0.0);
         let oracle = match belief {
-            Belief::Given(oracle) => Some(Arc::clone(oracle)),
+            Belief::Given(oracle) => {
+                Some((Arc::clone(oracle), vec![Risk::OUTSIDE; grid.n_cells() * window.n_yaws]))
+            }
             Belief::Physics | Belief::Nominal => None,
         };
         Ok(Self {
@@ -110,7 +114,7 @@ impl RiskLayer {
         surface: &GridMap<SurfaceCell>,
         changed: &CellRegion,
     ) -> Result<(), PriorMapError> {
-        self.follow(position_m);
+        let is_moved = self.follow(position_m);
         if self.is_filled {
             self.prior.update_dirty(surface, changed)?;
         } else {
@@ -118,13 +122,14 @@ impl RiskLayer {
         }
         let known = self.prior.risk_map().view();
         self.map.place_at(known.geometry.origin);
-        match &self.oracle {
-            Some(oracle) => ask(oracle, known, &mut self.map),
-            None => {
-                let (risks, ground) = self.map.arrays_mut();
-                risks.copy_from_slice(known.risks);
-                ground.copy_from_slice(known.ground);
+        let (risks, ground) = self.map.arrays_mut();
+        risks.copy_from_slice(known.risks);
+        ground.copy_from_slice(known.ground);
+        if let Some((oracle, answer)) = &mut self.oracle {
+            if is_moved {
+                oracle(&known.geometry, known.n_yaws, answer);
             }
+            believe(answer, risks);
         }
         for pose in &self.stuck {
             block(&mut self.map, pose, self.length_m);
@@ -133,14 +138,17 @@ impl RiskLayer {
         Ok(())
     }
 
-    fn follow(&mut self, position_m: [f64; 2]) {
+    /// Returns whether the window moved.
+    fn follow(&mut self, position_m: [f64; 2]) -> bool {
         let now = *self.prior.risk_map().geometry();
         let [x_m, y_m] = position_m;
         let wanted = GridGeometry::centred(now.resolution_m, now.n_rows, now.n_cols, x_m, y_m);
         let is_far = |axis: usize| (wanted.origin[axis] - now.origin[axis]).abs() >= self.recentre_cells;
-        if !self.is_filled || is_far(0) || is_far(1) {
+        let moves = !self.is_filled || is_far(0) || is_far(1);
+        if moves {
             self.prior.place_at(wanted.origin);
         }
+        moves
     }
 }
 
@@ -171,21 +179,11 @@ fn block(map: &mut RiskMap, stuck: &StuckPose, length_m: f64) {
     }
 }
 
-/// Fills `map` with what the oracle says, except where `known` is blocked or outside.
-fn ask(oracle: &RiskOracle, known: RiskMapView<'_>, map: &mut RiskMap) {
-    let (risks, ground) = map.arrays_mut();
-    ground.copy_from_slice(known.ground);
-    let per_row = known.geometry.n_cols * known.n_yaws;
-    let rows = risks.par_chunks_mut(per_row).zip(known.risks.par_chunks(per_row)).enumerate();
-    rows.for_each(|(row, (risks, known_risks))| {
-        for (place, (risk, known_risk)) in risks.iter_mut().zip(known_risks).enumerate() {
-            let cell = traversability::Cell { row, col: place / known.n_yaws };
-            let [x_m, y_m] = known.geometry.centre_m(cell);
-            *risk = if *known_risk == Risk::NONE {
-                oracle(x_m, y_m, known.yaw_rad(place % known.n_yaws))
-            } else {
-                *known_risk
-            };
+/// Takes over the answer wherever the map knows of neither obstacle nor border.
+fn believe(answer: &[Risk], risks: &mut [Risk]) {
+    risks.par_chunks_mut(4096).zip(answer.par_chunks(4096)).for_each(|(risks, answer)| {
+        for (risk, answer) in risks.iter_mut().zip(answer).filter(|(risk, _)| **risk == Risk::NONE) {
+            *risk = *answer;
         }
     });
 }
