@@ -137,11 +137,11 @@ impl Navigator {
             // What was given whole never gets old.
             self.guard.note_scan(odometry.valid_at_ns);
         }
-        let is_first = self.odometry.replace(*odometry).is_none();
-        match (scan, is_first) {
-            (Some(scan), _) => self.map(odometry, scan, is_first),
-            (None, true) => self.renew(odometry, is_first),
-            (None, false) => Ok(false),
+        self.odometry = Some(*odometry);
+        match scan {
+            Some(scan) => self.map(odometry, scan),
+            None if self.given.is_some() && self.risk.view().is_none() => self.renew(odometry),
+            None => Ok(false),
         }
     }
 
@@ -207,20 +207,21 @@ impl Navigator {
         decision
     }
 
-    fn map(&mut self, odometry: &Odometry, scan: &Scan, is_first: bool) -> Result<bool, NavigatorError> {
+    fn map(&mut self, odometry: &Odometry, scan: &Scan) -> Result<bool, NavigatorError> {
         if self.given.is_none() {
             // A finite pose was admitted; a scan whose origin is no place holds nothing to fuse.
             let Ok(report) = self.elevation.fuse(scan, &pose(odometry)) else { return Ok(false) };
-            if report.n_points > report.n_rejected_non_finite {
-                self.guard.note_scan(scan.valid_at_ns);
+            if report.n_points == report.n_rejected_non_finite {
+                return Ok(false);
             }
+            self.guard.note_scan(scan.valid_at_ns);
         }
-        self.renew(odometry, is_first)
+        self.renew(odometry)
     }
 
     /// Brings risk map and cost-to-go up to date with the surface.
-    fn renew(&mut self, odometry: &Odometry, is_first: bool) -> Result<bool, NavigatorError> {
-        if is_first {
+    fn renew(&mut self, odometry: &Odometry) -> Result<bool, NavigatorError> {
+        if self.risk.view().is_none() {
             self.elevation.assume_ground(&pose(odometry), &self.assumed)?;
         }
         let position_m = [odometry.position_m[0], odometry.position_m[1]];
