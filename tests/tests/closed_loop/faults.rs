@@ -1,0 +1,136 @@
+//! Sensors that fail: the drive survives, or comes to a controlled stop that says why.
+
+use bicycle::{Decision, HoldReason, StopReason};
+use scenarios::{Outcome, SensorFault};
+use terrain::TerrainClass;
+
+use crate::course::{Course, Driven, ground};
+
+/// The fault begins when the vehicle is at full speed [s].
+const FROM_S: f64 = 2.0;
+/// Length of a control cycle [s].
+const CYCLE_S: f64 = 0.1;
+/// Speed below which a vehicle stands [m/s].
+const STANDING_MPS: f64 = 0.05;
+
+/// The first stop came for this reason, no sooner than `after_s` after the fault began and at most two cycles later;
+/// from then on the vehicle braked to a standstill within twice the way that its limit of deceleration needs.
+fn assert_stops(driven: &Driven, reason: StopReason, after_s: f64) {
+    let at_s = driven.first_stop_s(reason).unwrap_or_else(|| panic!("{:?}", driven.stops()));
+    let waited_s = at_s - FROM_S;
+    assert!((after_s - 1e-6..after_s + 2.0 * CYCLE_S + 1e-6).contains(&waited_s), "{waited_s} s");
+    let first_s =
+        driven.stops().into_keys().filter_map(|any| driven.first_stop_s(any)).fold(f64::MAX, f64::min);
+    assert_eq!(first_s, at_s, "no other reason before: {:?}", driven.stops());
+    let rest = || driven.trace().iter().skip_while(|row| row.time_s < at_s);
+    let first = rest().next().unwrap().motion;
+    let standing = rest().find(|row| row.motion.velocity_mps[0].abs() < STANDING_MPS).unwrap();
+    let way_m = (standing.motion.pose.x_m - first.pose.x_m).hypot(standing.motion.pose.y_m - first.pose.y_m);
+    let deceleration_mps2 = Course::flat(1.0).vehicle.limits.acceleration_max_mps2;
+    let speed_mps = first.velocity_mps[0];
+    assert!(speed_mps > 0.5, "the fault must come at speed, found {speed_mps} m/s");
+    assert!(way_m < speed_mps.powi(2) / deceleration_mps2 + 0.2, "{way_m} m from {speed_mps} m/s");
+    assert!(rest().take_while(|row| row.time_s < standing.time_s).all(|row| row.command.speed_mps == 0.0));
+}
+
+fn flat_with(sensor: SensorFault, until_s: f64) -> Driven {
+    Course::flat(8.0).with_fault(sensor, FROM_S, until_s).drive()
+}
+
+#[test]
+fn points_that_are_no_numbers_are_survived() {
+    let driven = Course::flat(6.0).with_fault(SensorFault::NonFinitePoints, 0.0, f64::INFINITY).drive();
+    assert_eq!((driven.outcome, driven.stops().len()), (Outcome::Goal, 0), "{:?}", driven.stops());
+    let known = driven.closed.navigator.surface().values().iter().filter(|cell| cell.is_known());
+    assert!(known.clone().all(|cell| cell.height_m.abs() < 0.5), "the ground is flat");
+    assert!(known.count() > 1000, "the other points make a map");
+}
+
+#[test]
+fn empty_scans_stop_the_vehicle_until_it_sees_again() {
+    // Scans come every other cycle; the last good one is from 1.8 s, the age limit is 1 s.
+    for sensor in [SensorFault::EmptyScan, SensorFault::MissingScan] {
+        let driven = flat_with(sensor, 4.5);
+        assert_stops(&driven, StopReason::StaleScan, 0.8);
+        assert_eq!(driven.outcome, Outcome::Goal);
+    }
+}
+
+#[test]
+fn blindness_for_good_ends_the_drive_as_stopped() {
+    let driven = flat_with(SensorFault::EmptyScan, f64::INFINITY);
+    assert_stops(&driven, StopReason::StaleScan, 0.8);
+    assert_eq!(driven.outcome, Outcome::Stopped);
+}
+
+#[test]
+fn vehicle_that_has_never_seen_waits_and_then_says_why() {
+    let driven = Course::flat(6.0).with_fault(SensorFault::EmptyScan, 0.0, f64::INFINITY).drive();
+    assert_eq!(driven.outcome, Outcome::Stopped, "{:?}", driven.stops());
+    assert!(driven.stops().contains_key(&StopReason::StaleScan), "{:?}", driven.stops());
+    assert_eq!(driven.trace()[0].decision, Decision::Hold(HoldReason::NoMap));
+    assert!(driven.closed.episode.path_length_m() < 0.05, "{} m", driven.closed.episode.path_length_m());
+}
+
+#[test]
+fn odometry_that_freezes_for_good_ends_the_drive_at_a_standstill() {
+    // It repeats from the first frozen sample on; half a second of that is too much.
+    let driven = flat_with(SensorFault::FrozenOdometry, f64::INFINITY);
+    assert_stops(&driven, StopReason::StaleOdometry, 0.5);
+    assert_eq!(driven.outcome, Outcome::Stopped);
+}
+
+#[test]
+fn odometry_that_thaws_lets_the_drive_go_on() {
+    let driven = flat_with(SensorFault::FrozenOdometry, 4.5);
+    assert_stops(&driven, StopReason::StaleOdometry, 0.5);
+    assert_eq!((driven.outcome, driven.closed.navigator.n_jumps()), (Outcome::Goal, 0));
+}
+
+#[test]
+fn odometry_that_falls_silent_stops_the_vehicle() {
+    // The last message is from 1.9 s, the age limit is 0.3 s.
+    let driven = flat_with(SensorFault::SilentOdometry, f64::INFINITY);
+    assert_stops(&driven, StopReason::StaleOdometry, 0.2);
+    assert_eq!(driven.outcome, Outcome::Stopped);
+}
+
+#[test]
+fn odometry_that_is_no_number_stops_the_vehicle_at_once_and_only_as_long() {
+    let driven = flat_with(SensorFault::NonFiniteOdometry, 4.5);
+    assert_stops(&driven, StopReason::NonFiniteInput, 0.0);
+    // 25 cycles from 2.0 to 4.4 s; then the map is out of date until the next scan, and no jump is made of the gap.
+    assert_eq!((driven.outcome, driven.stops()[&StopReason::NonFiniteInput]), (Outcome::Goal, 25));
+    assert!(driven.stops().get(&StopReason::StaleScan).is_none_or(|&n_cycles| n_cycles <= 2));
+    assert_eq!(driven.closed.navigator.n_jumps(), 0);
+    let driven = flat_with(SensorFault::NonFiniteOdometry, f64::INFINITY);
+    assert_eq!(driven.outcome, Outcome::Stopped);
+    assert!(driven.trace().iter().all(|row| row.command.speed_mps.is_finite()));
+}
+
+#[test]
+fn map_follows_a_localisation_that_corrects_itself_by_a_metre() {
+    // A block beside the way, 0.75 m wide around (8, 3.5).
+    const BLOCK_M: [f64; 2] = [8.0, 3.5];
+    const JUMP_M: [f64; 2] = [-0.8, 0.6];
+    let is_block = |x_m: f64, y_m: f64| (x_m - BLOCK_M[0]).abs().max((y_m - BLOCK_M[1]).abs()) < 0.4;
+    let driven = Course::along_x(ground(|_, _| 0.0, is_block), 8.0)
+        .with_fault(SensorFault::PoseJump(JUMP_M), FROM_S, f64::INFINITY)
+        .drive();
+    // The planner's goal lies 0.8 m behind and 0.6 m beside the true one: it passes within the tolerance of 1 m.
+    assert_eq!((driven.outcome, driven.stops().len()), (Outcome::Goal, 0), "{:?}", driven.stops());
+    assert!(driven.trace().iter().all(|row| matches!(row.decision, Decision::Drive(_))));
+    assert_eq!(driven.closed.navigator.n_jumps(), 1);
+    // One block is known, and it stands where the corrected localisation must see it.
+    let surface = driven.closed.navigator.surface();
+    let cells =
+        surface.values().iter().enumerate().filter(|(_, cell)| cell.class() == TerrainClass::Obstacle);
+    let places: Vec<_> =
+        cells.map(|(index, _)| surface.geometry().centre_m(surface.geometry().cell(index))).collect();
+    assert!(!places.is_empty(), "the block was seen");
+    for [x_m, y_m] in &places {
+        let off_m = [x_m - BLOCK_M[0] - JUMP_M[0], y_m - BLOCK_M[1] - JUMP_M[1]];
+        // Half the block, and a cell of 0.3 m for rounding on either side.
+        assert!(off_m[0].abs().max(off_m[1].abs()) < 0.38 + 0.3, "({x_m}, {y_m}) of {places:?}");
+    }
+}

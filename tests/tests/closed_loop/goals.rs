@@ -1,0 +1,71 @@
+//! Goals that can be reached are reached, others end in time.
+
+use bench::closed_loop::Method;
+use scenarios::Outcome;
+
+use crate::course::{Course, ground};
+
+#[test]
+fn near_goal_on_flat_ground_is_reached_nearly_straight() {
+    let driven = Course::flat(6.0).drive();
+    assert_eq!(driven.outcome, Outcome::Goal, "{:?}", driven.stops());
+    // The straight way up to the tolerance of 1 m is 5 m; sampled steering may swerve by a twentieth of it.
+    let path_m = driven.closed.episode.path_length_m();
+    assert!((4.99..5.25).contains(&path_m), "{path_m} m");
+    // From rest with 1 m/s2 up to 1 m/s, 5 m take 0.5 s + 5 s; an actuator that lags and a planner that looks for
+    // its way may take half as much again.
+    let limits = &Course::flat(6.0).vehicle.limits;
+    let ideal_s = 5.0 / limits.speed_max_mps + 0.5 * limits.speed_max_mps / limits.acceleration_max_mps2;
+    let time_s = driven.closed.episode.time_s();
+    assert!((ideal_s * 0.99..ideal_s * 1.5).contains(&time_s), "{time_s} s, ideal {ideal_s} s");
+    assert_eq!(driven.stops().len(), 0, "{:?}", driven.stops());
+}
+
+#[test]
+fn near_goal_on_a_rock_field_is_reached() {
+    let driven = Course::rocks(8.0, 3).drive();
+    assert_eq!(driven.outcome, Outcome::Goal, "{:?}", driven.stops());
+    let limits = &Course::rocks(8.0, 3).vehicle.limits;
+    assert!(driven.closed.episode.largest_roll_rad() < limits.roll_max_rad);
+    assert!(driven.closed.episode.path_length_m() >= 6.99, "8 m less the tolerance of 1 m");
+}
+
+#[test]
+fn goal_behind_walls_on_all_sides_ends_in_time_and_touches_none() {
+    // A ring of walls 3.5 to 4.5 m around the goal at (14, 0).
+    let is_wall = |x_m: f64, y_m: f64| (3.5..4.5).contains(&(x_m - 14.0).abs().max(y_m.abs()));
+    let mut course = Course::along_x(ground(|_, _| 0.0, is_wall), 10.0);
+    course.episode.rules.time_limit_s = 15.0;
+    let driven = course.drive();
+    let ends = [Outcome::Timeout, Outcome::Stuck, Outcome::Stopped];
+    assert!(ends.contains(&driven.outcome), "{:?}", driven.outcome);
+    assert!(driven.closed.episode.time_s() <= 15.0 + 1e-9);
+    // The bumper is the length less the rear overhang ahead of the axle; the wall begins at x = 9.5 m.
+    let geometry = &course.vehicle.geometry;
+    let ahead_m = geometry.length_m - geometry.rear_overhang_m;
+    let bumper_m = driven.trace().iter().map(|row| row.motion.pose.x_m + ahead_m).fold(0.0, f64::max);
+    assert!(bumper_m < 9.5, "{bumper_m} m");
+}
+
+/// A ridge of 0.7 m across the straight line at x = 12 m, from y = -4 to 1.25 m, with flanks of atan(0.7 / 0.75) = 43
+/// degrees: beyond the limit of 30 degrees and beyond what dirt holds.
+fn ridge(x_m: f64, y_m: f64) -> f64 {
+    let along = (1.0 - (x_m - 12.0).abs() / 0.75).max(0.0);
+    let across = ((2.625 - (y_m + 1.375).abs()) / 0.75).clamp(0.0, 1.0);
+    0.7 * along * across
+}
+
+#[test]
+fn physics_drives_around_the_ridge_that_full_traction_runs_into() {
+    let course = |method| Course { method, ..Course::along_x(ground(ridge, |_, _| false), 12.0) };
+    let physics = course(Method::Physics).drive();
+    assert_eq!(physics.outcome, Outcome::Goal, "{:?}", physics.stops());
+    assert!(physics.detour_m() > 1.25, "the rear axle's centre must pass the end of the ridge");
+    let nominal = course(Method::Nominal).drive();
+    assert!(
+        matches!(nominal.outcome, Outcome::AttitudeLimit | Outcome::Stuck | Outcome::RolledOver),
+        "{:?}",
+        nominal.outcome
+    );
+    assert!(nominal.detour_m() < 1.25 && nominal.trace().last().unwrap().motion.pose.x_m < 12.0);
+}
