@@ -50,7 +50,7 @@ impl Config {
         let horizon_s = controller.n_steps as f64 * controller.step_s;
         let horizon_m = vehicle.limits.speed_max_mps * horizon_s;
         // Twice the horizon to either side sees around an obstacle at its end.
-        let window_m = (4.0 * horizon_m).max(8.0 * vehicle.geometry.length_m);
+        let window_m = (4.0 * horizon_m).max(6.0 * vehicle.geometry.length_m);
         let (finest_m, coarsest_m) = (vehicle.geometry.width_m / 9.0, vehicle.geometry.width_m / 2.5);
         let risk_m = round_to_two_digits((window_m / 128.0).clamp(finest_m, coarsest_m));
         let n = ((window_m / risk_m).ceil() as usize).min(128);
