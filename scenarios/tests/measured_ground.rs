@@ -1,4 +1,5 @@
 //! Worlds from elevation layers, and starts and goals on them.
+#![allow(clippy::unwrap_used, reason = "helpers of tests fail the test")]
 
 mod machines;
 
@@ -201,7 +202,7 @@ fn ends_on_obstacles_slopes_and_ice_are_refused_with_the_reason() {
         panic!("{error}");
     };
     // The springs add what the weight's shift to the lower side compresses them: a few degrees more than the slope.
-    assert!((32.0..37.0).contains(&roll_deg) && pitch_deg < 0.5, "{roll_deg} {pitch_deg}");
+    assert!((32.0..40.0).contains(&roll_deg) && pitch_deg < 0.5, "{roll_deg} {pitch_deg}");
     assert!((roll_max_deg - 27.0).abs() < 0.01, "{roll_max_deg}");
 
     // Up 24 degrees on ice: tan = 0.45 > 0.40.

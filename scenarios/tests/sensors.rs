@@ -1,4 +1,5 @@
 //! Simulated sensors against geometry and statistics.
+#![allow(clippy::unwrap_used, reason = "helpers of tests fail the test")]
 
 use std::sync::Arc;
 

@@ -1,4 +1,5 @@
 //! The static truth against closed forms and against the driven plant.
+#![allow(clippy::unwrap_used, reason = "helpers of tests fail the test")]
 
 mod machines;
 
@@ -208,6 +209,23 @@ fn agreement(pairs: &[[f64; 2]]) -> [f64; 3] {
     };
     let absolute = pairs.iter().map(|pair| (pair[0] - pair[1]).abs()).sum::<f64>() / n;
     [product(0, 1) / (product(0, 0) * product(1, 1)).sqrt(), means[0] - means[1], absolute]
+}
+
+#[test]
+fn statics_agree_with_the_parked_plant_on_slopes() {
+    let vehicle = full_size();
+    for incline_deg in [5.0_f64, 15.0, 25.0, 32.0] {
+        let world = ground(|_, y| incline_deg.to_radians().tan() * y, |_, _| ASPHALT);
+        let truth = Truth::new(&vehicle, Arc::clone(&world));
+        for yaw_rad in [0.0, 0.8, std::f64::consts::FRAC_PI_2] {
+            let mut plant = Plant::new(&vehicle, Arc::clone(&world), [0.0, 0.0, yaw_rad]).unwrap();
+            plant.advance(1.0);
+            let pose = plant.pose();
+            let said = truth.traversability(pose.x_m, pose.y_m, pose.yaw_rad);
+            let errors = [said.roll_rad - pose.roll_rad, said.pitch_rad - pose.pitch_rad];
+            assert!(errors.iter().all(|error| error.abs() < 0.03), "{incline_deg} {yaw_rad}: {errors:?}");
+        }
+    }
 }
 
 #[test]

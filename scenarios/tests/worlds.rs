@@ -1,4 +1,5 @@
 //! Queries of the ground, the rock testbed and the arena against geometry.
+#![allow(clippy::unwrap_used, reason = "helpers of tests fail the test")]
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 

@@ -243,18 +243,20 @@ impl Statics {
         let mut stand = self.first_guess(ground, &place);
         // Where the wheels touch depends on the attitude, and the attitude on where they touch.
         let touches = self.touches(ground, &place, &stand);
-        for _ in 0..PASSES {
+        for pass in 1..=PASSES {
             let guess = stand;
             let ground_m = self.wheels_on_ground(ground, &place, &mut stand);
             self.balance(&ground_m, touches.as_ref(), &mut stand);
-            let deepest = touches.and_then(|touches| self.deepest(&touches, &stand));
-            stand.belly_slope = deepest.map_or(0.0, |at_m| self.belly_slope(ground, &place, at_m));
-            let turned =
-                (stand.pitch_sine - guess.pitch_sine).abs().max((stand.left_rise - guess.left_rise).abs());
-            if turned < TURN_MIN {
+            let turn = [stand.pitch_sine - guess.pitch_sine, stand.left_rise - guess.left_rise];
+            if pass == PASSES || turn[0].abs().max(turn[1].abs()) < TURN_MIN {
                 break;
             }
+            // Half way: on a steep slope contacts and attitude drive each other too far in turn.
+            stand.pitch_sine -= 0.5 * turn[0];
+            stand.left_rise -= 0.5 * turn[1];
         }
+        let deepest = touches.and_then(|touches| self.deepest(&touches, &stand));
+        stand.belly_slope = deepest.map_or(0.0, |at_m| self.belly_slope(ground, &place, at_m));
         stand
     }
 

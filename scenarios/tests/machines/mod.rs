@@ -1,4 +1,5 @@
 //! The shipped machines.
+#![allow(clippy::unwrap_used, reason = "helpers of tests fail the test")]
 
 use bicycle::Vehicle;
 
