@@ -186,6 +186,45 @@ fn step_by_step_is_the_same_as_run_and_repeats_bit_for_bit() {
     assert!(whole.0.len() > 20);
 }
 
+/// Drives the arena through points with a steering proportional to the bearing.
+fn through(bush_height_m: f64, points_m: &[[f64; 2]]) -> (Outcome, Episode) {
+    let task = Task::arena(&ArenaConfig { bush_height_m, ..ArenaConfig::default() }).unwrap();
+    let mut points_m = [points_m, &[task.goal_m]].concat();
+    let mut config = blind(&rc_car());
+    config.odometry = OdometryConfig::PERFECT;
+    let mut episode = Episode::new(task, &rc_car(), config, 1).unwrap();
+    let decide = |observation: &Observation| {
+        let [x_m, y_m, _] = observation.odometry.position_m;
+        let away = |point: &[f64; 2]| [point[0] - x_m, point[1] - y_m];
+        if points_m.len() > 1 && away(&points_m[0])[0].hypot(away(&points_m[0])[1]) < 0.25 {
+            points_m.remove(0);
+        }
+        let [east, north] = away(&points_m[0]);
+        let bearing = north.atan2(east) - observation.odometry.attitude_rad[2];
+        let steering_rad = (2.0 * bearing.sin().atan2(bearing.cos())).clamp(-0.5, 0.5) as f32;
+        Decision::Drive(Command { speed_mps: 1.0, steering_rad })
+    };
+    let outcome = episode.run(decide, |_| ControlFlow::Continue(())).unwrap();
+    (outcome, episode)
+}
+
+#[test]
+fn the_arena_offers_three_ways_of_which_tall_bushes_close_one() {
+    let ramp = [[2.6, 5.62], [6.9, 5.62]];
+    let gap = [[2.8, 2.0], [4.2, 0.6], [5.5, 0.6], [7.0, 2.0]];
+    let (low, straight) = through(0.05, &[]);
+    assert_eq!(low, Outcome::Goal);
+    assert_eq!(through(0.25, &[]).0, Outcome::Stuck);
+    let (over, climbed) = through(0.25, &ramp);
+    assert_eq!(over, Outcome::Goal);
+    assert!(climbed.largest_pitch_rad() > 0.2, "{}", climbed.largest_pitch_rad());
+    let (around, circled) = through(0.25, &gap);
+    assert_eq!(around, Outcome::Goal);
+    let times_s = [straight.time_s(), climbed.time_s(), circled.time_s()];
+    println!("straight, ramp, gap: {times_s:.1?} s");
+    assert!(times_s.is_sorted());
+}
+
 #[test]
 fn observations_come_at_their_rates() {
     let mut episode = Episode::new(flat(), &rc_car(), EpisodeConfig::for_vehicle(&rc_car()), 1).unwrap();

@@ -4,6 +4,7 @@
 //! for one map, as the upper bound that no learned or assumed traversability can beat.
 
 mod field;
+mod forces;
 mod ground;
 mod obstacles;
 mod stand;

@@ -3,6 +3,7 @@
 use bicycle::{Axle, Vehicle};
 use nalgebra::{Matrix3, Vector3};
 
+use super::forces::{Forces, WheelSpring};
 use super::ground::Ground;
 
 /// Acceleration of gravity [m/s2].
@@ -21,8 +22,6 @@ const N_ACROSS: usize = 5;
 /// How far ahead of the bumper ground counts as touched: whoever drives on meets it at once. Over the length.
 const BUMPER_AHEAD: f64 = 0.03;
 const N_UNDERSIDE: usize = (BELLY_ALONG.len() + 2) * N_ACROSS;
-/// Stiffness of the travel stops over that of the spring [-].
-const STOP_RATIO: f64 = 10.0;
 /// Stiffness of each point of the underside over that of a wheel [-].
 const BELLY_RATIO: f64 = 10.0;
 /// Ground within this share of the clearance may touch the belly once the springs have given way [-].
@@ -30,20 +29,8 @@ const NEAR_SHARE: f64 = 0.6;
 /// The contacts are taken anew for an attitude that differs by more than this from the one they were taken for [-].
 const TURN_MIN: f64 = 0.05;
 const PASSES: usize = 3;
-/// A lifted wheel keeps this share of its stiffness, so that the balance stays solvable [-].
-const LIFTED_SHARE: f64 = 1e-3;
 /// Largest sine of roll or pitch: whoever stands steeper has fallen over [-].
 const SINE_MAX: f64 = 0.9;
-
-/// Force of one wheel over the height of the ground at its hub: straight pieces with kinks at the travel's ends.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct WheelSpring {
-    rest_n: f64,
-    stiffness_n_per_m: f64,
-    /// Rise at which the travel ends [m], and the stiffness beyond.
-    stop_m: f64,
-    stop_n_per_m: f64,
-}
 
 /// A vehicle reduced to what statics need. Wheels in the order front left, front right, rear left, rear right.
 #[derive(Clone, Debug)]
@@ -116,34 +103,6 @@ impl Place {
     }
 }
 
-/// Sums over all contacts and gravity.
-#[derive(Clone, Copy)]
-struct Forces {
-    /// Upward force [N], its moments over the distance ahead and to the left [N m].
-    balance: Vector3<f64>,
-    /// Derivative of the balance by heave, pitch sine and left rise.
-    stiffness: Matrix3<f64>,
-    load_n: [f64; 4],
-    belly_n: f64,
-}
-
-impl Forces {
-    /// Adds an upward force at a point of the body that stiffens with depth.
-    #[inline]
-    fn push(&mut self, [ahead_m, left_m]: [f64; 2], force_n: f64, n_per_m: f64) {
-        let arm = Vector3::new(1.0, ahead_m, left_m);
-        self.balance += arm * force_n;
-        self.stiffness += arm * Vector3::new(-1.0, ahead_m, -left_m).transpose() * n_per_m;
-    }
-
-    /// How far from equilibrium, over the weight [-].
-    fn excess(&self, statics: &Statics) -> f64 {
-        let arm_m = statics.vehicle.geometry.wheelbase_m;
-        let scaled = Vector3::new(self.balance.x, self.balance.y / arm_m, self.balance.z / arm_m);
-        scaled.norm() / statics.weight_n
-    }
-}
-
 /// Height at which the hubs' plane would just touch, for each point of the underside [m].
 type Touches = [f64; N_UNDERSIDE];
 
@@ -170,31 +129,6 @@ fn underside(vehicle: &Vehicle, hub_height_m: f64) -> [Underside; N_UNDERSIDE] {
         };
         Underside { at_m: [ahead_m, across * geometry.width_m], below_m }
     })
-}
-
-impl WheelSpring {
-    fn new(axle: &Axle, tyre_n_per_m: f64, rest_n: f64) -> Self {
-        let strut = &axle.suspension;
-        let in_series = |strut_n_per_m: f64| strut_n_per_m * tyre_n_per_m / (strut_n_per_m + tyre_n_per_m);
-        Self {
-            rest_n,
-            stiffness_n_per_m: in_series(strut.stiffness_n_per_m),
-            stop_m: strut.travel_m * (1.0 + strut.stiffness_n_per_m / tyre_n_per_m),
-            stop_n_per_m: in_series((1.0 + STOP_RATIO) * strut.stiffness_n_per_m),
-        }
-    }
-
-    /// Force and stiffness when the ground is `rise_m` higher than at rest.
-    #[inline]
-    fn at(&self, rise_m: f64) -> [f64; 2] {
-        let beyond_m = (rise_m - self.stop_m).max(0.0);
-        let force_n =
-            self.rest_n + self.stiffness_n_per_m * (rise_m - beyond_m) + self.stop_n_per_m * beyond_m;
-        if force_n <= 0.0 {
-            return [0.0, LIFTED_SHARE * self.stiffness_n_per_m];
-        }
-        [force_n, if beyond_m > 0.0 { self.stop_n_per_m } else { self.stiffness_n_per_m }]
-    }
 }
 
 impl Statics {
@@ -326,9 +260,11 @@ impl Statics {
     /// Newton's iteration on heave, pitch and roll until springs and gravity balance; a step that overshoots a wheel's
     /// lift-off or the belly's touch is halved.
     fn balance(&self, ground_m: &[f64; 4], touches: Option<&Touches>, stand: &mut Stand) {
+        let wheelbase_m = self.vehicle.geometry.wheelbase_m;
+        let excess = |forces: &Forces| forces.excess(self.weight_n, wheelbase_m);
         let mut forces = self.forces(ground_m, touches, stand);
         for _ in 0..16 {
-            if forces.excess(self) < 1e-3 {
+            if excess(&forces) < 1e-3 {
                 break;
             }
             let Some(step) = forces.stiffness.lu().solve(&forces.balance) else { break };
@@ -340,7 +276,7 @@ impl Statics {
                 trial.left_rise = (trial.left_rise - share * step[2]).clamp(-SINE_MAX, SINE_MAX);
                 let after = self.forces(ground_m, touches, &trial);
                 share *= 0.5;
-                if after.excess(self) < forces.excess(self) || share < 0.05 {
+                if excess(&after) < excess(&forces) || share < 0.05 {
                     (*stand, forces) = (trial, after);
                     break;
                 }
