@@ -212,6 +212,51 @@ fn agreement(pairs: &[[f64; 2]]) -> [f64; 3] {
 }
 
 #[test]
+fn plants_and_slopes_slow_the_plant_as_the_truth_says() {
+    let meadow = |height_m: f32| slope(0.0, Patch::open(Stribeck::GRASS).overgrown(height_m));
+    let cases = [
+        (full_size(), slope(0.2, ASPHALT)),
+        (full_size(), slope(0.3, Patch::open(Stribeck::ROCK))),
+        (rc_car(), meadow(0.06)),
+        (rc_car(), meadow(0.1)),
+        (rc_car(), slope(0.3, ASPHALT)),
+    ];
+    for (vehicle, world) in cases {
+        let said = Truth::new(&vehicle, Arc::clone(&world)).traversability(0.0, 0.0, 0.0).linear_traction;
+        let mut plant = Plant::new(&vehicle, world, [-2.0, 0.0, 0.0]).unwrap();
+        let speed_mps = vehicle.limits.speed_max_mps;
+        plant.set_command(Command { speed_mps: speed_mps as f32, steering_rad: 0.0 }).unwrap();
+        plant.advance(3.0);
+        let before_m = plant.pose().x_m;
+        plant.advance(2.0);
+        let found = (plant.pose().x_m - before_m) / (2.0 * speed_mps);
+        println!("{}: truth {said:.3}, plant {found:.3}", vehicle.name);
+        assert!((said - found).abs() < 0.06, "{}: truth {said:.3}, plant {found:.3}", vehicle.name);
+    }
+}
+
+#[test]
+fn turning_is_slowed_as_the_truth_says() {
+    for vehicle in [full_size(), rc_car()] {
+        let world = slope(0.0, ASPHALT);
+        let said = Truth::new(&vehicle, Arc::clone(&world)).traversability(0.0, 0.0, 0.0).angular_traction;
+        let mut plant = Plant::new(&vehicle, world, [0.0, 0.0, 0.0]).unwrap();
+        let speed_mps = vehicle.limits.speed_max_mps;
+        let steering_rad = 0.3_f64;
+        let command = Command { speed_mps: speed_mps as f32, steering_rad: steering_rad as f32 };
+        plant.set_command(command).unwrap();
+        plant.advance(4.0);
+        let yaw_rates = (0..100).map(|_| {
+            plant.advance(0.02);
+            plant.motion().angular_rate_radps[2] / 100.0
+        });
+        let found = yaw_rates.sum::<f64>() / (speed_mps * steering_rad.tan() / vehicle.geometry.wheelbase_m);
+        println!("{}: truth {said:.3}, plant {found:.3}", vehicle.name);
+        assert!((said - found).abs() < 0.1, "{}: truth {said:.3}, plant {found:.3}", vehicle.name);
+    }
+}
+
+#[test]
 fn statics_agree_with_the_parked_plant_on_slopes() {
     let vehicle = full_size();
     for incline_deg in [5.0_f64, 15.0, 25.0, 32.0] {
