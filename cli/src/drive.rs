@@ -7,7 +7,7 @@ mod scene;
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
-use bench::closed_loop::{self, ClosedLoop, Cycle, Drive};
+use bench::closed_loop::{self, ClosedLoop, Cycle, Drive, DriveError};
 use bicycle::{Decision, StopReason};
 use formats::{config_hash, write_json_atomic};
 use scenarios::EpisodeConfig;
@@ -25,10 +25,10 @@ use scene::Scene;
 pub(crate) fn run(arguments: &DriveArguments) -> anyhow::Result<()> {
     arguments.bush_height_m()?;
     let scene = scene::prepare(arguments)?;
+    let mut closed = ClosedLoop::new(drive(arguments, &scene)?).map_err(|error| refused(arguments, error))?;
     let files = OutputFiles::prepare(arguments)?;
     let config_hash = config_hash(&(&scene.config, &scene.model, &scene.vehicle))?;
     let about = about(arguments, &scene, &config_hash);
-    let mut closed = ClosedLoop::new(drive(arguments, &scene)?).map_err(UsageError::from_input)?;
     let mut recording = Recording::create(&files.recording, about).map_err(UsageError::from_input)?;
     recording.goal(&scene.task.world, scene.task.goal_m)?;
     interrupt::catch_interrupts()?;
@@ -98,6 +98,13 @@ fn drive<'a>(arguments: &DriveArguments, scene: &'a Scene) -> Result<Drive<'a>, 
     })
 }
 
+/// Settings that cannot be together are told with the file that they come from.
+fn refused(arguments: &DriveArguments, error: DriveError) -> UsageError {
+    let from_file = arguments.config.as_ref().filter(|_| matches!(error, DriveError::Navigator(_)));
+    let told = UsageError::from_input(error);
+    from_file.map_or(told.clone(), |file| UsageError(format!("{}: {told}", file.display())))
+}
+
 /// Drives to the end, whatever it is.
 fn follow(
     arguments: &DriveArguments,
@@ -111,12 +118,13 @@ fn follow(
     let mut kept = Kept { tally: Tally::default(), known };
     let began = Instant::now();
     while closed.episode.outcome().is_none() {
+        let scan = closed.episode.observe().scan.clone();
         let cycle = closed.cycle()?;
         kept.tally.count(&cycle, closed.episode.cycle_s());
         if let Some(map) = closed.navigator.risk_map().filter(|_| cycle.map_ms.is_some()) {
             kept.known.update(&map);
         }
-        recording.cycle(closed, &cycle)?;
+        recording.cycle(closed, &cycle, scan.as_deref())?;
         progress.update(&told(closed, &cycle));
         if interrupt::interrupted() {
             kept.tally.is_interrupted = true;

@@ -7,7 +7,7 @@ use bench::closed_loop::{ClosedLoop, Cycle};
 use bicycle::State;
 use formats::{DriveRecorder, RecordError};
 use scenarios::World;
-use terrain::{GridGeometry, GridMap, Pose};
+use terrain::{GridGeometry, GridMap, Pose, Scan};
 use traversability::{GroundFlags, RiskMapView};
 
 use crate::picture::PathSample;
@@ -36,8 +36,13 @@ impl Recording {
         self.recorder.goal(0, &Pose { x_m, y_m, z_m: world.height_m(x_m, y_m), ..Pose::default() })
     }
 
-    /// Notes the cycle that has just been driven.
-    pub fn cycle(&mut self, closed: &ClosedLoop, cycle: &Cycle) -> Result<(), RecordError> {
+    /// Notes the cycle that has just been driven, and the scan that it began with.
+    pub fn cycle(
+        &mut self,
+        closed: &ClosedLoop,
+        cycle: &Cycle,
+        scan: Option<&Scan>,
+    ) -> Result<(), RecordError> {
         let Some(row) = closed.episode.trace().last() else { return Ok(()) };
         let at_ns = (row.time_s * 1e9).round() as u64;
         let pose = row.motion.pose;
@@ -53,6 +58,7 @@ impl Recording {
         }
         if number.is_multiple_of(CYCLES_PER_MAP) {
             self.maps(at_ns, closed, &pose)?;
+            scan.map_or(Ok(()), |scan| self.recorder.scan(at_ns, scan))?;
         }
         Ok(())
     }
@@ -76,9 +82,6 @@ impl Recording {
         self.recorder.elevation(at_ns, closed.navigator.surface())?;
         if let Some(map) = closed.navigator.risk_map() {
             self.recorder.risk(at_ns, &map, pose.yaw_rad)?;
-        }
-        if let Some(scan) = &closed.episode.observe().scan {
-            self.recorder.scan(at_ns, scan)?;
         }
         Ok(())
     }

@@ -1,0 +1,166 @@
+//! `surefoot drive` from its start to what it leaves behind, also when it is broken off.
+
+#![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
+
+use std::path::Path;
+use std::process::{Child, Command, Output, Stdio};
+use std::time::Duration;
+
+use bicycle::Column;
+use cli::summary::{Outcome, Summary};
+use formats::read_drive_log_mcap;
+
+const BIJOU: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/data/terrain/bijou_gully_5m.npz");
+
+fn drive(out: &Path, words: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_surefoot"));
+    command.args(["drive", "--threads", "1", "--out"]).arg(out).args(words);
+    command
+}
+
+fn text(bytes: &[u8]) -> String {
+    String::from_utf8(bytes.to_vec()).unwrap()
+}
+
+/// The drive ended before its goal: exit code 1 and one line that holds `part`.
+fn assert_not_there(output: &Output, part: &str) {
+    let told = text(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{told}");
+    assert_eq!(told.lines().count(), 1, "{told}");
+    assert!(told.starts_with("surefoot: goal not reached") && told.contains(part), "{told}");
+}
+
+fn read_summary(out: &Path) -> Summary {
+    serde_json::from_slice(&std::fs::read(out.join("summary.json")).unwrap()).unwrap()
+}
+
+fn n_recorded(out: &Path) -> usize {
+    let recording = read_drive_log_mcap(&out.join("drive.mcap")).unwrap();
+    assert_eq!(recording.ended_early, None, "the recording is complete");
+    recording.log.n_rows()
+}
+
+#[test]
+fn drive_that_runs_out_of_time_leaves_picture_recording_and_summary() {
+    let folder = tempfile::tempdir().unwrap();
+    let (out, copy) = (folder.path().join("out"), folder.path().join("copy.json"));
+    let output = drive(&out, &["--seed", "3", "--time-limit", "2", "--json", copy.to_str().unwrap()])
+        .output()
+        .unwrap();
+    assert_not_there(&output, "time limit passed");
+    let told = text(&output.stdout);
+    for part in
+        ["time limit passed", "2.0 s simulated", "drive.png", "drive.mcap", "summary.json", "copy.json"]
+    {
+        assert!(told.contains(part), "{part} in {told}");
+    }
+
+    let mut names: Vec<_> = std::fs::read_dir(&out)
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+        .collect();
+    names.sort_unstable();
+    assert_eq!(names, ["drive.mcap", "drive.png", "summary.json"]);
+    assert_eq!(std::fs::read(&copy).unwrap(), std::fs::read(out.join("summary.json")).unwrap());
+    assert_eq!(&std::fs::read(out.join("drive.png")).unwrap()[..8], b"\x89PNG\r\n\x1a\n");
+
+    // 2 s at 10 Hz are 20 cycles, each recorded once.
+    let summary = read_summary(&out);
+    assert_eq!((summary.outcome, summary.cycles, n_recorded(&out)), (Outcome::Timeout, 20, 20));
+    let log = read_drive_log_mcap(&out.join("drive.mcap")).unwrap().log;
+    let run = log.runs().next().unwrap();
+    let (x_m, y_m) = (run.column(Column::X).unwrap(), run.column(Column::Y).unwrap());
+    assert!((x_m[0] - summary.start.x_m).hypot(y_m[0] - summary.start.y_m) < 1e-6);
+    // The recorded places are chords of the path; the last cycle's way is not among them: at most 0.1 s of 1 m/s.
+    let chords_m: f64 = (1..x_m.len()).map(|i| (x_m[i] - x_m[i - 1]).hypot(y_m[i] - y_m[i - 1])).sum();
+    let rest_m = summary.path_length_m - chords_m;
+    assert!((0.0..0.15).contains(&rest_m), "{chords_m} m of {} m", summary.path_length_m);
+}
+
+#[test]
+fn summary_holds_every_promised_field() {
+    let folder = tempfile::tempdir().unwrap();
+    let words = ["--seed", "5", "--time-limit", "0.5", "--isa", "portable", "--alpha", "0.3"];
+    assert_not_there(&drive(folder.path(), &words).output().unwrap(), "time limit passed");
+    let json: serde_json::Value =
+        serde_json::from_slice(&std::fs::read(folder.path().join("summary.json")).unwrap()).unwrap();
+    for times in ["control_ms", "map_ms"] {
+        let [p50, p99, max] = ["p50", "p99", "max"].map(|key| json[times][key].as_f64().unwrap());
+        assert!(0.0 < p50 && p50 <= p99 && p99 <= max, "{json}");
+    }
+    for number in ["path_length_m", "largest_roll_deg", "largest_pitch_deg", "cycles", "deadline_misses"] {
+        assert!(json[number].as_f64().unwrap() >= 0.0, "{number} in {json}");
+    }
+    assert!(json["time_to_goal_s"].is_null() && json["stops"].is_object(), "{json}");
+    assert_eq!((&json["outcome"], &json["seed"]), (&"timeout".into(), &5.into()));
+    assert_eq!((&json["isa"], &json["alpha"]), (&"portable".into(), &0.3.into()));
+    assert_eq!(json["vehicle"], "pietra_full_size");
+    assert!(json["world"].as_str().unwrap().contains("seed 5"), "{json}");
+    assert_eq!(json["config_hash"].as_str().unwrap().len(), 64, "SHA-256 in hexadecimal digits");
+    assert!(!json["revision"].as_str().unwrap().is_empty());
+}
+
+#[test]
+fn recording_carries_foxgloves_own_schemas() {
+    let folder = tempfile::tempdir().unwrap();
+    drive(folder.path(), &["--world", "arena", "--time-limit", "0.5"]).output().unwrap();
+    let bytes = std::fs::read(folder.path().join("drive.mcap")).unwrap();
+    let summary = mcap::Summary::read(&bytes).unwrap().unwrap();
+    let counts = &summary.stats.as_ref().unwrap().channel_message_counts;
+    for (topic, schema) in [
+        ("/pose", "foxglove.PoseInFrame"),
+        ("/path", "foxglove.PosesInFrame"),
+        ("/elevation", "foxglove.Grid"),
+        ("/risk", "foxglove.Grid"),
+        ("/rollouts", "foxglove.SceneUpdate"),
+        ("/scan", "foxglove.PointCloud"),
+        ("/tf", "foxglove.FrameTransform"),
+        ("/command", "surefoot.command"),
+        ("/controller", "surefoot.controller"),
+    ] {
+        let channel = summary.channels.values().find(|channel| channel.topic == topic);
+        let channel = channel.unwrap_or_else(|| panic!("no {topic}"));
+        assert_eq!(channel.schema.as_ref().unwrap().name, schema, "{topic}");
+        assert!(counts[&channel.id] > 0, "{topic}");
+    }
+}
+
+#[test]
+fn measured_ground_is_driven_between_ends_that_the_seed_picks() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = drive(folder.path(), &["--world", BIJOU, "--time-limit", "1"]).output().unwrap();
+    assert_not_there(&output, "time limit passed");
+    let summary = read_summary(folder.path());
+    assert!(summary.world.contains("bijou_gully_5m.npz"), "{}", summary.world);
+    let distance_m = (summary.goal.x_m - summary.start.x_m).hypot(summary.goal.y_m - summary.start.y_m);
+    assert!(distance_m > 20.0, "start and goal {distance_m} m apart");
+}
+
+/// A drive at the pace of the clock that is under way.
+fn begin_in_real_time(out: &Path) -> Child {
+    let words = ["--pace", "real", "--seed", "3", "--time-limit", "60"];
+    let mut child = drive(out, &words).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    // The recording grows by chunks: once one is on the disk, cycles are being driven.
+    for _ in 0..600 {
+        if std::fs::metadata(out.join("drive.mcap")).is_ok_and(|file| file.len() > 10_000) {
+            return child;
+        }
+        std::thread::sleep(Duration::from_millis(50));
+    }
+    child.kill().unwrap();
+    panic!("no recording after 30 s");
+}
+
+#[test]
+fn interrupt_ends_the_drive_in_order() {
+    let folder = tempfile::tempdir().unwrap();
+    let child = begin_in_real_time(folder.path());
+    assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
+    let output = child.wait_with_output().unwrap();
+    assert_not_there(&output, "interrupted by the user");
+    let summary = read_summary(folder.path());
+    assert_eq!(summary.outcome, Outcome::Stopped);
+    assert!(summary.duration_s < 59.0, "{} s", summary.duration_s);
+    assert_eq!(n_recorded(folder.path()) as u64, summary.cycles);
+    assert!(folder.path().join("drive.png").is_file());
+}
