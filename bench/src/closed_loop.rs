@@ -7,6 +7,7 @@ use std::time::Instant;
 
 use bicycle::{Decision, Model, Vehicle};
 use navigator::{Belief, Config, Navigator, NavigatorError, RiskOracle, Setup, Surface};
+use rayon::prelude::*;
 use scenarios::{Episode, EpisodeConfig, EpisodeError, Task, Traversability, Truth, TruthField, World};
 use serde::{Deserialize, Serialize};
 use terrain::{Cell, GridGeometry, GridMap, SurfaceCell};
@@ -132,23 +133,47 @@ impl ClosedLoop {
     }
 }
 
-/// The plant's true traversability as risk: no distribution, hence the same at every CVaR level.
+/// Yaws that the truth is asked for within one yaw bin.
+const YAWS_PER_BIN: usize = 3;
+
+/// The plant's true traversability as risk: no distribution, hence the same at every CVaR level. A cell and a yaw bin
+/// stand for every pose in them, so their risk is the worst that is true within the bin and half a cell around.
 fn truth(vehicle: &Vehicle, world: &Arc<World>, config: &Config) -> RiskOracle {
     let truth = Truth::new(vehicle, Arc::clone(world));
-    let field = TruthField::new(truth, config.risk_resolution_m(), config.risk_map.n_yaws);
-    let field = Mutex::new(field);
+    let n_yaws = YAWS_PER_BIN * config.risk_map.n_yaws;
+    let field = Mutex::new(TruthField::new(truth, config.risk_resolution_m(), n_yaws));
     Arc::new(move |window, n_yaws, risks| {
         // A field that was poisoned by a panic elsewhere is still a cache of true values.
         let mut field = field.lock().unwrap_or_else(PoisonError::into_inner);
-        field.prepare(window);
-        for (index, risks) in risks.chunks_mut(n_yaws).enumerate() {
+        let around = GridGeometry {
+            origin: window.origin.map(|index| index - 1),
+            n_rows: window.n_rows + 2,
+            n_cols: window.n_cols + 2,
+            ..*window
+        };
+        field.prepare(&around);
+        let field = &*field;
+        risks.par_chunks_mut(n_yaws).enumerate().for_each(|(index, risks)| {
             let Cell { row, col } = window.cell(index);
-            let place = [window.origin[0] + col as i64, window.origin[1] + row as i64];
-            if let Some(there) = field.at(place) {
-                risks.iter_mut().zip(there).for_each(|(risk, there)| *risk = risk_of(there));
+            let [x, y] = [window.origin[0] + col as i64, window.origin[1] + row as i64];
+            risks.fill(Risk::NONE);
+            for place in [[x, y], [x - 1, y], [x + 1, y], [x, y - 1], [x, y + 1]] {
+                let there = field.at(place).unwrap_or_default().chunks(YAWS_PER_BIN);
+                for (risk, there) in risks.iter_mut().zip(there) {
+                    *risk = there.iter().fold(*risk, |risk, there| worse(risk, risk_of(there)));
+                }
             }
-        }
+        });
     })
+}
+
+fn worse(one: Risk, other: Risk) -> Risk {
+    Risk {
+        linear_traction: one.linear_traction.min(other.linear_traction),
+        angular_traction: one.angular_traction.min(other.angular_traction),
+        roll_rad: one.roll_rad.max(other.roll_rad),
+        pitch_rad: one.pitch_rad.max(other.pitch_rad),
+    }
 }
 
 fn risk_of(there: &Traversability) -> Risk {
