@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
 use std::path::Path;
-use std::process::{Child, Command, Output, Stdio};
+use std::process::{Command, Output, Stdio};
 use std::time::Duration;
 
 use bicycle::Column;
@@ -136,27 +136,24 @@ fn measured_ground_is_driven_between_ends_that_the_seed_picks() {
     assert!(distance_m > 20.0, "start and goal {distance_m} m apart");
 }
 
-/// A drive at the pace of the clock that is under way.
-fn begin_in_real_time(out: &Path) -> Child {
-    let words = ["--pace", "real", "--seed", "3", "--time-limit", "60"];
-    let mut child = drive(out, &words).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
-    // The recording grows by chunks: once one is on the disk, cycles are being driven.
-    for _ in 0..600 {
-        if std::fs::metadata(out.join("drive.mcap")).is_ok_and(|file| file.len() > 10_000) {
-            return child;
-        }
+/// Waits until the recording has begun to grow; it does so by chunks, so that cycles are being driven by then.
+fn wait_for_recording(out: &Path) -> bool {
+    (0..600).any(|_| {
         std::thread::sleep(Duration::from_millis(50));
-    }
-    child.kill().unwrap();
-    panic!("no recording after 30 s");
+        std::fs::metadata(out.join("drive.mcap")).is_ok_and(|file| file.len() > 10_000)
+    })
 }
 
 #[test]
 fn interrupt_ends_the_drive_in_order() {
     let folder = tempfile::tempdir().unwrap();
-    let child = begin_in_real_time(folder.path());
-    assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
+    let words = ["--pace", "real", "--seed", "3", "--time-limit", "60"];
+    let mut command = drive(folder.path(), &words);
+    let child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    let is_recording = wait_for_recording(folder.path());
+    let killed = Command::new("kill").args(["-INT", &child.id().to_string()]).status();
     let output = child.wait_with_output().unwrap();
+    assert!(is_recording && killed.unwrap().success(), "no recording after 30 s");
     assert_not_there(&output, "interrupted by the user");
     let summary = read_summary(folder.path());
     assert_eq!(summary.outcome, Outcome::Stopped);
