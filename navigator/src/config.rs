@@ -24,6 +24,9 @@ pub struct Config {
     pub controller: mppi::Config,
     /// What may enter.
     pub guard: GuardConfig,
+    /// Share of the limits of roll and pitch that a plan may use, in (0, 1]; the rest is for what no map shows:
+    /// rocking, sinking springs, the edge of a rock between two cells.
+    pub attitude_share: f64,
 }
 
 /// Window of the risk map; its cells are whole multiples of the elevation map's.
@@ -76,6 +79,7 @@ impl Config {
             cost_to_go: CostToGoConfig::default(),
             controller,
             guard: GuardConfig::default(),
+            attitude_share: 0.9,
         }
     }
 
@@ -86,18 +90,16 @@ impl Config {
 
     /// The first field of this crate's own that is out of range: name, what would do, value.
     pub(crate) fn first_invalid(&self) -> Option<(&'static str, &'static str, f64)> {
-        let counts = [
-            ("risk_map.elevation_cells", self.risk_map.elevation_cells, 1),
-            ("risk_map.n_rows", self.risk_map.n_rows, 3),
-            ("risk_map.n_cols", self.risk_map.n_cols, 3),
-            ("risk_map.n_yaws", self.risk_map.n_yaws, 1),
-        ];
-        let too_few = counts.into_iter().find(|(_, found, least)| found < least);
+        let at_least = |field, found: usize, least: usize, expected| {
+            (found < least).then_some((field, expected, found as f64))
+        };
+        let share = self.attitude_share;
         let recentre_m = self.risk_map.recentre_m;
-        too_few
-            .map(|(field, found, least)| {
-                (field, if least == 1 { "at least 1" } else { "at least 3" }, found as f64)
-            })
+        at_least("risk_map.elevation_cells", self.risk_map.elevation_cells, 1, "at least 1")
+            .or(at_least("risk_map.n_rows", self.risk_map.n_rows, 3, "at least 3"))
+            .or(at_least("risk_map.n_cols", self.risk_map.n_cols, 3, "at least 3"))
+            .or(at_least("risk_map.n_yaws", self.risk_map.n_yaws, 1, "at least 1"))
+            .or((!(share > 0.0 && share <= 1.0)).then_some(("attitude_share", "a number in (0, 1]", share)))
             .or((!(recentre_m.is_finite() && recentre_m > 0.0)).then_some((
                 "risk_map.recentre_m",
                 "a finite number > 0",

@@ -99,6 +99,9 @@ impl Navigator {
             return Err(NavigatorError::Config { field, expected, found });
         }
         let window = config.risk_map;
+        let mut model = model;
+        model.limits.roll_max_rad *= config.attitude_share;
+        model.limits.pitch_max_rad *= config.attitude_share;
         Ok(Self {
             guard: Guard::new(config.guard),
             elevation: ElevationMap::new(config.elevation)?,
