@@ -253,7 +253,8 @@ mod tests {
     fn sleeping_threads_wake_up_for_work() {
         let mut workers = Workers::new(4, 8).unwrap();
         for _ in 0..3 {
-            std::thread::sleep(std::time::Duration::from_millis(5));
+            // Long enough for idle threads to give up spinning.
+            (0..5_000_000).for_each(|_| std::hint::spin_loop());
             let mut items = [0u64; 8];
             workers.run(&mut items, |_, item| *item = 1);
             assert_eq!(items, [1; 8]);
