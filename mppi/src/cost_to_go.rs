@@ -279,7 +279,8 @@ impl CostToGo {
 
     /// Puts the first known times into the queue and decides what the border ring is.
     fn seed(&mut self, goal_m: [f64; 2]) {
-        let inside = self.geometry.cell_at(goal_m[0], goal_m[1]).filter(|&cell| !self.is_border(cell));
+        let goal = self.geometry.cell_at(goal_m[0], goal_m[1]);
+        let inside = goal.filter(|&cell| !self.is_border(cell));
         let outside_slowness = self.slowness_at(self.config.outside_speed_share);
         let border_slowness = if inside.is_some() { self.forbidden_slowness() } else { outside_slowness };
         for index in 0..self.n_rows * self.n_cols {
@@ -287,7 +288,8 @@ impl CostToGo {
             if self.is_border(cell) {
                 let place = self.padded(cell);
                 self.slowness[place] = [border_slowness; 16];
-                if inside.is_none() && !self.crosses_inside(cell, goal_m) {
+                // From the goal's own cell the line is too short to say where it passes.
+                if inside.is_none() && (goal == Some(cell) || !self.crosses_inside(cell, goal_m)) {
                     let [x_m, y_m] = self.geometry.centre_m(cell);
                     let distance_m = (goal_m[0] - x_m).hypot(goal_m[1] - y_m);
                     self.improve(place, distance_m as f32 * outside_slowness);

@@ -222,6 +222,26 @@ fn a_goal_due_east_beyond_the_window_adds_the_straight_line_outside() {
 }
 
 #[test]
+fn a_goal_in_the_border_ring_draws_from_everywhere() {
+    // On the inner edge of the ring, in the middle of a ring cell and in a corner, on every side.
+    let geometry = geometry(9, 12);
+    let [west_m, south_m] = geometry.south_west_m();
+    for [x_cells, y_cells] in
+        [[11.0, 4.0], [11.5, 4.5], [1.0 - 1e-9, 4.0], [5.0, 8.0], [5.5, 0.5], [11.5, 8.5]]
+    {
+        let goal_m = [west_m + x_cells * RESOLUTION_M, south_m + y_cells * RESOLUTION_M];
+        let field = field(Neighbourhood::Sixteen, &RiskMap::constant(geometry, 8, Risk::NONE), goal_m);
+        let longest_s = 12f64.hypot(9.0) * RESOLUTION_M * 2.0 / (SPEED_MPS * OUTSIDE_SPEED_SHARE);
+        for seconds in field.view().seconds {
+            assert!(
+                f64::from(*seconds) <= longest_s,
+                "{seconds} s to the goal in cell ({x_cells}, {y_cells})"
+            );
+        }
+    }
+}
+
+#[test]
 fn shut_off_from_a_goal_outside_the_way_leads_around_the_window() {
     // Everything but the west side is walled off behind the ring, the goal lies east.
     let (n_rows, n_cols) = (15, 17);

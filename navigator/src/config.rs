@@ -8,6 +8,9 @@ use terrain::ElevationConfig;
 
 use crate::GuardConfig;
 
+/// Vehicles below this length cannot look over what hides ground from them [m].
+const SMALL_LENGTH_M: f64 = 1.0;
+
 /// Settings of the pipeline. A file gives only what differs from [`Config::for_vehicle`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -47,26 +50,29 @@ pub struct RiskMapConfig {
 
 impl Config {
     /// Settings that fit a vehicle: a window of at most 128 cells a side that holds twice the controller's horizon
-    /// if cells between a ninth and two fifths of the vehicle's width can do that.
+    /// if cells between a ninth and a quarter of the vehicle's width can do that.
     pub fn for_vehicle(vehicle: &Vehicle) -> Self {
-        let controller = mppi::Config::default();
+        let length_m = vehicle.geometry.length_m;
+        let controller = controller(length_m);
         let horizon_s = controller.n_steps as f64 * controller.step_s;
         let horizon_m = vehicle.limits.speed_max_mps * horizon_s;
         // Twice the horizon to either side sees around an obstacle at its end.
         let window_m = (4.0 * horizon_m).max(6.0 * vehicle.geometry.length_m);
-        let (finest_m, coarsest_m) = (vehicle.geometry.width_m / 9.0, vehicle.geometry.width_m / 2.5);
+        let (finest_m, coarsest_m) = (vehicle.geometry.width_m / 9.0, vehicle.geometry.width_m / 4.0);
         let risk_m = round_to_two_digits((window_m / 128.0).clamp(finest_m, coarsest_m));
         let n = ((window_m / risk_m).ceil() as usize).min(128);
         // The ground under a footprint at the border must be inside the elevation window, and so must its drift.
         let margin_m = vehicle.geometry.length_m + 2.0 * risk_m;
         let elevation_n = n + 2 * (margin_m / risk_m).ceil() as usize;
+        let fitting = ElevationConfig::scaled_to(length_m);
         Self {
             elevation: ElevationConfig {
                 resolution_m: risk_m,
                 n_rows: elevation_n,
                 n_cols: elevation_n,
                 recentre_m: 4.0 * risk_m,
-                ..ElevationConfig::default()
+                gap_radius_m: fitting.gap_radius_m.max(gap_cells(length_m) * risk_m),
+                ..fitting
             },
             risk_map: RiskMapConfig {
                 elevation_cells: 1,
@@ -76,7 +82,7 @@ impl Config {
                 recentre_m: 4.0 * risk_m,
             },
             prior: PriorConfig::for_vehicle(&vehicle.geometry),
-            cost_to_go: CostToGoConfig::default(),
+            cost_to_go: cost_to_go(length_m),
             controller,
             guard: GuardConfig::default(),
             attitude_share: 0.9,
@@ -107,6 +113,36 @@ impl Config {
             )))
             .or(self.guard.first_invalid().map(|(field, found)| (field, "a finite number > 0", found)))
     }
+}
+
+/// Cells over which gaps of the elevation map are filled at the least: some lie between the rays whatever the size of
+/// the machine. A small one sees only the tops of plants as tall as itself, and the ground below them far before them.
+fn gap_cells(length_m: f64) -> f64 {
+    if length_m < SMALL_LENGTH_M { 5.0 } else { 2.0 }
+}
+
+/// The defaults; a small machine cannot look over what is as tall as itself, so that unseen ground is likelier more of
+/// what hides it: it counts as slow as the prior's rollouts find it.
+fn cost_to_go(length_m: f64) -> CostToGoConfig {
+    let default = CostToGoConfig::default();
+    let is_small = length_m < SMALL_LENGTH_M;
+    CostToGoConfig {
+        unknown_speed_share: if is_small { 0.25 } else { default.unknown_speed_share },
+        ..default
+    }
+}
+
+/// The controller's defaults with the lengths of the recovery scaled from a vehicle of 3.4 m. Small machines spin
+/// their wheels and measure their place no better than large ones: below a third of that length it ends.
+fn controller(length_m: f64) -> mppi::Config {
+    let default = mppi::Config::default();
+    let scale = (length_m / 3.4).max(1.0 / 3.0);
+    let recovery = mppi::Recovery {
+        progress_m: scale * default.recovery.progress_m,
+        distance_m: scale * default.recovery.distance_m,
+        ..default.recovery
+    };
+    mppi::Config { recovery, ..default }
 }
 
 /// Limits that keep a cell size readable: 0.1944 becomes 0.19.

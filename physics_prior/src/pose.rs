@@ -83,9 +83,13 @@ impl Placed<'_> {
     }
 
     /// Largest height of the ground under the belly above the plane that fits the four wheel contacts best,
-    /// raised by the clearance; not less than 0.
+    /// raised by the clearance; not less than 0. A wheel over unknown ground has no height that a plane could
+    /// rest on: nothing is said of the belly there.
     #[inline(always)]
     fn belly_depth_m(&self, wheels: &[Contact; 4], lengths: &Lengths) -> f32 {
+        if wheels.iter().any(|wheel| wheel.values[Contact::UNKNOWN] > 0.0) {
+            return 0.0;
+        }
         let height_m = |wheel: usize| wheels[wheel].values[Contact::HEIGHT];
         let (front_left_m, rear_left_m, rear_right_m, front_right_m) =
             (height_m(0), height_m(1), height_m(2), height_m(3));

@@ -188,6 +188,18 @@ fn ground_that_reaches_the_belly_takes_the_traction() {
 }
 
 #[test]
+fn a_belly_over_unknown_ground_is_not_judged() {
+    // Level ground 300 m up that ends under the vehicle: invented heights would leave the belly hanging in it.
+    let ground =
+        surface(window(0.1, 80, 80), |x, _| if x < 4.0 { open(300.0) } else { SurfaceCell::UNKNOWN });
+    let map = prior_map(&TRUCK, &sharp(), &ground, 4);
+    for step in 0..20 {
+        let belief = map.belief(2.0 + 0.1 * f64::from(step), 4.0, 0.0).unwrap();
+        assert!(belief.linear.probabilities()[0] < 0.5, "{belief:?}");
+    }
+}
+
+#[test]
 fn beyond_sixty_degrees_everything_lies_in_the_last_bin() {
     let ground = surface(window(0.1, 40, 40), |x, _| open(70f64.to_radians().tan() * x));
     for at in [0.05, 0.4, 1.0] {

@@ -1,9 +1,9 @@
-//! PIETRA's hall (section VI): 9.6 x 8 m of concrete and turf with a skateboard ramp and rows of bushes.
+//! PIETRA's hall (section VI): 9.6 x 8 m of concrete and turf with a skateboard ramp and a bed of bushes.
 //!
 //! South-west corner at the origin, the vehicle drives east. Across the straight way to the goal stand the bushes;
-//! north of them lies the ramp, beyond it crates up to the wall; south of them crates leave a gap at the wall.
-//! So there are three ways: straight through the bushes (7.2 m), over the ramp (about 8.2 m) or around on the
-//! floor (about 10 m).
+//! north of them lies the ramp between two rails, beyond it crates up to the wall; south of them crates leave a gap
+//! at the wall. So there are three ways: straight through the bushes (7.2 m), over the ramp (about 8 m) or around on
+//! the floor (about 10 m).
 
 use terrain::GridGeometry;
 
@@ -22,10 +22,13 @@ const TURF_PILE_M: f32 = 0.01;
 const CRATE_HEIGHT_M: f32 = 0.6;
 
 /// Rectangles [west, south, east, north] in metres.
-const TURF: [f64; 4] = [3.6, 2.6, 6.2, 5.0];
-const BUSH_ROWS: [[f64; 4]; 3] = [[4.3, 2.6, 4.6, 5.0], [4.7, 2.6, 5.0, 5.0], [5.1, 2.6, 5.4, 5.0]];
-const CRATES: [[f64; 4]; 2] = [[4.6, 6.25, 5.1, 8.0], [4.6, 1.15, 5.1, 2.6]];
-const RAMP: [f64; 4] = [3.55, 5.05, 6.15, 6.2];
+const TURF: [f64; 4] = [3.6, 2.6, 6.2, 4.6];
+const BUSHES: [f64; 4] = [4.3, 2.6, 5.4, 4.6];
+const CRATES: [[f64; 4]; 2] = [[4.6, 6.2, 5.1, 8.0], [4.6, 1.15, 5.1, 2.6]];
+const RAMP: [f64; 4] = [3.3, 4.6, 6.5, 6.2];
+/// Boards along the ramp's sides: a step off its middle would tip the car.
+const RAILS: [[f64; 4]; 2] = [[3.3, 4.6, 6.5, 4.66], [3.3, 6.14, 6.5, 6.2]];
+const RAIL_HEIGHT_M: f32 = 0.15;
 
 /// What can be set of the hall.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -41,7 +44,7 @@ pub struct ArenaConfig {
 
 impl Default for ArenaConfig {
     fn default() -> Self {
-        Self { bush_height_m: 0.05, ramp_height_m: 0.26, ramp_slope_length_m: 0.95 }
+        Self { bush_height_m: 0.05, ramp_height_m: 0.2, ramp_slope_length_m: 1.3 }
     }
 }
 
@@ -90,7 +93,10 @@ impl ArenaConfig {
         if CRATES.iter().any(|crate_| within(crate_, x_m, y_m)) {
             return floor.obstructed(CRATE_HEIGHT_M);
         }
-        if self.bush_height_m > 0.0 && BUSH_ROWS.iter().any(|row| within(row, x_m, y_m)) {
+        if RAILS.iter().any(|rail| within(rail, x_m, y_m)) {
+            return floor.obstructed(RAIL_HEIGHT_M);
+        }
+        if self.bush_height_m > 0.0 && within(&BUSHES, x_m, y_m) {
             return Patch::open(Stribeck::GRASS).overgrown(self.bush_height_m as f32);
         }
         if within(&TURF, x_m, y_m) {

@@ -12,6 +12,11 @@ use crate::World;
 use crate::random::RayNoise;
 use crate::skyline::Skyline;
 
+/// Least height of the sensor above the ground [m].
+const MAST_MIN_M: f64 = 0.35;
+/// Vehicles below this length get finer rays [m].
+const SMALL_LENGTH_M: f64 = 1.0;
+
 /// What the sensor can see.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -51,14 +56,17 @@ pub struct RangeSensorError {
 }
 
 impl RangeSensorConfig {
-    /// A sensor that fits the machine: above its middle at 0.55 of its length, seeing seven lengths far.
+    /// A sensor that fits the machine: above its middle at 0.55 of its length, on a small one on a mast of
+    /// 0.35 m, seeing seven lengths far, at least 5 m. What looks far for its height strikes the ground at so flat an
+    /// angle that it takes finer rays to see it.
     pub fn for_vehicle(vehicle: &Vehicle) -> Self {
         let geometry = &vehicle.geometry;
         let length_m = geometry.length_m;
-        let height_m = 0.55 * length_m - geometry.wheel_radius_m;
+        let height_m = (0.55 * length_m).max(MAST_MIN_M) - geometry.wheel_radius_m;
+        let is_small = length_m < SMALL_LENGTH_M;
         Self {
-            n_azimuths: 240,
-            n_beams: 40,
+            n_azimuths: if is_small { 600 } else { 240 },
+            n_beams: if is_small { 96 } else { 40 },
             elevation_rad: [-50.0_f64.to_radians(), 8.0_f64.to_radians()],
             origin_m: [0.5 * geometry.wheelbase_m, 0.0, height_m],
             range_m: [0.1 * length_m, (7.0 * length_m).clamp(5.0, 40.0)],

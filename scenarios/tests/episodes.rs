@@ -210,14 +210,14 @@ fn through(bush_height_m: f64, points_m: &[[f64; 2]]) -> (Outcome, Episode) {
 
 #[test]
 fn the_arena_offers_three_ways_of_which_tall_bushes_close_one() {
-    let ramp = [[2.6, 5.62], [6.9, 5.62]];
+    let ramp = [[2.6, 5.4], [6.9, 5.4]];
     let gap = [[2.8, 2.0], [4.2, 0.6], [5.5, 0.6], [7.0, 2.0]];
     let (low, straight) = through(0.05, &[]);
     assert_eq!(low, Outcome::Goal);
     assert_eq!(through(0.25, &[]).0, Outcome::Stuck);
     let (over, climbed) = through(0.25, &ramp);
     assert_eq!(over, Outcome::Goal);
-    assert!(climbed.largest_pitch_rad() > 0.2, "{}", climbed.largest_pitch_rad());
+    assert!(climbed.largest_pitch_rad() > 0.12, "{}", climbed.largest_pitch_rad());
     let (around, circled) = through(0.25, &gap);
     assert_eq!(around, Outcome::Goal);
     let times_s = [straight.time_s(), climbed.time_s(), circled.time_s()];

@@ -222,24 +222,26 @@ fn a_rock_field_that_cannot_be_is_refused_by_name() {
 fn the_arena_has_a_ramp_bushes_crates_and_a_clear_start_and_goal() {
     let world = arena(&ArenaConfig { bush_height_m: 0.3, ..ArenaConfig::default() }).unwrap();
     assert_eq!(world.bounds().north_east_m.map(|side| (side * 1e6).round() / 1e6), [9.6, 8.0]);
-    // Half way up the slope of 0.95 m to 0.26 m, on top, and half way down.
-    assert!((world.height_m(3.55 + 0.475, 5.6) - 0.13).abs() < 0.004);
-    assert!((world.height_m(4.85, 5.6) - 0.26).abs() < 1e-6);
-    assert!((world.height_m(6.15 - 0.475, 5.6) - 0.13).abs() < 0.004);
-    assert_eq!(world.height_m(4.85, 4.9), 0.0);
+    // Half way up the slope of 1.3 m to 0.2 m, on top, and half way down.
+    assert!((world.height_m(3.3 + 0.65, 5.4) - 0.1).abs() < 0.004);
+    assert!((world.height_m(4.9, 5.4) - 0.2).abs() < 1e-6);
+    assert!((world.height_m(6.5 - 0.65, 5.4) - 0.1).abs() < 0.004);
+    assert_eq!(world.height_m(4.85, 4.5), 0.0);
+    for rail_y_m in [4.63, 6.17] {
+        assert_eq!(world.patch(4.0, rail_y_m).class, TerrainClass::Obstacle);
+    }
     let bush = world.patch(4.45, 4.0);
     assert_eq!((bush.class, bush.vegetation_height_m), (TerrainClass::Vegetation, 0.3));
     assert_eq!(world.patch(4.8, 7.0).class, TerrainClass::Obstacle);
     for (x_m, y_m) in [(ARENA_START[0], ARENA_START[1]), (ARENA_GOAL_M[0], ARENA_GOAL_M[1])] {
         assert_eq!(world.patch(x_m, y_m).class, TerrainClass::Open);
     }
-    // Whoever crosses the middle of the hall meets crates, bushes or the ramp, except in the southern gap of 1.15 m
-    // and in two slots of 5 cm beside the ramp.
+    // Whoever crosses the middle of the hall meets crates, bushes or the ramp, except in the southern gap of 1.15 m.
     let closed = |y_m: f64| {
         let patch = world.patch(4.85, y_m);
-        patch.class != TerrainClass::Open || world.height_m(4.85, y_m) > 0.2
+        patch.class != TerrainClass::Open || world.height_m(4.85, y_m) > 0.19
     };
     let open = (0..800).filter(|k| !closed(f64::from(*k) * 0.01 + 0.005)).count() as f64 * 0.01;
-    assert!((open - 1.25).abs() < 0.06, "{open} m open");
+    assert!((open - 1.15).abs() < 0.03, "{open} m open");
     assert!(arena(&ArenaConfig { bush_height_m: -0.1, ..ArenaConfig::default() }).is_err());
 }
