@@ -14,10 +14,10 @@ use scenarios::{
 use crate::UsageError;
 use crate::arguments::{DriveArguments, WorldSource};
 
-/// Maps up to this side are built whole [m].
-const WHOLE_MAP_M: f64 = 600.0;
+/// Maps up to so many cells a side are built whole.
+const WHOLE_MAP_CELLS: f64 = 3500.0;
 /// What of a larger map is built around its start and goal, beyond the distance between them [m].
-const WINDOW_MARGIN_M: f64 = 40.0;
+const WINDOW_MARGIN_M: f64 = 30.0;
 /// Places of a large map that are searched for a start and a goal.
 const WINDOWS_TRIED: u64 = 8;
 
@@ -80,7 +80,8 @@ fn in_file(arguments: &DriveArguments, vehicle: &Vehicle, path: &Path) -> Result
         goal_m: arguments.goal.map(|goal| [goal.x_m, goal.y_m]),
         distance_m: ROCK_FIELD_DISTANCE_M.min(0.5 * shortest_m),
     };
-    let mut windows = windows(&bounds, &wish, arguments.seed).into_iter().peekable();
+    let whole_m = WHOLE_MAP_CELLS * LayerConfig::for_vehicle(vehicle).resolution_m;
+    let mut windows = windows(&bounds, &wish, (arguments.seed, whole_m)).into_iter().peekable();
     loop {
         let window = windows.next().flatten();
         let config = LayerConfig { window, ..LayerConfig::for_vehicle(vehicle) };
@@ -100,9 +101,9 @@ fn in_file(arguments: &DriveArguments, vehicle: &Vehicle, path: &Path) -> Result
 
 /// The parts of a map to build and look for a pair in, one after the other: all of a small map; of a large one what
 /// lies around the ends that are given, or places by the seed.
-fn windows(map: &Bounds, wish: &PairWish, seed: u64) -> Vec<Option<Bounds>> {
+fn windows(map: &Bounds, wish: &PairWish, (seed, whole_m): (u64, f64)) -> Vec<Option<Bounds>> {
     let side_m = [0, 1].map(|k| map.north_east_m[k] - map.south_west_m[k]);
-    if side_m[0].max(side_m[1]) <= WHOLE_MAP_M {
+    if side_m[0].max(side_m[1]) <= whole_m {
         return vec![None];
     }
     let ends = wish.start.map(|[x_m, y_m, _]| [x_m, y_m]).into_iter().chain(wish.goal_m);
@@ -117,7 +118,8 @@ fn windows(map: &Bounds, wish: &PairWish, seed: u64) -> Vec<Option<Bounds>> {
         }
     };
     if !given.is_empty() {
-        return vec![Some(around(&given, WINDOW_MARGIN_M + wish.distance_m))];
+        let free_m = if given.len() == 2 { 0.0 } else { wish.distance_m };
+        return vec![Some(around(&given, WINDOW_MARGIN_M + free_m))];
     }
     // The fractional parts of multiples of the plastic number's powers spread evenly over a square.
     let place = |try_: u64| {
