@@ -1,12 +1,12 @@
 //! The equations of the prior in closed form, on ground simple enough to compute by hand.
 
-mod common;
+mod surfaces;
 
 use std::f64::consts::TAU;
 
-use common::*;
 use physics_prior::{Assumption, PriorConfig};
 use proptest::prelude::*;
+use surfaces::*;
 use terrain::{GridGeometry, GridMap, SurfaceCell, TerrainClass, height_at};
 use traversability::{Bins, Pmf};
 

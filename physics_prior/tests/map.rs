@@ -1,12 +1,12 @@
 //! The map: every pose, obstacles, holes, partial updates, threads.
 
-mod common;
+mod surfaces;
 
 use std::f64::consts::PI;
 
-use common::*;
 use physics_prior::{Assumption, PriorConfig, PriorConfigError, PriorMap, PriorMapError};
 use proptest::prelude::*;
+use surfaces::*;
 use terrain::{Cell, CellRegion, GridGeometry, GridMap, SurfaceCell, TerrainClass};
 use traversability::{Bins, GroundFlags, Risk};
 
