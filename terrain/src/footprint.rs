@@ -4,7 +4,8 @@ use crate::{Cell, GridGeometry};
 
 /// Places of the wheels. Wheel order everywhere: front left, rear left, rear right, front right
 /// (PIETRA's 1, 2, 3, 4).
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct WheelLayout {
     /// Between the axles [m].
     pub wheelbase_m: f64,

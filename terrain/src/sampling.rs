@@ -77,7 +77,8 @@ pub fn wheel_heights_m<T: Height>(
 }
 
 /// A rectangle of samples that turns with the vehicle: rows go forward, columns go left.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct PatchShape {
     /// Samples along the vehicle.
     pub n_rows: usize,

@@ -9,26 +9,37 @@ use std::sync::LazyLock;
 
 /// Every crate with the internal crates that its product may use, and no others. `cli` calls `bench` to run
 /// `surefoot bench`; `tests` may use all, but has no product: it has dev-dependencies only.
-const MAY_USE: [(&str, &[&str]); 11] = [
+const MAY_USE: [(&str, &[&str]); 12] = [
     ("terrain", &[]),
     ("traversability", &["terrain"]),
     ("bicycle", &[]),
     ("physics_prior", &["terrain", "traversability", "bicycle"]),
     ("mppi", &["traversability", "bicycle"]),
-    ("navigator", &["terrain", "traversability", "bicycle", "physics_prior", "mppi"]),
+    ("evidential", &["terrain", "traversability", "bicycle", "physics_prior"]),
+    ("navigator", &["terrain", "traversability", "bicycle", "physics_prior", "evidential", "mppi"]),
     ("scenarios", &["terrain", "bicycle"]),
     ("formats", &["terrain", "traversability", "bicycle"]),
     ("bench", &LIBRARIES),
     ("cli", &LIBRARIES_AND_BENCH),
     ("tests", &[]),
 ];
-const LIBRARIES: [&str; 8] =
-    ["terrain", "traversability", "bicycle", "physics_prior", "mppi", "navigator", "scenarios", "formats"];
-const LIBRARIES_AND_BENCH: [&str; 9] = [
+const LIBRARIES: [&str; 9] = [
     "terrain",
     "traversability",
     "bicycle",
     "physics_prior",
+    "evidential",
+    "mppi",
+    "navigator",
+    "scenarios",
+    "formats",
+];
+const LIBRARIES_AND_BENCH: [&str; 10] = [
+    "terrain",
+    "traversability",
+    "bicycle",
+    "physics_prior",
+    "evidential",
     "mppi",
     "navigator",
     "scenarios",

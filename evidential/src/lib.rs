@@ -1,0 +1,24 @@
+//! What driving teaches about the ground, and how far that may be trusted.
+//!
+//! # The flow
+//!
+//! 1. A drive log becomes measured traversability: what the vehicle did over what was asked of it, and where that means
+//!    nothing.
+//! 2. [`FeatureLayout`] turns the ground around a pose into numbers; with labels and the physics prior they make a
+//!    [`Dataset`].
+//! 3. Training fits the networks of a [`Method`] to it (PIETRA, equations 9 to 14) and leaves a [`Checkpoint`].
+//! 4. A predictor is the checkpoint made ready for the control computer: the same arithmetic without autograd.
+//! 5. A belief map lays it over a whole surface, fuses it with the physics prior by evidence (equation 11) and keeps
+//!    the CVaR of the posterior as a risk map.
+
+mod architecture;
+mod checkpoint;
+mod dataset;
+mod features;
+mod method;
+
+pub use architecture::Architecture;
+pub use checkpoint::{Checkpoint, DensityRange, Sidecar, Tensor};
+pub use dataset::{Dataset, DatasetOrigin, Example};
+pub use features::{FeatureLayout, Standardisation};
+pub use method::{Method, Prior};
