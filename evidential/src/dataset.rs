@@ -1,9 +1,20 @@
 //! Footprints and what was measured on them.
 
+mod builder;
+mod file;
+
 use serde::{Deserialize, Serialize};
-use traversability::N_BINS;
+use traversability::{Bins, N_BINS, Pmf};
 
 use crate::FeatureLayout;
+pub use builder::{Surveyor, SurveyorError};
+pub use file::DatasetFileError;
+
+/// Names of the four parameters, in their order everywhere.
+pub const PARAMETER_NAMES: [&str; 4] = ["linear traction", "angular traction", "roll", "pitch"];
+
+/// The bins of the four parameters, in the order of [`PARAMETER_NAMES`].
+pub const PARAMETER_BINS: [Bins; 4] = [Bins::TRACTION, Bins::TRACTION, Bins::ATTITUDE, Bins::ATTITUDE];
 
 /// One footprint and what was measured there.
 #[derive(Clone, Debug, PartialEq)]
@@ -45,4 +56,143 @@ pub struct Dataset {
     pub origin: DatasetOrigin,
     /// The examples, drive by drive in time order.
     pub examples: Vec<Example>,
+}
+
+/// Examples that nothing can be learnt from, or that are no examples.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum DatasetError {
+    /// Nothing there.
+    #[error("dataset: expected at least one example, found none")]
+    Empty,
+    /// An example of another layout.
+    #[error("example {example}, features: expected {expected} numbers, found {found}")]
+    Features {
+        /// Which example, from 0.
+        example: usize,
+        /// What the layout says.
+        expected: usize,
+        /// What the example holds.
+        found: usize,
+    },
+    /// A number that is none.
+    #[error("example {example}, {what}: expected a finite number, found {found}")]
+    NonFinite {
+        /// Which example, from 0.
+        example: usize,
+        /// What the number is.
+        what: &'static str,
+        /// The number.
+        found: f64,
+    },
+    /// The prior is no distribution.
+    #[error("example {example}, prior of {parameter}: {problem}")]
+    Prior {
+        /// Which example, from 0.
+        example: usize,
+        /// Of which parameter.
+        parameter: &'static str,
+        /// What is wrong.
+        problem: traversability::PmfError,
+    },
+    /// A drive that the origin does not name.
+    #[error("example {example}, drive: expected a number below {n_drives}, the drives named, found {found}")]
+    Drive {
+        /// Which example, from 0.
+        example: usize,
+        /// Drives that are named.
+        n_drives: usize,
+        /// The drive.
+        found: u32,
+    },
+    /// Nothing was measured of a parameter.
+    #[error("{parameter}: expected measurements in at least two bins, found none that means anything")]
+    NothingMeasured {
+        /// Of which parameter.
+        parameter: &'static str,
+    },
+    /// Everything that was measured of a parameter is the same.
+    #[error("{parameter}: expected measurements in at least two bins, found all {n} in the bin of {value}")]
+    OneClass {
+        /// Of which parameter.
+        parameter: &'static str,
+        /// Measurements.
+        n: usize,
+        /// The bin's value: traction, or an angle [rad].
+        value: f32,
+    },
+}
+
+impl Dataset {
+    /// Refuses what is no dataset: nothing in it, other lengths than the layout's, numbers that are not finite,
+    /// priors that are no distributions, drives without a name.
+    pub fn validate(&self) -> Result<(), DatasetError> {
+        if self.examples.is_empty() {
+            return Err(DatasetError::Empty);
+        }
+        let n_features = self.origin.layout.n_features();
+        let n_drives = self.origin.drives.len();
+        for (index, example) in self.examples.iter().enumerate() {
+            example.validate(index, n_features, n_drives)?;
+        }
+        Ok(())
+    }
+
+    /// Refuses what cannot be learnt from: beyond [`Dataset::validate`], a parameter of which nothing was measured or
+    /// all measurements fall into one bin.
+    pub fn validate_for_training(&self) -> Result<(), DatasetError> {
+        self.validate()?;
+        for (parameter, bins) in PARAMETER_BINS.iter().enumerate() {
+            let name = PARAMETER_NAMES[parameter];
+            let mut seen =
+                self.examples.iter().filter_map(|example| bins.bin_of(example.measured[parameter]));
+            let Some(first) = seen.next() else {
+                return Err(DatasetError::NothingMeasured { parameter: name });
+            };
+            if seen.all(|bin| bin == first) {
+                let (n, value) = (self.n_measured()[parameter], bins.values()[first]);
+                return Err(DatasetError::OneClass { parameter: name, n, value });
+            }
+        }
+        Ok(())
+    }
+
+    /// Examples in which each parameter was measured.
+    pub fn n_measured(&self) -> [usize; 4] {
+        std::array::from_fn(|parameter| {
+            self.examples.iter().filter(|example| !example.measured[parameter].is_nan()).count()
+        })
+    }
+
+    /// Unevenness below which this share of the examples lies [m]; NaN for an empty dataset.
+    pub fn unevenness_quantile_m(&self, share: f64) -> f32 {
+        let mut unevenness_m: Vec<f32> = self.examples.iter().map(|example| example.unevenness_m).collect();
+        unevenness_m.sort_by(f32::total_cmp);
+        let rank = (share.clamp(0.0, 1.0) * unevenness_m.len().saturating_sub(1) as f64).round();
+        unevenness_m.get(rank as usize).copied().unwrap_or(f32::NAN)
+    }
+}
+
+impl Example {
+    fn validate(&self, example: usize, n_features: usize, n_drives: usize) -> Result<(), DatasetError> {
+        if self.features.len() != n_features {
+            let found = self.features.len();
+            return Err(DatasetError::Features { example, expected: n_features, found });
+        }
+        if self.drive as usize >= n_drives {
+            return Err(DatasetError::Drive { example, n_drives, found: self.drive });
+        }
+        let numbers = self.features.iter().map(|value| ("features", f64::from(*value)));
+        let numbers = numbers.chain(self.pose.iter().map(|value| ("pose", *value)));
+        let mut numbers = numbers.chain([("unevenness", f64::from(self.unevenness_m))]);
+        // A measurement may be missing, but not infinite.
+        let infinite = self.measured.iter().find(|value| value.is_infinite());
+        let infinite = infinite.map(|value| ("measured", f64::from(*value)));
+        if let Some((what, found)) = numbers.find(|(_, value)| !value.is_finite()).or(infinite) {
+            return Err(DatasetError::NonFinite { example, what, found });
+        }
+        for (parameter, prior) in PARAMETER_NAMES.into_iter().zip(self.prior) {
+            Pmf::new(prior).map_err(|problem| DatasetError::Prior { example, parameter, problem })?;
+        }
+        Ok(())
+    }
 }

@@ -30,13 +30,15 @@ const COLS: [usize; 2] = [7, 3];
 const ROWS: [usize; 2] = [12, 5];
 
 impl FeatureLayout {
-    /// Patches that cover the body of a vehicle; heights count in wheel radii.
+    /// Patches of square cells that cover the body of a vehicle and are centred on it; heights count in wheel radii.
+    /// All vehicles have the same number of features: a wide one sees a little beyond its bumpers, a long one a little
+    /// beyond its sides.
     pub fn for_vehicle(geometry: &bicycle::Geometry) -> Self {
-        let patch = |n_rows: usize, n_cols: usize| PatchShape {
-            n_rows,
-            n_cols,
-            spacing_m: geometry.length_m / n_rows as f64,
-            rear_m: geometry.rear_overhang_m - 0.5 * geometry.length_m / n_rows as f64,
+        let middle_m = 0.5 * geometry.length_m - geometry.rear_overhang_m;
+        let patch = |n_rows: usize, n_cols: usize| {
+            let spacing_m = (geometry.length_m / n_rows as f64).max(geometry.width_m / n_cols as f64);
+            let rear_m = 0.5 * (n_rows as f64 - 1.0) * spacing_m - middle_m;
+            PatchShape { n_rows, n_cols, spacing_m, rear_m }
         };
         Self {
             wheels: WheelLayout { wheelbase_m: geometry.wheelbase_m, track_m: geometry.track_m },

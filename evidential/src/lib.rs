@@ -15,10 +15,15 @@ mod architecture;
 mod checkpoint;
 mod dataset;
 mod features;
+mod label;
 mod method;
 
 pub use architecture::Architecture;
 pub use checkpoint::{Checkpoint, DensityRange, Sidecar, Tensor};
-pub use dataset::{Dataset, DatasetOrigin, Example};
+pub use dataset::{
+    Dataset, DatasetError, DatasetFileError, DatasetOrigin, Example, PARAMETER_BINS, PARAMETER_NAMES,
+    Surveyor, SurveyorError,
+};
 pub use features::{FeatureLayout, Standardisation};
+pub use label::{Label, LabelConfig, LabelError, Response, Responses, Reversing, estimate_responses, labels};
 pub use method::{Method, Prior};
