@@ -3,7 +3,7 @@
 
 /// Resolution of the risk map over that of the surface, `numerator / denominator`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Ratio {
+pub struct Ratio {
     numerator: i64,
     denominator: i64,
 }
@@ -45,6 +45,11 @@ impl Ratio {
     /// The surface cell that holds the centre of a risk cell, as lattice indices.
     pub fn base(self, risk_index: i64) -> i64 {
         ((2 * risk_index + 1) * self.numerator).div_euclid(2 * self.denominator)
+    }
+
+    /// How many surface cells the base advances over [`Ratio::n_phases`] risk cells.
+    pub fn stride(self) -> i64 {
+        self.numerator
     }
 
     /// The surface cells that a risk cell shares an area with, from the first to one past the last.

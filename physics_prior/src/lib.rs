@@ -31,6 +31,7 @@ mod lengths;
 mod outcomes;
 mod pose;
 mod poses;
+mod prior_field;
 mod prior_map;
 mod stencil;
 mod tails;
@@ -38,4 +39,6 @@ mod triangle;
 
 pub use belief::PriorBelief;
 pub use config::{PriorConfig, PriorConfigError};
+pub use lattice::Ratio;
+pub use prior_field::{PosePrior, PriorField};
 pub use prior_map::{Assumption, PriorMap, PriorMapError};

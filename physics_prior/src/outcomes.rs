@@ -82,10 +82,16 @@ impl Equations {
         }
     }
 
+    /// Whether too little of a footprint is known.
+    #[inline(always)]
+    pub fn is_unknown(&self, pose: &PoseGround) -> bool {
+        pose.unknown_share > self.unknown_share_max
+    }
+
     /// What may happen at a pose. A footprint of which too little is known counts as unknown under every wheel.
     #[inline(always)]
     pub fn outcomes(&self, pose: &PoseGround) -> Outcomes {
-        let all_unknown = pose.unknown_share > self.unknown_share_max;
+        let all_unknown = self.is_unknown(pose);
         let freedom = (1.0 - pose.belly_depth_m * self.per_belly_depth_m).max(0.0);
         let per_wheel = 0.25 * (1.0 - self.uniform_weight);
         let mut outcomes = Outcomes { unknown: self.unknown_traction * freedom, ..Outcomes::NONE };

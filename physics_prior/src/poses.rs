@@ -8,6 +8,7 @@ use crate::lattice::Ratio;
 use crate::lengths::Lengths;
 use crate::outcomes::Equations;
 use crate::pose::Placed;
+use crate::prior_field::PosePrior;
 use crate::stencil::{Reach, Stencil};
 use crate::tails::{Tails, distribution};
 
@@ -70,13 +71,40 @@ impl Poses {
         base + self.reach.min[axis] <= max && base + self.reach.max[axis] >= min
     }
 
+    /// How the risk cells lie on those of the surface.
+    pub fn ratio(&self) -> Ratio {
+        self.ratio
+    }
+
     /// Risks of one risk cell for every yaw bin.
     pub fn risks(&self, cell: [i64; 2], risks: &mut [Risk]) {
-        let base = cell.map(|index| self.ratio.base(index));
+        let (stencils, base) = self.stencils_of(cell);
+        pulp::Arch::new().dispatch(Yaws { poses: self, stencils, base, risks });
+    }
+
+    /// What the prior says of one risk cell for every yaw bin; nothing for the nominal judgement.
+    pub fn pose_priors(&self, cell: [i64; 2], priors: &mut [PosePrior]) {
+        if let Judgement::Physics(physics) = &self.judgement {
+            let (stencils, base) = self.stencils_of(cell);
+            pulp::Arch::new().dispatch(YawPriors { poses: self, physics, stencils, base, priors });
+        }
+    }
+
+    fn stencils_of(&self, cell: [i64; 2]) -> (&[Stencil], [i64; 2]) {
         let [col_phase, row_phase] = cell.map(|index| self.ratio.phase_index(index));
         let first = (row_phase * self.ratio.n_phases() + col_phase) * self.n_yaws;
-        let stencils = &self.stencils[first..first + self.n_yaws];
-        pulp::Arch::new().dispatch(Yaws { poses: self, stencils, base, risks });
+        (&self.stencils[first..first + self.n_yaws], cell.map(|index| self.ratio.base(index)))
+    }
+
+    #[inline(always)]
+    fn pose_prior(&self, physics: &Physics, placed: &Placed) -> PosePrior {
+        let counts = placed.counts();
+        let pose = placed.pose_ground(counts, &self.lengths);
+        PosePrior {
+            moments: physics.tails.moments(&physics.equations.outcomes(&pose)),
+            is_blocked: counts.obstacles > 0,
+            is_unknown: physics.equations.is_unknown(&pose),
+        }
     }
 
     #[inline(always)]
@@ -148,6 +176,27 @@ impl pulp::WithSimd for Yaws<'_> {
         let (poses, base) = (self.poses, self.base);
         for (stencil, risk) in self.stencils.iter().zip(self.risks) {
             *risk = poses.risk(&Placed { ground: &poses.ground, stencil, base });
+        }
+    }
+}
+
+/// The same for what the prior says of these poses.
+struct YawPriors<'a> {
+    poses: &'a Poses,
+    physics: &'a Physics,
+    stencils: &'a [Stencil],
+    base: [i64; 2],
+    priors: &'a mut [PosePrior],
+}
+
+impl pulp::WithSimd for YawPriors<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: pulp::Simd>(self, _: S) {
+        let (poses, base) = (self.poses, self.base);
+        for (stencil, prior) in self.stencils.iter().zip(self.priors) {
+            *prior = poses.pose_prior(self.physics, &Placed { ground: &poses.ground, stencil, base });
         }
     }
 }

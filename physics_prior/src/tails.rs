@@ -1,6 +1,6 @@
 //! From outcomes to the distribution over bins, and straight to its CVaR.
 
-use traversability::{Bins, CvarLevel, N_BINS, PmfQuad, Risk};
+use traversability::{Bins, CvarLevel, N_BINS, PartialMoments, PmfQuad, Risk};
 
 use crate::outcomes::{Equations, Outcomes};
 use crate::triangle::{Excess, VALUES, probabilities};
@@ -16,21 +16,25 @@ pub(crate) struct Tails {
     per_level: f32,
     /// Of traction: value less what the uniform share costs.
     traction: [f32; N_BINS],
+    /// Of traction: shortfall of the uniform share.
+    uniform_shortfall: [f32; N_BINS],
     /// Expected excess of the angles of unknown ground.
     unknown_excess: Excess,
 }
 
-/// Below this the tail is one outcome whatever the level, and f32 would overflow.
-const LEVEL_MIN: f32 = 1e-20;
-
 impl Tails {
     pub fn new(equations: &Equations, level: CvarLevel) -> Self {
-        let per_level = 1.0 / (level.get() as f32).max(LEVEL_MIN);
+        let per_level = level.reciprocal();
         let unknown_excess = unknown_excess(equations);
         let share = equations.uniform_weight / N_BINS as f32;
         let values = Bins::TRACTION.values();
         let shortfall = |t: f32| values.iter().map(|value| (t - value).max(0.0)).sum::<f32>();
-        Self { per_level, traction: values.map(|t| t - per_level * share * shortfall(t)), unknown_excess }
+        Self {
+            per_level,
+            traction: values.map(|t| t - per_level * share * shortfall(t)),
+            uniform_shortfall: values.map(|t| share * shortfall(t)),
+            unknown_excess,
+        }
     }
 
     /// CVaR of every parameter from its bad end (equation 6).
@@ -44,35 +48,31 @@ impl Tails {
         }
     }
 
+    /// Partial moments of every parameter, which do not depend on the level.
+    #[inline(always)]
+    pub fn moments(&self, outcomes: &Outcomes) -> PartialMoments {
+        let shortfalls = |dirt: &[f32; 4]| {
+            let mut shortfalls = self.uniform_shortfall;
+            add_shortfalls(&mut shortfalls, outcomes, dirt, 1.0);
+            shortfalls
+        };
+        let excesses_rad = |axis: usize| {
+            let excess = excess(outcomes, axis, &self.unknown_excess);
+            excess.map(|above| (above - excess[N_BINS - 1]) * Bins::ATTITUDE_WIDTH_RAD)
+        };
+        let [linear, angular] = [shortfalls(&outcomes.dirt[0]), shortfalls(&outcomes.dirt[1])];
+        PartialMoments { moments: [linear, angular, excesses_rad(0), excesses_rad(1)] }
+    }
+
     #[inline(always)]
     fn traction(&self, outcomes: &Outcomes, dirt: &[f32; 4]) -> f32 {
         let mut tails = self.traction;
-        for wheel in 0..4 {
-            self.take(&mut tails, dirt[wheel], outcomes.dirt_probability[wheel]);
-        }
-        let vegetation_shares = &outcomes.vegetation_probability;
-        if vegetation_shares.iter().any(|&share| share > 0.0) {
-            for wheel in 0..4 {
-                self.take(&mut tails, outcomes.vegetation[wheel], vegetation_shares[wheel]);
-            }
-        }
-        if outcomes.unknown_probability > 0.0 {
-            self.take(&mut tails, outcomes.unknown, outcomes.unknown_probability);
-        }
+        add_shortfalls(&mut tails, outcomes, dirt, -self.per_level);
         let mut best = f32::NEG_INFINITY;
         for tail in tails {
             best = if tail > best { tail } else { best };
         }
         best
-    }
-
-    /// Takes the expected shortfall of one outcome off.
-    #[inline(always)]
-    fn take(&self, tails: &mut [f32; N_BINS], traction: f32, probability: f32) {
-        let cost = self.per_level * probability;
-        for k in 0..N_BINS {
-            tails[k] -= cost * (Bins::TRACTION.values()[k] - traction).max(0.0);
-        }
     }
 
     #[inline(always)]
@@ -86,6 +86,30 @@ impl Tails {
             best = if tail < best { tail } else { best };
         }
         best * Bins::ATTITUDE_WIDTH_RAD
+    }
+}
+
+/// Adds the expected shortfall of all outcomes of traction at every bin value, times `weight`.
+#[inline(always)]
+fn add_shortfalls(sums: &mut [f32; N_BINS], outcomes: &Outcomes, dirt: &[f32; 4], weight: f32) {
+    for wheel in 0..4 {
+        add_shortfall(sums, dirt[wheel], weight * outcomes.dirt_probability[wheel]);
+    }
+    let vegetation_shares = &outcomes.vegetation_probability;
+    if vegetation_shares.iter().any(|&share| share > 0.0) {
+        for wheel in 0..4 {
+            add_shortfall(sums, outcomes.vegetation[wheel], weight * vegetation_shares[wheel]);
+        }
+    }
+    if outcomes.unknown_probability > 0.0 {
+        add_shortfall(sums, outcomes.unknown, weight * outcomes.unknown_probability);
+    }
+}
+
+#[inline(always)]
+fn add_shortfall(sums: &mut [f32; N_BINS], traction: f32, weight: f32) {
+    for k in 0..N_BINS {
+        sums[k] += weight * (Bins::TRACTION.values()[k] - traction).max(0.0);
     }
 }
 

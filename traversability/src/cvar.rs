@@ -32,6 +32,12 @@ impl CvarLevel {
     pub fn get(self) -> f64 {
         self.0
     }
+
+    /// One over the level, bounded so that f32 does not overflow: below 1e-20 the tail is one outcome whatever the
+    /// level.
+    pub fn reciprocal(self) -> f32 {
+        1.0 / (self.0 as f32).max(1e-20)
+    }
 }
 
 impl TryFrom<f64> for CvarLevel {

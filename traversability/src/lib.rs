@@ -8,6 +8,7 @@
 mod bins;
 mod cvar;
 mod parameters;
+mod partial_moments;
 mod pmf;
 mod quad;
 mod risk_map;
@@ -15,6 +16,7 @@ mod risk_map;
 pub use bins::{Bins, N_BINS};
 pub use cvar::{CvarLevel, CvarLevelError, lower_tail_cvar, upper_tail_cvar};
 pub use parameters::{Attitude, Traction, Traversability};
+pub use partial_moments::PartialMoments;
 pub use pmf::{Pmf, PmfError};
 pub use quad::PmfQuad;
 pub use risk_map::{Ground, GroundFlags, Risk, RiskMap, RiskMapView};
