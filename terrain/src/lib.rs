@@ -50,6 +50,7 @@
 mod elevation;
 mod footprint;
 mod grid;
+mod ground_filter;
 mod observation;
 mod plane;
 mod region;
@@ -62,6 +63,7 @@ pub use elevation::{
 };
 pub use footprint::{Footprint, WheelLayout, YawFootprint};
 pub use grid::{Cell, GridGeometry, GridMap};
+pub use ground_filter::{FilteredGround, GroundFilter, GroundFilterError, filter_ground, height_step_m};
 pub use observation::{Pose, RangePoint, Scan, TerrainClass};
 pub use region::CellRegion;
 pub use sampling::{PatchSample, PatchShape, bilinear_height, envelope_height, height_at, wheel_heights_m};

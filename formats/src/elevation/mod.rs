@@ -9,11 +9,10 @@ use std::path::Path;
 use terrain::{GridGeometry, GridMap};
 
 use crate::ConfigError;
+use crate::numpy::{ELEMENTS_MAX as CELLS_MAX, check_cell};
+use crate::refusal::Refusal;
 
 pub use png::PngScale;
-
-/// Most cells that a file may hold: 8192 x 8192, 256 MB of heights.
-const CELLS_MAX: usize = 1 << 26;
 
 /// Measured ground as a file holds it. The map frame's origin is the grid's south-west corner, x east, y north.
 #[derive(Clone, Debug)]
@@ -107,19 +106,7 @@ fn open_and(
     read(file).map_err(|refusal| refusal.of(path))
 }
 
-/// What is wrong with a file, before its name is known.
-#[derive(Debug)]
-struct Refusal {
-    field: String,
-    expected: String,
-    found: String,
-}
-
 impl Refusal {
-    fn new(field: impl ToString, expected: impl ToString, found: impl ToString) -> Self {
-        Self { field: field.to_string(), expected: expected.to_string(), found: found.to_string() }
-    }
-
     fn of(self, path: &Path) -> ElevationError {
         let Self { field, expected, found } = self;
         ElevationError::Field { file: path.display().to_string(), field, expected, found }
@@ -131,11 +118,6 @@ fn check_shape(field: &str, n_rows: usize, n_cols: usize) -> Result<(), Refusal>
     let fits = n_rows >= 2 && n_cols >= 2 && n_rows.checked_mul(n_cols).is_some_and(|n| n <= CELLS_MAX);
     let expected = || format!("2 x 2 to {CELLS_MAX} cells");
     if fits { Ok(()) } else { Err(Refusal::new(field, expected(), format!("{n_rows} x {n_cols}"))) }
-}
-
-fn check_cell(field: &str, cell_m: f64) -> Result<(), Refusal> {
-    let ok = cell_m.is_finite() && cell_m > 0.0;
-    if ok { Ok(()) } else { Err(Refusal::new(field, "a finite number of metres > 0", cell_m)) }
 }
 
 /// Builds the result from rows that start in the south; NaN is a hole, infinity is refused.
