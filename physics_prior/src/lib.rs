@@ -33,6 +33,7 @@ mod pose;
 mod poses;
 mod prior_field;
 mod prior_map;
+mod skid_steer;
 mod stencil;
 mod tails;
 mod triangle;
@@ -41,4 +42,7 @@ pub use belief::PriorBelief;
 pub use config::{PriorConfig, PriorConfigError};
 pub use lattice::Ratio;
 pub use prior_field::{PosePrior, PriorField};
+pub use skid_steer::{
+    ANGULAR, COMPENSATION, LINEAR, Quantiles, SkidSteerBelief, SkidSteerGround, SkidSteerPrior,
+};
 pub use prior_map::{Assumption, PriorMap, PriorMapError};
