@@ -8,6 +8,7 @@ pub mod navigation;
 pub mod prior_map;
 mod spread;
 mod stopwatch;
+pub mod traction_map;
 
 pub use error::BenchError;
 pub use spread::Spread;
