@@ -2,6 +2,7 @@
 //! of the physics prior. Both are measured through the interface that a drive uses.
 
 pub mod closed_loop;
+pub mod collection;
 pub mod control;
 mod error;
 pub mod navigation;

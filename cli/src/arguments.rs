@@ -1,14 +1,16 @@
 //! The command line: what can be asked, in which units, and what each word must look like.
 
 mod bench;
+mod collect;
 mod drive;
 mod values;
 
 use clap::{Parser, Subcommand};
 
 pub use bench::{
-    BenchCommand, BenchControlArguments, BenchNavigationArguments, BenchPriorMapArguments, BenchWork,
+    BenchCommand, BenchControlArguments, BenchLearningArguments, BenchNavigationArguments, BenchPriorMapArguments, BenchWork,
 };
+pub use collect::{CollectArguments, CollectMap, CollectSplit, CollectWorld};
 pub use drive::{DriveArguments, InstructionSet, MapSource, Method, Pace};
 pub use values::{Goal, StartPose, WorldSource};
 
@@ -35,6 +37,9 @@ pub enum Command {
     /// Drive a simulated vehicle over rough ground to a goal
     #[command(long_about = drive::LONG_ABOUT)]
     Drive(Box<DriveArguments>),
+    /// Gather data to learn from, by simulated drives or from a recorded one
+    #[command(long_about = collect::LONG_ABOUT)]
+    Collect(Box<CollectArguments>),
     /// Measure how fast the controller and the risk map are, and how often drives reach their goal
     Bench {
         /// What to measure.
@@ -55,6 +60,7 @@ Examples:
   surefoot drive                        40 m over a generated rock field, nothing else needed
   surefoot drive --world arena          an RC car in a hall with a ramp and bushes
   surefoot drive --help                 every option, with its unit and default
+  surefoot collect                      data to learn from, out of 200 simulated trials
   surefoot bench control --threads 2    milliseconds of one control update
 
 Units are SI: metres, seconds, radians. x points east, y north; yaw is counter-clockwise from east.

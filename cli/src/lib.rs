@@ -5,6 +5,7 @@
 
 pub mod arguments;
 mod bench;
+mod collect;
 mod drive;
 mod failure;
 pub mod interrupt;
@@ -40,8 +41,10 @@ pub fn run() -> ExitCode {
 fn dispatch(command: Command) -> anyhow::Result<()> {
     match command {
         Command::Drive(drive) => drive::run(&drive),
+        Command::Collect(collect) => collect::run(&collect),
         Command::Bench { command: BenchCommand::Control(control) } => bench::run_control(&control),
         Command::Bench { command: BenchCommand::PriorMap(prior_map) } => bench::run_prior_map(&prior_map),
+        Command::Bench { command: BenchCommand::Learning(learning) } => bench::run_learning(&learning),
         Command::Bench { command: BenchCommand::Navigation(navigation) } => {
             bench::run_navigation(&navigation)
         }

@@ -117,6 +117,21 @@ pub(super) fn seed_count(word: &str) -> Result<u64, String> {
     count(word, 1000, "seeds").map(|n| n as u64)
 }
 
+/// A number of worlds.
+pub(super) fn map_count(word: &str) -> Result<u32, String> {
+    count(word, 1000, "maps").map(|n| n as u32)
+}
+
+/// A number of trials.
+pub(super) fn trial_count(word: &str) -> Result<u32, String> {
+    count(word, 1000, "trials").map(|n| n as u32)
+}
+
+/// A factor on heights.
+pub(super) fn height_scale(word: &str) -> Result<f64, String> {
+    number_where(word, "a factor from 0.1 to 10", |value| (0.1..=10.0).contains(&value))
+}
+
 fn count(word: &str, most: usize, of: &str) -> Result<usize, String> {
     word.trim()
         .parse()

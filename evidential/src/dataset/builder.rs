@@ -1,7 +1,7 @@
 //! From labels on a surface to examples.
 
 use bicycle::Geometry;
-use physics_prior::{Assumption, PriorConfig, PriorMap, PriorMapError};
+use physics_prior::{Assumption, PriorConfig, PriorField, PriorMapError};
 use terrain::{
     Footprint, GridGeometry, GridMap, SurfaceCell, WheelLayout, YawFootprint, footprint_unevenness,
 };
@@ -16,12 +16,14 @@ pub struct Surveyor {
     layout: FeatureLayout,
     wheels: WheelLayout,
     body: Footprint,
-    prior: PriorMap,
+    prior: PriorField,
 }
 
 /// Why the ground cannot be looked at.
 pub type SurveyorError = PriorMapError;
 
+/// Yaws that decide how far around it the ground is read.
+const N_YAWS: usize = 16;
 /// Side of the window in which the prior is asked [cells]; odd, so that a pose can be in its middle.
 const WINDOW_CELLS: usize = 3;
 
@@ -47,7 +49,7 @@ impl Surveyor {
                 rear_m: geometry.rear_overhang_m,
                 half_width_m: 0.5 * geometry.width_m,
             },
-            prior: PriorMap::new(geometry, &assumption, resolution_m, window, 1)?,
+            prior: PriorField::new(geometry, &assumption, resolution_m, window, N_YAWS)?,
         })
     }
 
@@ -65,19 +67,25 @@ impl Surveyor {
         let [x_m, y_m, yaw_rad] = label.pose;
         let geometry = surface.geometry();
         let Some(cell) = geometry.cell_at(x_m, y_m) else { return Ok(None) };
-        let turned = YawFootprint::new(&self.wheels, &self.body, geometry.resolution_m, yaw_rad);
-        let unevenness_m = footprint_unevenness(surface, cell, &turned);
-        if !turned.is_inside(cell, geometry) || unevenness_m.is_nan() {
-            return Ok(None);
-        }
+        let Some(unevenness_m) = self.unevenness_m(surface, label.pose) else { return Ok(None) };
         let Some(features) = self.layout.features(surface, label.pose) else { return Ok(None) };
         let half = WINDOW_CELLS as i64 / 2;
         let middle = [cell.col as i64 + geometry.origin[0], cell.row as i64 + geometry.origin[1]];
         self.prior.place_at(middle.map(|index| index - half));
-        self.prior.update_all(surface)?;
+        self.prior.read_all(surface)?;
         let Some(belief) = self.prior.belief(x_m, y_m, yaw_rad) else { return Ok(None) };
         let prior = [belief.linear, belief.angular, belief.roll, belief.pitch];
         let prior = prior.map(|pmf| *pmf.probabilities());
         Ok(Some(Example { features, measured: label.measured, prior, unevenness_m, drive, pose: label.pose }))
+    }
+
+    /// Standard deviation of elevation under the footprint [m]; `None` where the footprint leaves the surface or less
+    /// than two of its cells are known.
+    pub fn unevenness_m(&self, surface: &GridMap<SurfaceCell>, [x_m, y_m, yaw_rad]: [f64; 3]) -> Option<f32> {
+        let geometry = surface.geometry();
+        let cell = geometry.cell_at(x_m, y_m)?;
+        let turned = YawFootprint::new(&self.wheels, &self.body, geometry.resolution_m, yaw_rad);
+        let unevenness_m = footprint_unevenness(surface, cell, &turned);
+        (turned.is_inside(cell, geometry) && !unevenness_m.is_nan()).then_some(unevenness_m)
     }
 }

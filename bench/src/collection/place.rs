@@ -1,0 +1,81 @@
+//! Where data are gathered.
+
+use std::fmt;
+
+use rand::{RngExt, SeedableRng};
+use rand_xoshiro::Xoshiro256PlusPlus;
+use scenarios::{
+    ArenaConfig, ArenaError, RockFieldConfig, RockFieldError, RockMap, Split, World, arena, rock_field,
+};
+
+/// A family of worlds.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Place {
+    /// PIETRA's rock testbed; map k is the k-th of its split.
+    Rocks {
+        /// What the fields look like.
+        field: RockFieldConfig,
+        /// Which third of the testbed.
+        split: Split,
+    },
+    /// PIETRA's hall, with bushes of another height in every map.
+    Arena {
+        /// Which third of the heights.
+        split: Split,
+    },
+}
+
+/// Why a world cannot be made.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum PlaceError {
+    /// The rock field.
+    #[error(transparent)]
+    Field(#[from] RockFieldError),
+    /// The hall.
+    #[error(transparent)]
+    Arena(#[from] ArenaError),
+}
+
+/// Lowest and highest bushes of the hall [m].
+const BUSH_HEIGHTS_M: [f64; 2] = [0.02, 0.3];
+
+impl Place {
+    /// The world of a number: the same seed, split and number give the same world.
+    pub fn world(&self, seed: u64, index: u32) -> Result<World, PlaceError> {
+        match self {
+            Self::Rocks { field, split } => {
+                Ok(rock_field(field, RockMap { seed, split: *split, index }, &[])?)
+            }
+            Self::Arena { split } => {
+                let key = [0xA12E, *split as u64, u64::from(index)];
+                let bush_height_m = stream(seed, &key).random_range(BUSH_HEIGHTS_M[0]..BUSH_HEIGHTS_M[1]);
+                Ok(arena(&ArenaConfig { bush_height_m, ..ArenaConfig::default() })?)
+            }
+        }
+    }
+}
+
+impl fmt::Display for Place {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Rocks { field, split: Split::Test } => {
+                write!(formatter, "rock fields, Test, heights times {}", field.test_height_scale)
+            }
+            Self::Rocks { split, .. } => write!(formatter, "rock fields, {split:?}"),
+            Self::Arena { split } => write!(formatter, "arena, {split:?}"),
+        }
+    }
+}
+
+/// The generator that belongs to a seed and a key, whatever else was drawn.
+pub(super) fn stream(seed: u64, key: &[u64]) -> Xoshiro256PlusPlus {
+    // The finaliser of SplitMix64: every input bit flips half of the output bits.
+    let mixed = |word: u64| {
+        let word = word.wrapping_add(0x9E37_79B9_7F4A_7C15);
+        let word = (word ^ (word >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        let word = (word ^ (word >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+        word ^ (word >> 31)
+    };
+    let seed = key.iter().fold(mixed(seed), |state, word| mixed(state ^ mixed(*word)));
+    Xoshiro256PlusPlus::seed_from_u64(seed)
+}

@@ -1,0 +1,183 @@
+//! `surefoot collect`.
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+use scenarios::Split;
+
+use super::values;
+
+/// What to gather, and where to put it.
+#[derive(Args, Clone, Debug)]
+#[command(after_long_help = AFTER_HELP)]
+pub struct CollectArguments {
+    /// Worlds to drive in
+    #[arg(long, value_enum, default_value_t = CollectWorld::Rocks, help_heading = "Simulated drives")]
+    pub world: CollectWorld,
+
+    /// Which third of the worlds: to learn from, to choose by, or to report on
+    ///
+    /// No two splits share a world. The rock fields of the test split are higher, see --test-height-scale.
+    #[arg(long, value_enum, default_value_t = CollectSplit::Train, help_heading = "Simulated drives")]
+    pub split: CollectSplit,
+
+    /// Worlds, 1 to 1000
+    #[arg(long, value_name = "N", value_parser = values::map_count, default_value = "10",
+          allow_hyphen_values = true, help_heading = "Simulated drives")]
+    pub maps: u32,
+
+    /// Trials in each world, 1 to 1000
+    #[arg(long, value_name = "N", value_parser = values::trial_count, default_value = "20",
+          allow_hyphen_values = true, help_heading = "Simulated drives")]
+    pub trials: u32,
+
+    /// Give up a trial after this much simulated time [s]
+    #[arg(long, value_name = "SECONDS", value_parser = values::duration_s, default_value = "40",
+          allow_hyphen_values = true, help_heading = "Simulated drives")]
+    pub time_limit: f64,
+
+    /// What the features are taken from
+    #[arg(long, value_enum, default_value_t = CollectMap::Oracle, help_heading = "Simulated drives")]
+    pub map: CollectMap,
+
+    /// What all heights of the test rock fields are multiplied by [default: 2.2]
+    #[arg(long, value_name = "FACTOR", value_parser = values::height_scale, allow_hyphen_values = true,
+          conflicts_with = "harder_than", help_heading = "Simulated drives")]
+    pub test_height_scale: Option<f64>,
+
+    /// Find the height scale at which 91 % of the test footprints are more uneven than the median of this dataset
+    ///
+    /// Drives the test split up to eight times; the scale found is told and written to --json.
+    #[arg(long, value_name = "DATASET", help_heading = "Simulated drives")]
+    pub harder_than: Option<PathBuf>,
+
+    /// A recorded drive instead of simulated ones: .csv or .mcap
+    #[arg(long, value_name = "FILE", requires = "elevation", help_heading = "Recorded drives")]
+    pub log: Option<PathBuf>,
+
+    /// The ground of the recorded drive: .npz, GeoTIFF or 16-bit PNG, in the frame of its poses
+    #[arg(long, value_name = "FILE", requires = "log", help_heading = "Recorded drives")]
+    pub elevation: Option<PathBuf>,
+
+    /// The machine: a name or a TOML file [default: pietra_full_size; rc_car in the arena]
+    #[arg(long, value_name = "NAME|FILE", help_heading = "Run")]
+    pub vehicle: Option<String>,
+
+    /// Number that decides everything random: worlds, starts, steering, the sensors' noise
+    #[arg(long, value_name = "NUMBER", value_parser = values::seed, default_value = "1",
+          allow_hyphen_values = true, help_heading = "Run")]
+    pub seed: u64,
+
+    /// Threads, 1 to 256 [default: the machine's]; the result does not depend on it
+    #[arg(long, value_name = "N", value_parser = values::thread_count, allow_hyphen_values = true,
+          help_heading = "Run")]
+    pub threads: Option<usize>,
+
+    /// The dataset; a picture of it goes beside it, with the ending .png
+    #[arg(
+        long,
+        value_name = "FILE",
+        default_value = "surefoot-out/dataset.safetensors",
+        help_heading = "Output"
+    )]
+    pub out: PathBuf,
+
+    /// Write the summary to this file too
+    #[arg(long, value_name = "FILE", help_heading = "Output")]
+    pub json: Option<PathBuf>,
+}
+
+impl CollectArguments {
+    /// The machine, a shipped name or a path: the one asked for, else the one that fits the world.
+    pub fn vehicle_name_or_path(&self) -> &str {
+        let fitting = match self.world {
+            CollectWorld::Arena => "rc_car",
+            CollectWorld::Rocks => "pietra_full_size",
+        };
+        self.vehicle.as_deref().unwrap_or(fitting)
+    }
+
+    /// Threads: as asked, else as many as the machine runs at once.
+    pub fn n_threads(&self) -> usize {
+        self.threads.unwrap_or_else(values::machine_threads)
+    }
+}
+
+/// Families of worlds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum CollectWorld {
+    /// Generated rock fields of 50 x 50 m
+    Rocks,
+    /// Halls of 9.6 x 8 m with a ramp, and bushes of many heights
+    Arena,
+}
+
+/// Thirds of the worlds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum CollectSplit {
+    /// To learn from
+    Train,
+    /// To choose by
+    Validation,
+    /// To report on
+    Test,
+}
+
+impl From<CollectSplit> for Split {
+    fn from(asked: CollectSplit) -> Self {
+        match asked {
+            CollectSplit::Train => Self::Train,
+            CollectSplit::Validation => Self::Validation,
+            CollectSplit::Test => Self::Test,
+        }
+    }
+}
+
+/// Where features come from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum CollectMap {
+    /// The true surface, at the resolution of the robot's map
+    Oracle,
+    /// The robot's own map as known when it was there
+    Sensed,
+}
+
+pub(super) const LONG_ABOUT: &str = "\
+Gathers data to learn traversability from: what a vehicle did over what was asked of it, and the ground it did it on.
+
+Drives a simulated vehicle over generated ground without a planner: random starts, sinusoidal steering, full speed, \
+until it rolls over, is stuck, leaves the map or time is up. Or takes a recorded drive and the ground it went over. \
+Either way four things are measured: linear traction (speed over commanded speed), angular traction (yaw rate over \
+commanded yaw rate), |roll| and |pitch|, the commands first delayed and smoothed as the machine itself does, which is \
+estimated from the log. What means nothing is masked: angular traction when hardly turning, traction near standstill \
+or while a command is still on its way.";
+
+const AFTER_HELP: &str = "\
+Examples:
+  surefoot collect --out data/train.safetensors
+      20 trials on each of ten rock fields: about 200 000 footprints' worth of driving.
+  surefoot collect --split validation --out data/validation.safetensors
+      The same on ten other fields.
+  surefoot collect --split test --harder-than data/train.safetensors --out data/test.safetensors
+      Higher rocks, so that nine in ten footprints are unlike the training data.
+  surefoot collect --world arena --vehicle rc_car --map sensed --out data/arena.safetensors
+      A small car, and the ground as its own range sensor shows it.
+  surefoot collect --log drive.mcap --elevation ground.npz --vehicle my.toml --out data/mine.safetensors
+      A recorded drive.
+
+Recorded drives:
+  needed columns   t, x, y, yaw, vx, wz, cmd_speed, and cmd_steer or cmd_wz (or
+                   cmd_left and cmd_right instead of all commands)
+  used if there    roll, pitch; run (t restarts per run)
+  the elevation must cover the drive: x, y in its frame (south-west corner = 0, 0)
+
+The dataset (safetensors), for N examples of F features:
+  features [N,F] f32   measured [N,4] f32, NaN = means nothing   prior [N,4,12] f32
+  unevenness [N] f32   drive [N] u32   pose [N,3] f64
+  header entry 'surefoot': JSON with vehicle, layout of the features, physics
+  prior, names of the drives
+
+Exit codes:
+  0  the dataset was written
+  1  it was not; one line on standard error says why
+  2  bad usage or input; one line says what was expected and what was found";

@@ -1,0 +1,131 @@
+//! `surefoot collect`: what was asked, the drives or a recorded one, and the dataset with its summary and picture.
+
+mod summary;
+
+use std::io::IsTerminal;
+use std::path::Path;
+use std::time::Instant;
+
+use bench::closed_loop::MapSource;
+use bench::collection::{
+    Collection, CollectionError, HeightScale, Place, Request, collect, find_height_scale,
+};
+use evidential::Dataset;
+use formats::{read_vehicle, write_bytes_atomic, write_json_atomic};
+use indicatif::{ProgressBar, ProgressStyle};
+use scenarios::{RockFieldConfig, Split};
+
+use crate::arguments::{CollectArguments, CollectMap, CollectWorld};
+use crate::{UsageError, output};
+use summary::CollectSummary;
+
+/// Share of the test footprints that shall be more uneven than half of the training ones, and how exactly.
+const HARDER_SHARE: [f64; 2] = [0.91, 0.005];
+/// Height scales that are driven for it.
+const SCALES_TRIED: usize = 8;
+/// Room that must be free beforehand: the dataset of the papers takes less [bytes].
+const ROOM_BYTES: u64 = 64 << 20;
+
+pub(crate) fn run(arguments: &CollectArguments) -> anyhow::Result<()> {
+    let mut request = request(arguments)?;
+    let folder = arguments.out.parent().filter(|folder| !folder.as_os_str().is_empty());
+    formats::prepare_out_dir(folder.unwrap_or(Path::new(".")), ROOM_BYTES)
+        .map_err(|error| UsageError(format!("--out: {}", UsageError::from_input(error))))?;
+    arguments.json.as_deref().map_or(Ok(()), output::prepare_json)?;
+    let began = Instant::now();
+    let scale = find_scale(arguments, &mut request)?;
+    let bar = bar(u64::from(request.n_maps) * u64::from(request.n_trials));
+    let collected = collect(&request, || bar.inc(1));
+    bar.finish_and_clear();
+    let collection = collected.map_err(told)?;
+    let summary = CollectSummary::of(&collection, scale, began.elapsed().as_secs_f64());
+    write(arguments, &collection, &summary)?;
+    print!("{summary}");
+    println!("  {}", arguments.out.display());
+    Ok(())
+}
+
+fn request(arguments: &CollectArguments) -> Result<Request, UsageError> {
+    let vehicle = read_vehicle(arguments.vehicle_name_or_path()).map_err(UsageError::from_input)?;
+    let split = Split::from(arguments.split);
+    let place = match arguments.world {
+        CollectWorld::Rocks => {
+            let usual = RockFieldConfig::default();
+            let test_height_scale = arguments.test_height_scale.unwrap_or(usual.test_height_scale);
+            Place::Rocks { field: RockFieldConfig { test_height_scale, ..usual }, split }
+        }
+        CollectWorld::Arena => Place::Arena { split },
+    };
+    let is_scaled = matches!(place, Place::Rocks { split: Split::Test, .. });
+    let asked = [
+        ("--test-height-scale", arguments.test_height_scale.is_some()),
+        ("--harder-than", arguments.harder_than.is_some()),
+    ];
+    if let Some((option, _)) = asked.iter().find(|(_, is_given)| *is_given && !is_scaled) {
+        return Err(UsageError(format!(
+            "{option}: expected together with --world rocks --split test, found without it"
+        )));
+    }
+    Ok(Request {
+        n_maps: arguments.maps,
+        n_trials: arguments.trials,
+        time_limit_s: arguments.time_limit,
+        map_source: match arguments.map {
+            CollectMap::Oracle => MapSource::Oracle,
+            CollectMap::Sensed => MapSource::Sensed,
+        },
+        n_threads: arguments.n_threads(),
+        ..Request::new(vehicle, place, arguments.seed)
+    })
+}
+
+/// The height scale that makes the test split as hard as asked, put into the request.
+fn find_scale(arguments: &CollectArguments, request: &mut Request) -> anyhow::Result<Option<HeightScale>> {
+    let Some(path) = &arguments.harder_than else { return Ok(None) };
+    let training = read_dataset(path)?;
+    let found = find_height_scale(&training, request, HARDER_SHARE, SCALES_TRIED).map_err(told)?;
+    if let Place::Rocks { field, .. } = &mut request.place {
+        field.test_height_scale = found.scale;
+    }
+    Ok(Some(found))
+}
+
+fn read_dataset(path: &Path) -> Result<Dataset, UsageError> {
+    let told = |error: &dyn std::fmt::Display| UsageError(format!("{}: {error}", path.display()));
+    let bytes =
+        std::fs::read(path).map_err(|error| told(&format!("expected a readable file, found: {error}")))?;
+    Dataset::from_bytes(&bytes).map_err(|error| told(&error))
+}
+
+/// Counts trials on standard error; draws nothing where that is not a terminal.
+fn bar(n_trials: u64) -> ProgressBar {
+    let bar =
+        if std::io::stderr().is_terminal() { ProgressBar::new(n_trials) } else { ProgressBar::hidden() };
+    // The template is a constant: were it wrong, the plain bar would do.
+    if let Ok(style) =
+        ProgressStyle::with_template("  {bar:28.green/black.bright} {pos}/{len} trials, {eta} left")
+    {
+        bar.set_style(style.progress_chars("━╸━"));
+    }
+    bar
+}
+
+/// Worlds and vehicles that cannot be driven are the user's choice; all else is not.
+fn told(error: CollectionError) -> anyhow::Error {
+    match error {
+        CollectionError::Place(_) | CollectionError::NoStart { .. } | CollectionError::Setting { .. } => {
+            UsageError::from_input(error).into()
+        }
+        other => other.into(),
+    }
+}
+
+fn write(
+    arguments: &CollectArguments,
+    collection: &Collection,
+    summary: &CollectSummary,
+) -> anyhow::Result<()> {
+    write_bytes_atomic(&arguments.out, &collection.dataset.to_bytes()?)?;
+    arguments.json.as_deref().map_or(Ok(()), |path| write_json_atomic(path, summary))?;
+    Ok(())
+}
