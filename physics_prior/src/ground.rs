@@ -127,6 +127,12 @@ impl ContactGround {
         &self.window
     }
 
+    /// Bytes of its arrays.
+    pub fn n_bytes(&self) -> usize {
+        let bumps = self.bumps_m.iter().map(|level| size_of_val(&**level)).sum::<usize>();
+        size_of_val(&*self.contacts) + size_of_val(&*self.rests_m) + size_of_val(&*self.sums) + bumps
+    }
+
     /// Position of a lattice cell, which must lie in the window.
     #[inline(always)]
     pub fn index(&self, lattice: [i64; 2]) -> usize {

@@ -90,6 +90,11 @@ impl PriorField {
         }
     }
 
+    /// Whether the next reading is of the whole surface, whatever part of it changed.
+    pub fn is_outdated(&self, surface: &GridMap<SurfaceCell>) -> bool {
+        self.read_from != Some(*surface.geometry())
+    }
+
     /// Takes over the whole surface; what lies beyond its window is unknown. Returns the cells to judge: all.
     ///
     /// # Errors
@@ -113,7 +118,7 @@ impl PriorField {
         surface: &GridMap<SurfaceCell>,
         changed: &CellRegion,
     ) -> Result<CellRegion, PriorMapError> {
-        if self.read_from != Some(*surface.geometry()) {
+        if self.is_outdated(surface) {
             return self.read_all(surface);
         }
         if changed.n_cells() == 0 {
@@ -151,6 +156,11 @@ impl PriorField {
     pub fn belief(&self, x_m: f64, y_m: f64, yaw_rad: f64) -> Option<PriorBelief> {
         let (distribution, evidence) = self.poses.distribution(x_m, y_m, yaw_rad)?;
         Some(PriorBelief::new(&distribution, evidence))
+    }
+
+    /// Bytes of the ground that it keeps.
+    pub fn n_bytes(&self) -> usize {
+        self.poses.ground.n_bytes()
     }
 
     fn check_resolution(&self, surface: &GridMap<SurfaceCell>) -> Result<(), PriorMapError> {

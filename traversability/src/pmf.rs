@@ -45,8 +45,9 @@ impl Pmf {
         Ok(Self::normalised(probabilities))
     }
 
-    /// Weights that are known to be finite, not negative and not all zero, over their sum.
-    pub(crate) fn normalised(weights: [f32; N_BINS]) -> Self {
+    /// Weights that are known to be finite, not negative and not all zero, over their sum; others make no
+    /// distribution, and [`Pmf::new`] checks.
+    pub fn normalised(weights: [f32; N_BINS]) -> Self {
         let sum: f32 = weights.iter().sum();
         Self(weights.map(|weight| weight / sum))
     }

@@ -1,0 +1,387 @@
+//! Networks, prior and posterior over a whole surface, as a risk map.
+
+mod extraction;
+mod patch_ground;
+mod patch_stencil;
+mod posterior;
+mod row_task;
+
+use std::sync::{Arc, Mutex, PoisonError};
+
+use bicycle::Geometry;
+use physics_prior::{Assumption, PriorConfig, PriorField, PriorMapError};
+use rayon::prelude::*;
+use terrain::{CellRegion, GridGeometry, GridMap, SurfaceCell};
+use traversability::{CvarLevel, PartialMoments, Risk, RiskMap};
+
+use crate::predictor::{Predictor, PredictorError};
+use crate::{Checkpoint, Prior};
+use patch_ground::PatchGround;
+use patch_stencil::PatchStencil;
+use row_task::{RowTask, Scratch};
+
+/// What becomes of ground that is unlike the training data: its density lies below that of every training footprint.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Unfamiliar {
+    /// It is driven on as the posterior says, in which the prior outweighs the networks.
+    Fuse,
+    /// It is blocked like an obstacle, as EVORA avoids it.
+    Avoid,
+}
+
+/// What a [`BeliefMap`] believes.
+#[derive(Clone, Debug)]
+pub struct Learned {
+    /// Networks, and the prior and the features that they were trained with.
+    pub checkpoint: Arc<Checkpoint>,
+    /// What becomes of ground that is unlike the training data.
+    pub unfamiliar: Unfamiliar,
+    /// Widens the footprint that must not touch an obstacle, as in [`PriorConfig::obstacle_margin_m`] [m].
+    pub obstacle_margin_m: f64,
+    /// Share of the worst outcomes that counts.
+    pub level: CvarLevel,
+}
+
+/// Why no belief map can be made.
+#[derive(Debug, thiserror::Error)]
+pub enum BeliefMapError {
+    /// The networks cannot be used.
+    #[error(transparent)]
+    Predictor(#[from] PredictorError),
+    /// The prior or the grids do not fit.
+    #[error(transparent)]
+    Prior(#[from] PriorMapError),
+    /// The networks were trained on another vehicle.
+    #[error("{field} of the vehicle: expected {expected} as in training, found {found}")]
+    Vehicle {
+        /// Which length.
+        field: &'static str,
+        /// Of the vehicle in training [m].
+        expected: f64,
+        /// Of this vehicle [m].
+        found: f64,
+    },
+    /// A method without a flow cannot tell what is unlike the training data.
+    #[error("method {method}: expected one with a density to avoid unfamiliar ground by, found none")]
+    NoDensity {
+        /// Name of the method.
+        method: &'static str,
+    },
+}
+
+/// A risk map from what was learned, fused with a prior by evidence (PIETRA, equations 10 and 11).
+///
+/// Poses are those of [`RiskMap`]. The prior is that of the checkpoint's method: the physics prior, all bins alike, or
+/// none. Whatever the method, unknown ground and obstacles are those of the physics prior: a footprint that is mostly
+/// unknown has nothing that networks could judge and is the prior's alone, one that touches an obstacle is
+/// [`Risk::blocked`]. A cell whose poses are unlike the training data in most yaws has the flag
+/// [`traversability::GroundFlags::OUT_OF_DISTRIBUTION`]; unknown ground never has. Runs in the rayon pool of the
+/// caller; the result does not depend on the number of threads.
+#[derive(Clone, Debug)]
+pub struct BeliefMap {
+    layers: BeliefLayers,
+    map: RiskMap,
+    scratches: Vec<Scratch>,
+}
+
+/// What the poses of a map are judged by.
+#[derive(Clone, Debug)]
+struct BeliefLayers {
+    field: PriorField,
+    ground: PatchGround,
+    /// Shape [row phase, column phase, yaw].
+    stencils: Vec<PatchStencil>,
+    n_yaws: usize,
+    /// Smallest and largest offset that a stencil reads, each columns, rows.
+    reach: [[i64; 2]; 2],
+    predictor: Predictor,
+    fusion: Fusion,
+}
+
+/// How prediction and prior become a risk.
+#[derive(Clone, Debug)]
+struct Fusion {
+    prior: Prior,
+    prior_evidence: f32,
+    unfamiliar: Unfamiliar,
+    /// Log density below which ground is unlike the training data.
+    log_density_min: f32,
+    per_level: f32,
+    uniform: PartialMoments,
+}
+
+impl Fusion {
+    fn avoids(&self) -> bool {
+        self.unfamiliar == Unfamiliar::Avoid
+    }
+
+    /// What the networks are weighed against: physics alone knows of unknown ground.
+    fn weighed<'a>(&'a self, physics: &'a PartialMoments, is_unknown: bool) -> &'a PartialMoments {
+        if is_unknown || self.prior == Prior::Physics { physics } else { &self.uniform }
+    }
+}
+
+/// Footprints that a thread works on at a time, about.
+const TASK_LANES: usize = 1024;
+
+impl BeliefMap {
+    /// A map in the window `risk` for surfaces of the given resolution; [`Risk::OUTSIDE`] until it is updated.
+    ///
+    /// `geometry` comes from a vehicle that passed [`bicycle::Vehicle::validate`].
+    ///
+    /// # Errors
+    /// The checkpoint is broken or of another vehicle, cannot do what is asked of it, or the grids do not line up.
+    pub fn new(
+        geometry: &Geometry,
+        learned: &Learned,
+        surface_resolution_m: f64,
+        risk: GridGeometry,
+        n_yaws: usize,
+    ) -> Result<Self, BeliefMapError> {
+        let sidecar = &learned.checkpoint.sidecar;
+        check_vehicle(geometry, learned)?;
+        let predictor = Predictor::new(&learned.checkpoint)?;
+        if learned.unfamiliar == Unfamiliar::Avoid && sidecar.density.is_none() {
+            return Err(BeliefMapError::NoDensity { method: sidecar.method.name() });
+        }
+        let prior = PriorConfig { obstacle_margin_m: learned.obstacle_margin_m, ..sidecar.prior };
+        let assumption = Assumption::Physics { prior, level: learned.level };
+        let field = PriorField::new(geometry, &assumption, surface_resolution_m, risk, n_yaws)?;
+        let fusion = Fusion {
+            prior: sidecar.method.prior(),
+            prior_evidence: prior.evidence as f32,
+            unfamiliar: learned.unfamiliar,
+            log_density_min: sidecar.density.map_or(f32::NEG_INFINITY, |density| density.min as f32),
+            per_level: learned.level.reciprocal(),
+            uniform: PartialMoments::uniform(),
+        };
+        let layers = BeliefLayers::new(field, predictor, fusion, (learned, surface_resolution_m, n_yaws));
+        Ok(Self { layers, map: RiskMap::constant(risk, n_yaws, Risk::OUTSIDE), scratches: Vec::new() })
+    }
+
+    /// The map as of the last update.
+    pub fn risk_map(&self) -> &RiskMap {
+        &self.map
+    }
+
+    /// Moves the window to another origin on the lattice of risk cells; the next update is a full one.
+    pub fn place_at(&mut self, origin: [i64; 2]) {
+        if self.layers.field.place_at(origin) {
+            self.map.place_at(origin);
+            self.layers.place_ground();
+        }
+    }
+
+    /// Judges at another level from the next update on, which is a full one.
+    pub fn set_level(&mut self, level: CvarLevel) {
+        self.layers.field.set_level(level);
+        self.layers.fusion.per_level = level.reciprocal();
+    }
+
+    /// Takes over the whole surface. What lies beyond its window is unknown.
+    ///
+    /// # Errors
+    /// The surface has another resolution than the map was made for.
+    pub fn update_all(&mut self, surface: &GridMap<SurfaceCell>) -> Result<(), BeliefMapError> {
+        let dirty = self.layers.field.read_all(surface)?;
+        self.layers.read_ground(surface, None);
+        self.fill(surface, &dirty);
+        Ok(())
+    }
+
+    /// Takes over the cells of the surface that changed since the last update, and judges anew only the poses that
+    /// they reach; the result is that of [`BeliefMap::update_all`], bit by bit. It is a full update when one of the
+    /// windows or the level changed.
+    ///
+    /// # Errors
+    /// The surface has another resolution than the map was made for.
+    pub fn update_dirty(
+        &mut self,
+        surface: &GridMap<SurfaceCell>,
+        changed: &CellRegion,
+    ) -> Result<(), BeliefMapError> {
+        let is_whole = self.layers.field.is_outdated(surface);
+        let by_prior = self.layers.field.read_changed(surface, changed)?;
+        let dirty = if is_whole {
+            self.layers.read_ground(surface, None);
+            by_prior
+        } else {
+            let by_networks = self.layers.read_ground(surface, Some(changed));
+            union(by_prior, by_networks)
+        };
+        self.fill(surface, &dirty);
+        Ok(())
+    }
+
+    /// Bytes that the map takes while it is updated: ground, prior, networks, buffers and result.
+    pub fn n_bytes(&self) -> usize {
+        let view = self.map.view();
+        let layers = &self.layers;
+        size_of_val(view.risks)
+            + size_of_val(view.ground)
+            + layers.field.n_bytes()
+            + layers.ground.n_bytes()
+            + layers.predictor.n_bytes()
+            + self.scratches.iter().map(Scratch::n_bytes).sum::<usize>()
+    }
+
+    fn fill(&mut self, surface: &GridMap<SurfaceCell>, dirty: &CellRegion) {
+        if dirty.n_cells() == 0 {
+            return;
+        }
+        let n_threads = rayon::current_num_threads();
+        let (layers, workspace) = (&self.layers, self.layers.predictor.workspace());
+        self.scratches.resize_with(n_threads, || Scratch::new(workspace.clone(), layers.n_yaws));
+        let tasks = Mutex::new(tasks(&mut self.map, layers.n_yaws, dirty).into_iter());
+        self.scratches.par_iter_mut().for_each(|scratch| {
+            let next = || tasks.lock().unwrap_or_else(PoisonError::into_inner).next();
+            while let Some(task) = next() {
+                task.run(layers, surface, scratch);
+            }
+        });
+        self.map.close_border();
+    }
+}
+
+/// The dirty part of a map, a few rows at a time.
+fn tasks<'a>(map: &'a mut RiskMap, n_yaws: usize, dirty: &CellRegion) -> Vec<RowTask<'a>> {
+    let geometry = *map.geometry();
+    let n_cols = geometry.n_cols;
+    let n_rows = (TASK_LANES / (dirty.cols.len() * n_yaws)).max(1);
+    let [west, south] = geometry.origin;
+    let (risks, ground) = map.arrays_mut();
+    let cells = dirty.rows.start * n_cols..dirty.rows.end * n_cols;
+    let risks = risks[cells.start * n_yaws..cells.end * n_yaws].chunks_mut(n_rows * n_cols * n_yaws);
+    let slices = risks.zip(ground[cells].chunks_mut(n_rows * n_cols));
+    let task = |(index, (risks, ground)): (usize, (&'a mut [Risk], &'a mut [_]))| {
+        let first = south + (dirty.rows.start + index * n_rows) as i64;
+        RowTask {
+            rows: first..first + (ground.len() / n_cols) as i64,
+            cols: west + dirty.cols.start as i64..west + dirty.cols.end as i64,
+            west,
+            risks,
+            ground,
+        }
+    };
+    slices.enumerate().map(task).collect()
+}
+
+fn union(a: CellRegion, b: CellRegion) -> CellRegion {
+    if a.n_cells() == 0 {
+        return b;
+    }
+    if b.n_cells() == 0 {
+        return a;
+    }
+    CellRegion {
+        rows: a.rows.start.min(b.rows.start)..a.rows.end.max(b.rows.end),
+        cols: a.cols.start.min(b.cols.start)..a.cols.end.max(b.cols.end),
+    }
+}
+
+impl BeliefLayers {
+    fn new(
+        field: PriorField,
+        predictor: Predictor,
+        fusion: Fusion,
+        (learned, resolution_m, n_yaws): (&Learned, f64, usize),
+    ) -> Self {
+        let layout = &learned.checkpoint.sidecar.layout;
+        let ratio = field.ratio();
+        let mut stencils = Vec::new();
+        for row in 0..ratio.n_phases() as i64 {
+            for col in 0..ratio.n_phases() as i64 {
+                for yaw in 0..n_yaws {
+                    let yaw_rad = (yaw as f64 + 0.5) * std::f64::consts::TAU / n_yaws as f64;
+                    let phase = [ratio.phase(col), ratio.phase(row)];
+                    stencils.push(PatchStencil::new(layout, resolution_m, phase, yaw_rad));
+                }
+            }
+        }
+        let mut reach = [[0; 2]; 2];
+        for of_stencil in stencils.iter().map(PatchStencil::reach) {
+            for axis in 0..2 {
+                reach[0][axis] = reach[0][axis].min(of_stencil[0][axis]);
+                reach[1][axis] = reach[1][axis].max(of_stencil[1][axis]);
+            }
+        }
+        let window = GridGeometry { resolution_m, ..*field.window() };
+        let ground = PatchGround::unknown(window, ratio, layout.height_scale_m);
+        let mut layers = Self { field, ground, stencils, n_yaws, reach, predictor, fusion };
+        layers.place_ground();
+        layers
+    }
+
+    /// Makes room for the ground under the present window; it must be read anew.
+    fn place_ground(&mut self) {
+        let (risk, ratio) = (*self.field.window(), self.field.ratio());
+        let n = [risk.n_cols, risk.n_rows].map(|n| n as i64);
+        let first = |axis: usize| ratio.base(risk.origin[axis]) + self.reach[0][axis];
+        let last = |axis: usize| ratio.base(risk.origin[axis] + n[axis] - 1) + self.reach[1][axis];
+        let count = |axis: usize| (last(axis) - first(axis) + 1) as usize;
+        let resolution_m = self.ground.window().resolution_m;
+        let window =
+            GridGeometry { resolution_m, origin: [first(0), first(1)], n_rows: count(1), n_cols: count(0) };
+        self.ground = self.ground.moved_to(window);
+        let n_phases = ratio.n_phases();
+        for (index, stencil) in self.stencils.iter_mut().enumerate() {
+            let col_phase = (index / self.n_yaws % n_phases) as i64;
+            let col = risk.origin[0] + (col_phase - risk.origin[0]).rem_euclid(n_phases as i64);
+            stencil.lay_on(&self.ground, [ratio.base(col), ratio.base(risk.origin[1])]);
+        }
+    }
+
+    fn stencil(&self, cell: [i64; 2], yaw: usize) -> &PatchStencil {
+        let ratio = self.field.ratio();
+        let [col_phase, row_phase] = cell.map(|index| ratio.phase_index(index));
+        &self.stencils[(row_phase * ratio.n_phases() + col_phase) * self.n_yaws + yaw]
+    }
+
+    /// Takes over what changed of the surface, everything for `None`; returns the cells whose networks read that.
+    fn read_ground(&mut self, surface: &GridMap<SurfaceCell>, changed: Option<&CellRegion>) -> CellRegion {
+        let window = *self.field.window();
+        let Some(changed) = changed else {
+            let ground = *self.ground.window();
+            let n = [ground.n_cols, ground.n_rows];
+            let last = [0, 1].map(|axis| ground.origin[axis] + n[axis] as i64 - 1);
+            self.ground.read(surface, ground.origin, last);
+            return CellRegion::whole(&window);
+        };
+        if changed.n_cells() == 0 {
+            return CellRegion { rows: 0..0, cols: 0..0 };
+        }
+        let origin = surface.geometry().origin;
+        let min = [origin[0] + changed.cols.start as i64, origin[1] + changed.rows.start as i64];
+        let max = [origin[0] + changed.cols.end as i64 - 1, origin[1] + changed.rows.end as i64 - 1];
+        self.ground.read(surface, min, max);
+        let readers = |axis: usize, n: usize| {
+            let reads = |index: &usize| {
+                let base = self.field.ratio().base(window.origin[axis] + *index as i64);
+                base + self.reach[0][axis] <= max[axis] && base + self.reach[1][axis] >= min[axis]
+            };
+            let start = (0..n).find(reads).unwrap_or(n);
+            start..(start..n).rev().find(reads).map_or(start, |last| last + 1)
+        };
+        CellRegion { rows: readers(1, window.n_rows), cols: readers(0, window.n_cols) }
+    }
+}
+
+/// Lengths that agree to this share are the same.
+const LENGTH_TOLERANCE: f64 = 1e-6;
+
+fn check_vehicle(geometry: &Geometry, learned: &Learned) -> Result<(), BeliefMapError> {
+    let layout = &learned.checkpoint.sidecar.layout;
+    let pairs = [
+        ("wheelbase_m", layout.wheels.wheelbase_m, geometry.wheelbase_m),
+        ("track_m", layout.wheels.track_m, geometry.track_m),
+        ("wheel_radius_m", layout.height_scale_m, geometry.wheel_radius_m),
+    ];
+    let differs = |(_, expected, found): &(&str, f64, f64)| {
+        let is_same = (found - expected).abs() <= LENGTH_TOLERANCE * expected.abs();
+        !is_same
+    };
+    match pairs.into_iter().find(differs) {
+        Some((field, expected, found)) => Err(BeliefMapError::Vehicle { field, expected, found }),
+        None => Ok(()),
+    }
+}
