@@ -54,6 +54,18 @@ impl Source {
         Self::FusedWithPhysics,
         Self::Switch,
     ];
+
+    /// The name in tables and pictures.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Prediction => "prediction",
+            Self::Uniform => "uniform",
+            Self::Prior => "physics prior",
+            Self::FusedWithUniform => "fused with uniform",
+            Self::FusedWithPhysics => "fused with physics",
+            Self::Switch => "switch",
+        }
+    }
 }
 
 /// What was found on a traction map.
@@ -121,10 +133,11 @@ pub fn judge(map: &TractionMap, seed: u64) -> Result<Judgement, JudgeError> {
         let errors = Source::ALL.map(|source| {
             cells.iter().map(|&i| score::emd2(&at(i, source), &measured.values()[i])).collect::<Vec<f64>>()
         });
-        let density = cells.iter().map(|&i| f64::from(map.normalised_density.values()[i])).collect::<Vec<_>>();
+        let density =
+            cells.iter().map(|&i| f64::from(map.normalised_density.values()[i])).collect::<Vec<_>>();
         score::head(&errors, &density, &blocks, seed)
     });
-    let report = TractionMapReport { linear, angular, ..counts(map, &prior, &cells, &blocks, seed) };
+    let report = report(map, &prior, &blocks, seed, [linear, angular]);
     let fused = TractionPmfs {
         linear: fused_map(map, [&map.predicted.linear, &prior.pmfs.linear]),
         angular: fused_map(map, [&map.predicted.angular, &prior.pmfs.angular]),
@@ -132,14 +145,14 @@ pub fn judge(map: &TractionMap, seed: u64) -> Result<Judgement, JudgeError> {
     Ok(Judgement { report, ground: prior.ground, prior: prior.pmfs, fused })
 }
 
-/// All of the report but the errors.
-fn counts(
+fn report(
     map: &TractionMap,
     prior: &Prior,
-    cells: &[usize],
     blocks: &score::Blocks,
     seed: u64,
+    [linear, angular]: [Head; 2],
 ) -> TractionMapReport {
+    let cells: Vec<usize> = map.known_cells().collect();
     let density = |index: usize| f64::from(map.normalised_density.values()[index]);
     let mut weights: Vec<f64> = cells.iter().map(|&i| f64::from(prediction_weight(density(i)))).collect();
     weights.sort_by(f64::total_cmp);
@@ -153,8 +166,8 @@ fn counts(
         seed,
         height_step_m: prior.height_step_m,
         prediction_weight: [0.05, 0.5, 0.95].map(|share| score::quantile(&weights, share)),
-        linear: Head::default(),
-        angular: Head::default(),
+        linear,
+        angular,
     }
 }
 

@@ -1,5 +1,6 @@
 //! `surefoot bench`: what was asked, handed to the benchmarks, and their result shown and written.
 
+mod learning;
 mod navigation;
 
 use ::bench::{BenchError, control, prior_map};
@@ -7,6 +8,7 @@ use serde::Serialize;
 
 use crate::arguments::{BenchControlArguments, BenchPriorMapArguments, BenchWork};
 use crate::{UsageError, output};
+pub(crate) use learning::run_learning;
 pub(crate) use navigation::run_navigation;
 
 pub(crate) fn run_control(arguments: &BenchControlArguments) -> anyhow::Result<()> {

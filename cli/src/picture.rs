@@ -9,6 +9,7 @@ mod map;
 mod navigation_table;
 mod relief;
 mod strips;
+mod traction_map;
 mod view;
 
 use std::path::{Path, PathBuf};
@@ -20,6 +21,7 @@ use terrain::GridMap;
 use canvas::{Anchor, Canvas, TextStyle};
 use colour::Rgb;
 pub use navigation_table::draw_navigation_table;
+pub use traction_map::draw_traction_map;
 
 /// One drive, as far as a picture needs it. All positions are in the map frame.
 #[derive(Clone, Debug)]

