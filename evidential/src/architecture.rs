@@ -45,6 +45,33 @@ impl Architecture {
         encoder + heads + evidence + 3 * self.n_flow_layers * self.n_latent
     }
 
+    /// Names and shapes of all tensors of a checkpoint. Without a flow there is neither an evidence head.
+    pub fn tensor_shapes(&self) -> Vec<(String, Vec<usize>)> {
+        let mut shapes = Vec::new();
+        let mut layer = |name: String, [n_inputs, n_outputs]: [usize; 2]| {
+            shapes.push((format!("{name}.weight"), vec![n_outputs, n_inputs]));
+            shapes.push((format!("{name}.bias"), vec![n_outputs]));
+        };
+        let mut widths = vec![self.n_inputs];
+        widths.extend(&self.encoder_hidden);
+        widths.push(self.n_latent);
+        for (k, pair) in widths.windows(2).enumerate() {
+            layer(format!("encoder.{k}"), [pair[0], pair[1]]);
+        }
+        for head in 0..Self::N_HEADS {
+            layer(format!("heads.{head}.0"), [self.n_latent, self.head_hidden]);
+            layer(format!("heads.{head}.1"), [self.head_hidden, N_BINS]);
+        }
+        if self.n_flow_layers > 0 {
+            layer("evidence.0".to_owned(), [self.n_latent, self.evidence_hidden]);
+            layer("evidence.1".to_owned(), [self.evidence_hidden, Self::N_HEADS]);
+            shapes.push(("flow.centre".to_owned(), vec![self.n_flow_layers, self.n_latent]));
+            shapes.push(("flow.alpha".to_owned(), vec![self.n_flow_layers]));
+            shapes.push(("flow.beta".to_owned(), vec![self.n_flow_layers]));
+        }
+        shapes
+    }
+
     /// Logarithm of the certainty budget N of equation 10, that of a normal distribution: H log(4 pi) / 2.
     pub fn log_budget(&self) -> f64 {
         0.5 * self.n_latent as f64 * (4.0 * std::f64::consts::PI).ln()

@@ -1,11 +1,14 @@
 //! Trained networks and everything that must fit for them to mean anything.
 
+mod file;
+
 use std::collections::BTreeMap;
 
 use physics_prior::PriorConfig;
 use serde::{Deserialize, Serialize};
 
 use crate::{Architecture, FeatureLayout, Method, Standardisation};
+pub use file::CheckpointError;
 
 /// An array of a checkpoint.
 #[derive(Clone, Debug, PartialEq)]

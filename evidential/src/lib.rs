@@ -12,14 +12,24 @@
 //!    the CVaR of the posterior as a risk map.
 
 mod architecture;
+mod belief_map;
 mod checkpoint;
 mod dataset;
+pub mod dirichlet;
 mod features;
+mod flow;
 mod label;
+mod loss;
 mod method;
+mod network;
+mod predictor;
+mod random;
+mod standardise;
+mod training;
 
 pub use architecture::Architecture;
-pub use checkpoint::{Checkpoint, DensityRange, Sidecar, Tensor};
+pub use belief_map::{BeliefMap, BeliefMapError, Learned, Unfamiliar};
+pub use checkpoint::{Checkpoint, CheckpointError, DensityRange, Sidecar, Tensor};
 pub use dataset::{
     Dataset, DatasetError, DatasetFileError, DatasetOrigin, Example, PARAMETER_BINS, PARAMETER_NAMES,
     Surveyor, SurveyorError,
@@ -27,3 +37,7 @@ pub use dataset::{
 pub use features::{FeatureLayout, Standardisation};
 pub use label::{Label, LabelConfig, LabelError, Response, Responses, Reversing, estimate_responses, labels};
 pub use method::{Method, Prior};
+pub use predictor::{Evidence, Prediction, Predictor, PredictorError};
+pub use training::{
+    Epoch, Outcome, Percentiles, Phase, Settings, SettingsError, TrainError, TrainingEnd, train,
+};

@@ -1,0 +1,457 @@
+//! Fits the networks of a [`Method`](crate::Method) to a dataset.
+//!
+//! Predictor and flow are trained together on the method's loss until the validation error no longer falls; the best
+//! weights are kept. Then the predictor is frozen and the flow alone is fitted to the latents of the training data by
+//! maximum likelihood, as NatPN and EVORA do.
+
+mod evaluation;
+mod samples;
+mod settings;
+
+use std::ops::ControlFlow;
+
+use candle_core::{Device, Tensor, Var};
+use candle_nn::{AdamW, Optimizer, ParamsAdamW};
+use rand::seq::SliceRandom;
+use serde::{Deserialize, Serialize};
+
+use crate::loss::{BatchLoss, LossTerms};
+use crate::network::Network;
+use crate::random::stream;
+use crate::{
+    Architecture, Checkpoint, Dataset, DatasetError, DensityRange, PARAMETER_BINS, PARAMETER_NAMES, Sidecar,
+    Standardisation,
+};
+use evaluation::Evaluation;
+pub use evaluation::Percentiles;
+use samples::{Samples, gather};
+pub use settings::{Settings, SettingsError};
+
+/// Keys of the random streams that order the examples.
+const JOINT_KEY: u64 = 2;
+const FLOW_KEY: u64 = 3;
+/// Rows that pass the encoder at a time where nothing is learnt.
+const CHUNK: usize = 1024;
+
+/// Why nothing was trained.
+#[derive(Debug, thiserror::Error)]
+pub enum TrainError {
+    /// A setting out of range.
+    #[error("settings: {0}")]
+    Settings(#[from] SettingsError),
+    /// Data that nothing can be learnt from.
+    #[error("{which} data: {problem}")]
+    Data {
+        /// Training or validation.
+        which: &'static str,
+        /// What is wrong.
+        problem: DatasetError,
+    },
+    /// Every parameter has one value throughout.
+    #[error(
+        "training data: expected measurements in at least two bins of some parameter, found one bin each in {n} examples"
+    )]
+    OneClass {
+        /// Number of examples.
+        n: usize,
+    },
+    /// Training and validation data do not belong together.
+    #[error("validation data, {what}: expected that of the training data, {expected}, found {found}")]
+    Mismatch {
+        /// What differs.
+        what: &'static str,
+        /// Of the training data.
+        expected: String,
+        /// Of the validation data.
+        found: String,
+    },
+    /// The loss became infinite or no number.
+    #[error(
+        "{phase}, epoch {epoch}, step {step}: expected a finite loss, found {found}; a smaller learning rate may help"
+    )]
+    NonFiniteLoss {
+        /// What was trained.
+        phase: Phase,
+        /// From 1.
+        epoch: usize,
+        /// From 1.
+        step: usize,
+        /// The loss.
+        found: f64,
+    },
+    /// The arithmetic library refused.
+    #[error(transparent)]
+    Arithmetic(#[from] candle_core::Error),
+    /// No thread to compute on.
+    #[error("expected a thread to train on: {0}")]
+    Thread(#[from] rayon::ThreadPoolBuildError),
+    /// The result cannot be kept.
+    #[error(transparent)]
+    Checkpoint(#[from] crate::CheckpointError),
+}
+
+/// What is being trained.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Phase {
+    /// Predictor and flow together.
+    Joint,
+    /// The flow alone.
+    Flow,
+}
+
+impl std::fmt::Display for Phase {
+    fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        formatter.write_str(match self {
+            Self::Joint => "training",
+            Self::Flow => "fitting the flow",
+        })
+    }
+}
+
+/// One pass over the data.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Epoch {
+    /// What was trained.
+    pub phase: Phase,
+    /// From 1 in each phase.
+    pub epoch: usize,
+    /// Mean of the loss over the steps: the method's loss, or the negative log density of the flow alone.
+    pub training_loss: f64,
+    /// By what the best weights are chosen: EMD2 summed over the parameters, or the negative log density.
+    pub validation_error: f64,
+    /// Whether no pass before was better.
+    pub is_best: bool,
+}
+
+/// A finished training.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Outcome {
+    /// The best weights.
+    pub checkpoint: Checkpoint,
+    /// Every pass, in order.
+    pub curves: Vec<Epoch>,
+    /// Validation EMD2 per parameter of the checkpoint.
+    pub validation_emd2: [f64; Architecture::N_HEADS],
+    /// n / (n + n_prior) over the validation data; `None` without evidence.
+    pub learned_weight: Option<Percentiles>,
+    /// Whether it was broken off.
+    pub end: TrainingEnd,
+}
+
+/// How a training ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum TrainingEnd {
+    /// By itself.
+    Finished,
+    /// At the caller's wish; the checkpoint is the best so far.
+    Interrupted,
+}
+
+/// Trains on one thread, whatever the machine has, so that several trainings run side by side.
+///
+/// `revision` names the program in the checkpoint. `progress` hears of every pass and may break off: the best weights
+/// so far are returned then.
+///
+/// # Errors
+/// Settings out of range, data that is empty or not finite, a parameter that was never measured, training data with one
+/// class per parameter, validation data of another vehicle, layout or
+/// prior, a loss that is not finite.
+pub fn train(
+    training: &Dataset,
+    validation: &Dataset,
+    settings: &Settings,
+    revision: &str,
+    progress: &mut (dyn FnMut(&Epoch) -> ControlFlow<()> + Send),
+) -> Result<Outcome, TrainError> {
+    settings.validate()?;
+    check(training, validation)?;
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
+    pool.install(|| Run::new(training, validation, settings)?.finish(training, revision, progress))
+}
+
+fn check(training: &Dataset, validation: &Dataset) -> Result<(), TrainError> {
+    for (which, dataset) in [("training", training), ("validation", validation)] {
+        let refused = |problem| TrainError::Data { which, problem };
+        dataset.validate().map_err(refused)?;
+        if let Some(parameter) = dataset.n_measured().iter().position(|&n| n == 0) {
+            return Err(refused(DatasetError::NothingMeasured { parameter: PARAMETER_NAMES[parameter] }));
+        }
+    }
+    if !teaches(training) {
+        return Err(TrainError::OneClass { n: training.examples.len() });
+    }
+    let (expected, found) = (&training.origin, &validation.origin);
+    let mismatch = |what, expected: String, found: String| {
+        if expected == found { Ok(()) } else { Err(TrainError::Mismatch { what, expected, found }) }
+    };
+    mismatch("vehicle", expected.vehicle.clone(), found.vehicle.clone())?;
+    mismatch("layout", format!("{:?}", expected.layout), format!("{:?}", found.layout))?;
+    mismatch("prior", format!("{:?}", expected.prior), format!("{:?}", found.prior))
+}
+
+/// Whether any parameter was measured in more than one bin. All need not be: on even ground every pitch is small.
+fn teaches(dataset: &Dataset) -> bool {
+    PARAMETER_BINS.iter().enumerate().any(|(parameter, bins)| {
+        let mut seen = dataset.examples.iter().filter_map(|example| bins.bin_of(example.measured[parameter]));
+        let first = seen.next();
+        seen.any(|bin| Some(bin) != first)
+    })
+}
+
+/// A training under way.
+struct Run<'a> {
+    settings: &'a Settings,
+    standardisation: Standardisation,
+    training: Samples,
+    validation: Samples,
+    network: Network,
+    terms: LossTerms,
+    curves: Vec<Epoch>,
+    end: TrainingEnd,
+}
+
+type Progress<'a> = &'a mut (dyn FnMut(&Epoch) -> ControlFlow<()> + Send);
+
+/// Whether a phase goes on after a pass.
+enum Next {
+    Continue,
+    Stop,
+}
+
+impl<'a> Run<'a> {
+    fn new(training: &Dataset, validation: &Dataset, settings: &'a Settings) -> Result<Self, TrainError> {
+        let standardisation = Standardisation::of(training);
+        let architecture = settings.architecture(training.origin.layout.n_features());
+        let method = settings.method;
+        let terms = LossTerms {
+            prior: method.prior(),
+            prior_evidence: training.origin.prior.evidence,
+            log_budget: architecture.log_budget(),
+            physics_weight: if method.has_physics_loss() { settings.physics_weight } else { 0.0 },
+            entropy_weight: if method.is_evidential() { settings.entropy_weight } else { 0.0 },
+        };
+        Ok(Self {
+            settings,
+            training: Samples::new(training, &standardisation),
+            validation: Samples::new(validation, &standardisation),
+            standardisation,
+            network: Network::new(&architecture, settings.seed)?,
+            terms,
+            curves: Vec::new(),
+            end: TrainingEnd::Finished,
+        })
+    }
+
+    fn finish(
+        mut self,
+        data: &Dataset,
+        revision: &str,
+        progress: Progress<'_>,
+    ) -> Result<Outcome, TrainError> {
+        self.fit_jointly(progress)?;
+        if self.settings.method.is_evidential() && self.end == TrainingEnd::Finished {
+            self.fit_flow(progress)?;
+        }
+        let density = self.density_range()?;
+        let evaluation = Evaluation::new(&self.network, &self.validation, &self.terms)?;
+        let sidecar = Sidecar {
+            format: Sidecar::FORMAT,
+            method: self.settings.method,
+            vehicle: data.origin.vehicle.clone(),
+            architecture: self.settings.architecture(data.origin.layout.n_features()),
+            layout: data.origin.layout,
+            standardisation: self.standardisation,
+            traction_bins: PARAMETER_BINS[0].values().to_vec(),
+            attitude_bins_rad: PARAMETER_BINS[2].values().to_vec(),
+            prior: data.origin.prior,
+            density,
+            training: serde_json::json!(self.settings),
+            git_revision: revision.to_owned(),
+            weights_sha256: String::new(),
+        };
+        Ok(Outcome {
+            checkpoint: Checkpoint::new(sidecar, self.network.tensors()?)?,
+            curves: self.curves,
+            validation_emd2: evaluation.emd2,
+            learned_weight: (!evaluation.learned_weights.is_empty())
+                .then(|| Percentiles::of(evaluation.learned_weights)),
+            end: self.end,
+        })
+    }
+
+    /// Trains everything on the method's loss and leaves the best weights in the network.
+    fn fit_jointly(&mut self, progress: Progress<'_>) -> Result<(), TrainError> {
+        let variables = self.network.variables();
+        let mut optimiser = adam(variables.clone(), self.settings.learning_rate)?;
+        let mut best = Best::new(variables);
+        for epoch in 1..=self.settings.epochs_max {
+            let place = Place { phase: Phase::Joint, epoch };
+            let (network, training, terms) = (&self.network, &self.training, self.terms);
+            let order = order(self.settings.seed, JOINT_KEY, epoch, training.n);
+            let training_loss = pass(&order, self.settings.batch, place, &mut optimiser, |indices| {
+                let (inputs, targets) = training.batch(indices)?;
+                network.outputs(&inputs)?.apply_op2(&targets, BatchLoss::new(terms))
+            })?;
+            let error = Evaluation::new(&self.network, &self.validation, &self.terms)?.total();
+            if let Next::Stop = self.conclude(place, training_loss, error, &mut best, progress)? {
+                break;
+            }
+        }
+        Ok(best.restore()?)
+    }
+
+    /// Fits the flow alone to the latents of the training data and leaves the likeliest in the network.
+    fn fit_flow(&mut self, progress: Progress<'_>) -> Result<(), TrainError> {
+        let [training, validation] = [self.latents(&self.training)?, self.latents(&self.validation)?];
+        let variables = self.network.flow_variables();
+        let mut optimiser = adam(variables.clone(), self.settings.flow_learning_rate)?;
+        let shape = (self.validation.n, self.settings.n_latent);
+        let validation = Tensor::from_vec(validation, shape, &Device::Cpu)?;
+        let mut best = Best::new(variables);
+        // The flow as the joint training left it may be the best.
+        best.offer(0, scalar(&mean_surprise(&self.network, &validation)?)?)?;
+        for epoch in 1..=self.settings.flow_epochs_max {
+            let place = Place { phase: Phase::Flow, epoch };
+            let (network, n) = (&self.network, self.training.n);
+            let order = order(self.settings.seed, FLOW_KEY, epoch, n);
+            let training_loss = pass(&order, self.settings.batch, place, &mut optimiser, |indices| {
+                mean_surprise(network, &gather(&training, n, indices)?)
+            })?;
+            let error = scalar(&mean_surprise(&self.network, &validation)?)?;
+            if let Next::Stop = self.conclude(place, training_loss, error, &mut best, progress)? {
+                break;
+            }
+        }
+        Ok(best.restore()?)
+    }
+
+    /// Keeps the weights if they are the best, reports, and says whether to go on.
+    fn conclude(
+        &mut self,
+        place: Place,
+        training_loss: f64,
+        validation_error: f64,
+        best: &mut Best,
+        progress: Progress<'_>,
+    ) -> Result<Next, TrainError> {
+        let Place { phase, epoch } = place;
+        if !validation_error.is_finite() {
+            let step = self.training.n.div_ceil(self.settings.batch);
+            return Err(TrainError::NonFiniteLoss { phase, epoch, step, found: validation_error });
+        }
+        let is_best = best.offer(epoch, validation_error)?;
+        self.curves.push(Epoch { phase, epoch, training_loss, validation_error, is_best });
+        if progress(&self.curves[self.curves.len() - 1]).is_break() {
+            self.end = TrainingEnd::Interrupted;
+            return Ok(Next::Stop);
+        }
+        Ok(if epoch - best.epoch >= self.settings.patience { Next::Stop } else { Next::Continue })
+    }
+
+    /// Latents of all samples, row-major.
+    fn latents(&self, samples: &Samples) -> Result<Vec<f32>, TrainError> {
+        let mut latents = Vec::with_capacity(samples.n * self.settings.n_latent);
+        for start in (0..samples.n).step_by(CHUNK) {
+            let (inputs, _) = samples.chunk(start, CHUNK)?;
+            latents.extend(self.network.latents(&inputs)?.flatten_all()?.to_vec1::<f32>()?);
+        }
+        Ok(latents)
+    }
+
+    /// Log densities of the training data; `None` without a flow.
+    fn density_range(&self) -> Result<Option<DensityRange>, TrainError> {
+        let latents = self.latents(&self.training)?;
+        let latents = Tensor::from_vec(latents, (self.training.n, self.settings.n_latent), &Device::Cpu)?;
+        let Some(densities) = self.network.log_densities(&latents)? else { return Ok(None) };
+        let densities = densities.to_vec1::<f32>()?;
+        let min = densities.iter().copied().fold(f32::INFINITY, f32::min);
+        let max = densities.iter().copied().fold(f32::NEG_INFINITY, f32::max);
+        Ok(Some(DensityRange { min: f64::from(min), max: f64::from(max) }))
+    }
+}
+
+fn scalar(tensor: &Tensor) -> candle_core::Result<f64> {
+    Ok(f64::from(tensor.to_scalar::<f32>()?))
+}
+
+/// Mean negative log density of latents.
+fn mean_surprise(network: &Network, latents: &Tensor) -> candle_core::Result<Tensor> {
+    match network.log_densities(latents)? {
+        Some(densities) => densities.mean_all()?.neg(),
+        None => candle_core::bail!("expected networks with a flow"),
+    }
+}
+
+/// Where a training stands.
+#[derive(Clone, Copy)]
+struct Place {
+    phase: Phase,
+    epoch: usize,
+}
+
+fn adam(variables: Vec<Var>, learning_rate: f64) -> candle_core::Result<AdamW> {
+    AdamW::new(variables, ParamsAdamW { lr: learning_rate, weight_decay: 0.0, ..ParamsAdamW::default() })
+}
+
+/// The order of examples in one pass.
+fn order(seed: u64, key: u64, epoch: usize, n: usize) -> Vec<u32> {
+    let mut order: Vec<u32> = (0..n as u32).collect();
+    order.shuffle(&mut stream(seed, &[key, epoch as u64]));
+    order
+}
+
+/// Steps once per batch; the mean loss.
+fn pass(
+    order: &[u32],
+    batch: usize,
+    place: Place,
+    optimiser: &mut AdamW,
+    loss_of: impl Fn(&[u32]) -> candle_core::Result<Tensor>,
+) -> Result<f64, TrainError> {
+    let mut sum = 0.0;
+    for (step, indices) in order.chunks(batch).enumerate() {
+        let loss = loss_of(indices)?;
+        let found = scalar(&loss)?;
+        if !found.is_finite() {
+            let Place { phase, epoch } = place;
+            return Err(TrainError::NonFiniteLoss { phase, epoch, step: step + 1, found });
+        }
+        optimiser.backward_step(&loss)?;
+        sum += found * indices.len() as f64;
+    }
+    Ok(sum / order.len() as f64)
+}
+
+/// The best weights so far.
+struct Best {
+    variables: Vec<Var>,
+    kept: Vec<Tensor>,
+    error: f64,
+    epoch: usize,
+}
+
+impl Best {
+    fn new(variables: Vec<Var>) -> Self {
+        Self { variables, kept: Vec::new(), error: f64::INFINITY, epoch: 0 }
+    }
+
+    /// Copies the weights if their error is the smallest.
+    fn offer(&mut self, epoch: usize, error: f64) -> candle_core::Result<bool> {
+        let is_best = error < self.error;
+        if is_best {
+            self.kept = self.variables.iter().map(|variable| variable.copy()).collect::<Result<_, _>>()?;
+            (self.error, self.epoch) = (error, epoch);
+        }
+        Ok(is_best)
+    }
+
+    /// Puts the best weights back.
+    fn restore(self) -> candle_core::Result<()> {
+        self.variables.iter().zip(&self.kept).try_for_each(|(variable, kept)| variable.set(&kept.detach()))
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,57 @@
+//! A dataset as the arrays that training feeds to the networks.
+
+use candle_core::{Device, Result, Tensor};
+
+use crate::loss::N_TARGETS;
+use crate::{Dataset, PARAMETER_BINS, Standardisation};
+
+/// Stands for a measurement that means nothing.
+const UNMEASURED: f32 = -1.0;
+
+/// Inputs and targets of all examples, row-major.
+pub(super) struct Samples {
+    pub n: usize,
+    inputs: Vec<f32>,
+    targets: Vec<f32>,
+}
+
+impl Samples {
+    pub(super) fn new(dataset: &Dataset, standardisation: &Standardisation) -> Self {
+        let n = dataset.examples.len();
+        let mut inputs = Vec::with_capacity(n * standardisation.mean.len());
+        let mut targets = Vec::with_capacity(n * N_TARGETS);
+        for example in &dataset.examples {
+            standardisation.apply(&example.features, &mut inputs);
+            targets.extend(example.prior.iter().flatten());
+            let measured = example.measured.iter().zip(&PARAMETER_BINS);
+            targets
+                .extend(measured.map(|(&value, bins)| bins.bin_of(value).map_or(UNMEASURED, |b| b as f32)));
+        }
+        Self { n, inputs, targets }
+    }
+
+    /// Inputs and targets of the examples named.
+    pub(super) fn batch(&self, indices: &[u32]) -> Result<(Tensor, Tensor)> {
+        Ok((gather(&self.inputs, self.n, indices)?, gather(&self.targets, self.n, indices)?))
+    }
+
+    /// Inputs and the rows of targets of the examples from `start` on, at most so many.
+    pub(super) fn chunk(&self, start: usize, n_max: usize) -> Result<(Tensor, &[f32])> {
+        let end = (start + n_max).min(self.n);
+        let width = self.inputs.len() / self.n;
+        let inputs = &self.inputs[start * width..end * width];
+        let inputs = Tensor::from_slice(inputs, (end - start, width), &Device::Cpu)?;
+        Ok((inputs, &self.targets[start * N_TARGETS..end * N_TARGETS]))
+    }
+}
+
+/// Rows of a row-major array of `n_rows`.
+pub(super) fn gather(values: &[f32], n_rows: usize, indices: &[u32]) -> Result<Tensor> {
+    let width = values.len() / n_rows;
+    let mut rows = Vec::with_capacity(indices.len() * width);
+    for &index in indices {
+        let start = index as usize * width;
+        rows.extend_from_slice(&values[start..start + width]);
+    }
+    Tensor::from_vec(rows, (indices.len(), width), &Device::Cpu)
+}
