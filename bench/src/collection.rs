@@ -6,6 +6,7 @@
 
 mod height_scale;
 mod place;
+mod recorded;
 mod trial;
 
 use std::sync::Arc;
@@ -16,14 +17,16 @@ use evidential::{
     Surveyor, SurveyorError, estimate_responses, labels,
 };
 use navigator::Config;
+use physics_prior::PriorConfig;
 use rayon::prelude::*;
-use scenarios::{EpisodeError, OdometryConfig, Outcome, Rules, World};
+use scenarios::{Bounds, EpisodeError, LayersError, OdometryConfig, Outcome, Rules, World};
 use serde::Serialize;
 use terrain::{GridMap, SurfaceCell};
 
 use crate::closed_loop::{MapSource, true_surface};
 pub use height_scale::{HeightScale, ScaleRound, find_height_scale};
 pub use place::{Place, PlaceError};
+pub use recorded::collect_recorded;
 use trial::{Driven, Field, drive};
 
 /// What to drive.
@@ -43,6 +46,8 @@ pub struct Request {
     pub time_limit_s: f64,
     /// What the features are taken from.
     pub map_source: MapSource,
+    /// The physics prior that the examples hold.
+    pub prior: PriorConfig,
     /// How well the vehicle knows its own motion.
     pub odometry: OdometryConfig,
     /// Decides worlds, starts, steering and sensor noise.
@@ -61,8 +66,10 @@ impl Request {
         let speed_mps =
             if vehicle.geometry.length_m < 1.0 { vehicle.limits.speed_max_mps } else { SPEED_MPS };
         let odometry = OdometryConfig::for_length(vehicle.geometry.length_m);
+        let prior = Config::for_vehicle(&vehicle).prior;
         Self {
             vehicle,
+            prior,
             place,
             n_maps: 10,
             n_trials: 20,
@@ -87,17 +94,24 @@ impl Request {
     }
 }
 
-/// One trial in numbers.
+/// Where recorded drives come from, for people.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Recorded {
+    /// Name of the log.
+    pub log: String,
+    /// Name of the elevation.
+    pub ground: String,
+}
+
+/// One trial, or one run of a recording, in numbers.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Trial {
     /// Which world.
     pub map: u32,
-    /// How it ended.
-    pub outcome: Outcome,
-    /// Simulated time until then [s].
+    /// How it ended; `None` for a recording.
+    pub outcome: Option<Outcome>,
+    /// Time until then [s].
     pub time_s: f64,
-    /// Way driven [m].
-    pub path_length_m: f64,
     /// Labels that became examples.
     pub n_examples: usize,
     /// Labels whose footprint lies on ground that is not known well enough.
@@ -141,6 +155,26 @@ pub enum CollectionError {
         map: u32,
         /// Places tried.
         tries: usize,
+    },
+    /// The layers of a recording's ground make no world.
+    #[error("elevation: {0}")]
+    Layers(#[from] LayersError),
+    /// A recording's ground lies elsewhere.
+    #[error(
+        "elevation: expected ground under at least half of the {n_labels} labelled poses, x {:.1} to {:.1}, y {:.1} to \
+         {:.1} m, found it under {n_covered}; it covers x {:.1} to {:.1}, y {:.1} to {:.1} m",
+        drive.south_west_m[0], drive.north_east_m[0], drive.south_west_m[1], drive.north_east_m[1],
+        ground.south_west_m[0], ground.north_east_m[0], ground.south_west_m[1], ground.north_east_m[1]
+    )]
+    NotCovered {
+        /// Labels of all runs.
+        n_labels: usize,
+        /// Labels on known ground.
+        n_covered: usize,
+        /// Around the labels.
+        drive: Bounds,
+        /// Around the ground.
+        ground: Bounds,
     },
     /// The plant gave up; a trial that ends badly is a result and no error.
     #[error("{trial}: {source}")]
@@ -200,17 +234,8 @@ fn gather(request: &Request, after_trial: &(impl Fn() + Sync)) -> Result<Collect
     let config = Config::for_vehicle(&request.vehicle);
     let vehicle = request.driven_vehicle();
     let layout = FeatureLayout::for_vehicle(&vehicle.geometry);
-    let resolution_m = config.elevation.resolution_m;
-    let surveyor = Surveyor::new(&vehicle.geometry, layout, config.prior, resolution_m)?;
-    let maps = 0..request.n_maps;
-    let fields: Vec<Field> = maps
-        .into_par_iter()
-        .map(|map| {
-            let world = Arc::new(request.place.world(request.seed, map)?);
-            let surface = true_surface(&world, resolution_m);
-            Ok(Field::new(&vehicle, world, surface))
-        })
-        .collect::<Result<_, PlaceError>>()?;
+    let surveyor = Surveyor::new(&vehicle.geometry, layout, request.prior, config.elevation.resolution_m)?;
+    let fields = fields(request, &vehicle, config.elevation.resolution_m)?;
     let driven: Vec<Driven> = (0..request.n_maps * request.n_trials)
         .into_par_iter()
         .map(|index| {
@@ -221,37 +246,50 @@ fn gather(request: &Request, after_trial: &(impl Fn() + Sync)) -> Result<Collect
         })
         .collect::<Result<_, _>>()?;
     let log = log(&driven)?;
-    let labelling = LabelConfig::for_vehicle(&vehicle);
+    let labelling = LabelConfig::for_vehicle(&vehicle.geometry, &vehicle.limits);
     let responses = estimate_responses(&log, &vehicle.geometry, &labelling)?;
     let runs: Vec<_> = log.runs().collect();
-    let surveyed: Vec<(Vec<Example>, usize)> = (driven.par_iter().zip(&runs).enumerate())
+    let (examples, trials): (Vec<Vec<Example>>, Vec<Trial>) = (driven.par_iter().zip(&runs).enumerate())
         .map(|(index, (driven, run))| {
             let labels = labels(run, &vehicle.geometry, &responses, &labelling)?;
-            let field = &fields[driven.map as usize];
-            examples(&surveyor, driven, &labels, &field.surface, index as u32)
+            let examples = match &driven.sensed {
+                None => examples(&surveyor, &labels, &fields[driven.map as usize].surface, index as u32)?,
+                Some(sensed) => sensed_examples(sensed, run.time_s(), &labels, index as u32),
+            };
+            let trial = driven.trial(labels.len(), examples.len());
+            Ok((examples, trial))
         })
-        .collect::<Result<_, CollectionError>>()?;
-    let trials = driven.iter().zip(&surveyed).map(|(driven, (examples, n_unknown_ground))| Trial {
-        map: driven.map,
-        outcome: driven.outcome,
-        time_s: driven.time_s,
-        path_length_m: driven.path_length_m,
-        n_examples: examples.len(),
-        n_unknown_ground: *n_unknown_ground,
-    });
-    let trials = trials.collect();
-    let origin = DatasetOrigin {
-        vehicle: vehicle.name.clone(),
-        layout,
-        prior: config.prior,
-        drives: driven.iter().map(|driven| driven.name.clone()).collect(),
-        provenance: provenance(request),
-    };
-    let examples = surveyed.into_iter().flat_map(|(examples, _)| examples).collect();
-    let dataset = Dataset { origin, examples };
-    dataset.validate()?;
+        .collect::<Result<Vec<_>, CollectionError>>()?
+        .into_iter()
+        .unzip();
+    let names = driven.into_iter().map(|driven| driven.name).collect();
+    let examples = examples.into_iter().flatten().collect();
+    let dataset = dataset_of(&vehicle, layout, request.prior, names, provenance(request), examples)?;
     let worlds = fields.into_iter().map(|field| field.world).collect();
     Ok(Collection { dataset, trials, responses, labelling, worlds, log })
+}
+
+fn fields(request: &Request, vehicle: &Vehicle, resolution_m: f64) -> Result<Vec<Field>, PlaceError> {
+    let field = |map| {
+        let world = Arc::new(request.place.world(request.seed, map)?);
+        let surface = true_surface(&world, resolution_m);
+        Ok(Field::new(vehicle, world, surface))
+    };
+    (0..request.n_maps).into_par_iter().map(field).collect()
+}
+
+fn dataset_of(
+    vehicle: &Vehicle,
+    layout: FeatureLayout,
+    prior: PriorConfig,
+    drives: Vec<String>,
+    provenance: String,
+    examples: Vec<Example>,
+) -> Result<Dataset, DatasetError> {
+    let origin = DatasetOrigin { vehicle: vehicle.name.clone(), layout, prior, drives, provenance };
+    let dataset = Dataset { origin, examples };
+    dataset.validate()?;
+    Ok(dataset)
 }
 
 fn provenance(request: &Request) -> String {
@@ -276,28 +314,23 @@ fn log(driven: &[Driven]) -> Result<DriveLog, CollectionError> {
     Ok(log)
 }
 
-/// Examples of one trial, and the number of labels whose ground is not known well enough.
+/// Examples of one drive; labels whose ground is not known well enough give none.
 fn examples(
     surveyor: &Surveyor,
-    driven: &Driven,
     labels: &[Label],
     surface: &GridMap<SurfaceCell>,
     drive: u32,
-) -> Result<(Vec<Example>, usize), CollectionError> {
+) -> Result<Vec<Example>, SurveyorError> {
     let mut surveyor = surveyor.clone();
-    let mut examples = Vec::with_capacity(labels.len());
-    for label in labels {
-        let example = match &driven.sensed {
-            None => surveyor.example(surface, label, drive)?,
-            Some(sensed) => {
-                // Labels stand at rows of the log, which is what the map was asked at.
-                let row = driven.rows.partition_point(|row| row.time_s < label.time_s);
-                let there = sensed.get(row).and_then(Option::as_ref);
-                there.map(|example| Example { measured: label.measured, drive, ..example.clone() })
-            }
-        };
-        examples.extend(example);
-    }
-    let n_unknown = labels.len() - examples.len();
-    Ok((examples, n_unknown))
+    labels.iter().filter_map(|label| surveyor.example(surface, label, drive).transpose()).collect()
+}
+
+/// The same where the ground was looked at during the drive, at every row of its log; labels stand at rows.
+fn sensed_examples(sensed: &[Option<Example>], time_s: &[f64], labels: &[Label], drive: u32) -> Vec<Example> {
+    let example = |label: &Label| {
+        let row = time_s.partition_point(|&time_s| time_s < label.time_s);
+        let under = sensed.get(row)?.as_ref()?;
+        Some(Example { measured: label.measured, drive, ..under.clone() })
+    };
+    labels.iter().filter_map(example).collect()
 }

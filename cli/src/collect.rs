@@ -1,21 +1,24 @@
 //! `surefoot collect`: what was asked, the drives or a recorded one, and the dataset with its summary and picture.
 
+mod recorded;
 mod summary;
 
 use std::io::IsTerminal;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use bench::closed_loop::MapSource;
 use bench::collection::{
     Collection, CollectionError, HeightScale, Place, Request, collect, find_height_scale,
 };
+use bicycle::Vehicle;
 use evidential::Dataset;
 use formats::{read_vehicle, write_bytes_atomic, write_json_atomic};
 use indicatif::{ProgressBar, ProgressStyle};
 use scenarios::{RockFieldConfig, Split};
 
 use crate::arguments::{CollectArguments, CollectMap, CollectWorld};
+use crate::picture::draw_collection;
 use crate::{UsageError, output};
 use summary::CollectSummary;
 
@@ -27,26 +30,49 @@ const SCALES_TRIED: usize = 8;
 const ROOM_BYTES: u64 = 64 << 20;
 
 pub(crate) fn run(arguments: &CollectArguments) -> anyhow::Result<()> {
-    let mut request = request(arguments)?;
-    let folder = arguments.out.parent().filter(|folder| !folder.as_os_str().is_empty());
+    let picture = prepare_output(arguments)?;
+    let vehicle = read_vehicle(arguments.vehicle_name_or_path()).map_err(UsageError::from_input)?;
+    let began = Instant::now();
+    let (collection, scale) = match (&arguments.log, &arguments.elevation) {
+        (Some(log), Some(elevation)) => (recorded::gather(&vehicle, log, elevation)?, None),
+        _ => drive(arguments, &vehicle)?,
+    };
+    let summary = CollectSummary::of(&collection, scale, began.elapsed().as_secs_f64());
+    write_bytes_atomic(&arguments.out, &collection.dataset.to_bytes()?)?;
+    arguments.json.as_deref().map_or(Ok(()), |path| write_json_atomic(path, &summary))?;
+    draw_collection(&collection, &vehicle, &picture)?;
+    print!("{summary}");
+    println!("  {}\n  {}", arguments.out.display(), picture.display());
+    Ok(())
+}
+
+/// Tries out the places of the results and tells where the picture goes.
+fn prepare_output(arguments: &CollectArguments) -> Result<PathBuf, UsageError> {
+    let out = &arguments.out;
+    if out.is_dir() || out.file_name().is_none() {
+        return Err(UsageError(format!("--out: expected a file, found the folder {}", out.display())));
+    }
+    let folder = out.parent().filter(|folder| !folder.as_os_str().is_empty());
     formats::prepare_out_dir(folder.unwrap_or(Path::new(".")), ROOM_BYTES)
         .map_err(|error| UsageError(format!("--out: {}", UsageError::from_input(error))))?;
     arguments.json.as_deref().map_or(Ok(()), output::prepare_json)?;
-    let began = Instant::now();
+    Ok(out.with_extension("png"))
+}
+
+/// Simulated drives, and the height scale if one was looked for.
+fn drive(
+    arguments: &CollectArguments,
+    vehicle: &Vehicle,
+) -> anyhow::Result<(Collection, Option<HeightScale>)> {
+    let mut request = request(arguments, vehicle)?;
     let scale = find_scale(arguments, &mut request)?;
     let bar = bar(u64::from(request.n_maps) * u64::from(request.n_trials));
     let collected = collect(&request, || bar.inc(1));
     bar.finish_and_clear();
-    let collection = collected.map_err(told)?;
-    let summary = CollectSummary::of(&collection, scale, began.elapsed().as_secs_f64());
-    write(arguments, &collection, &summary)?;
-    print!("{summary}");
-    println!("  {}", arguments.out.display());
-    Ok(())
+    Ok((collected.map_err(told)?, scale))
 }
 
-fn request(arguments: &CollectArguments) -> Result<Request, UsageError> {
-    let vehicle = read_vehicle(arguments.vehicle_name_or_path()).map_err(UsageError::from_input)?;
+fn request(arguments: &CollectArguments, vehicle: &Vehicle) -> Result<Request, UsageError> {
     let split = Split::from(arguments.split);
     let place = match arguments.world {
         CollectWorld::Rocks => {
@@ -75,7 +101,7 @@ fn request(arguments: &CollectArguments) -> Result<Request, UsageError> {
             CollectMap::Sensed => MapSource::Sensed,
         },
         n_threads: arguments.n_threads(),
-        ..Request::new(vehicle, place, arguments.seed)
+        ..Request::new(vehicle.clone(), place, arguments.seed)
     })
 }
 
@@ -90,7 +116,8 @@ fn find_scale(arguments: &CollectArguments, request: &mut Request) -> anyhow::Re
     Ok(Some(found))
 }
 
-fn read_dataset(path: &Path) -> Result<Dataset, UsageError> {
+/// A dataset from its file.
+pub(crate) fn read_dataset(path: &Path) -> Result<Dataset, UsageError> {
     let told = |error: &dyn std::fmt::Display| UsageError(format!("{}: {error}", path.display()));
     let bytes =
         std::fs::read(path).map_err(|error| told(&format!("expected a readable file, found: {error}")))?;
@@ -110,22 +137,17 @@ fn bar(n_trials: u64) -> ProgressBar {
     bar
 }
 
-/// Worlds and vehicles that cannot be driven are the user's choice; all else is not.
+/// What was asked for cannot be: the user's choice. All else is not.
 fn told(error: CollectionError) -> anyhow::Error {
     match error {
-        CollectionError::Place(_) | CollectionError::NoStart { .. } | CollectionError::Setting { .. } => {
-            UsageError::from_input(error).into()
-        }
+        CollectionError::Place(_)
+        | CollectionError::NoStart { .. }
+        | CollectionError::Setting { .. }
+        | CollectionError::Labels(_)
+        | CollectionError::Layers(_)
+        | CollectionError::NotCovered { .. }
+        | CollectionError::Dataset(_)
+        | CollectionError::Survey(_) => UsageError::from_input(error).into(),
         other => other.into(),
     }
-}
-
-fn write(
-    arguments: &CollectArguments,
-    collection: &Collection,
-    summary: &CollectSummary,
-) -> anyhow::Result<()> {
-    write_bytes_atomic(&arguments.out, &collection.dataset.to_bytes()?)?;
-    arguments.json.as_deref().map_or(Ok(()), |path| write_json_atomic(path, summary))?;
-    Ok(())
 }

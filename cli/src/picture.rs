@@ -3,8 +3,10 @@
 
 mod axes;
 mod canvas;
+mod collection;
 mod colour;
 mod legend;
+mod loss_curves;
 mod map;
 mod navigation_table;
 mod relief;
@@ -19,7 +21,9 @@ use scenarios::{Bounds, World};
 use terrain::GridMap;
 
 use canvas::{Anchor, Canvas, TextStyle};
+pub use collection::draw_collection;
 use colour::Rgb;
+pub use loss_curves::draw_loss_curves;
 pub use navigation_table::draw_navigation_table;
 pub use traction_map::draw_traction_map;
 

@@ -11,7 +11,7 @@ use scenarios::{Bounds, Episode, EpisodeConfig, Outcome, RangeSensorConfig, Spli
 use terrain::{AssumedGround, ElevationMap, Footprint, GridMap, Pose, SurfaceCell};
 
 use super::place::stream;
-use super::{CollectionError, Place, Request};
+use super::{CollectionError, Place, Request, Trial};
 use crate::closed_loop::MapSource;
 
 /// A world ready to be driven in.
@@ -39,7 +39,18 @@ pub(super) struct Driven {
     pub sensed: Option<Vec<Option<Example>>>,
     pub outcome: Outcome,
     pub time_s: f64,
-    pub path_length_m: f64,
+}
+
+impl Driven {
+    pub fn trial(&self, n_labels: usize, n_examples: usize) -> Trial {
+        Trial {
+            map: self.map,
+            outcome: Some(self.outcome),
+            time_s: self.time_s,
+            n_examples,
+            n_unknown_ground: n_labels - n_examples,
+        }
+    }
 }
 
 /// Places tried for a start.
@@ -117,7 +128,6 @@ pub(super) fn drive(
         sensed: own_map.map(|own_map| own_map.under_rows),
         outcome: episode.outcome().unwrap_or(Outcome::Stopped),
         time_s: episode.time_s(),
-        path_length_m: episode.path_length_m(),
         name,
     })
 }

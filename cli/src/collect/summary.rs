@@ -51,7 +51,8 @@ impl CollectSummary {
         let dataset = &collection.dataset;
         let mut outcomes = BTreeMap::new();
         for trial in &collection.trials {
-            *outcomes.entry(trial.outcome.to_string()).or_default() += 1;
+            let ended = trial.outcome.map_or_else(|| "recorded".to_owned(), |outcome| outcome.to_string());
+            *outcomes.entry(ended).or_default() += 1;
         }
         let trials = collection.trials.iter();
         Self {

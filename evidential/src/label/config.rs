@@ -1,6 +1,6 @@
 //! What is labelled and what is masked.
 
-use bicycle::Vehicle;
+use bicycle::{Geometry, Limits};
 use serde::{Deserialize, Serialize};
 
 /// Thresholds of [`crate::labels`].
@@ -67,13 +67,12 @@ pub enum LabelError {
 
 impl LabelConfig {
     /// Thresholds that fit a vehicle: a tenth of its speed limit, a fifth of the yaw rate at full lock and that speed.
-    pub fn for_vehicle(vehicle: &Vehicle) -> Self {
-        let limits = &vehicle.limits;
-        let turn_radps = limits.speed_max_mps * limits.steering_max_rad.tan() / vehicle.geometry.wheelbase_m;
+    pub fn for_vehicle(geometry: &Geometry, limits: &Limits) -> Self {
+        let turn_radps = limits.speed_max_mps * limits.steering_max_rad.tan() / geometry.wheelbase_m;
         Self {
             period_s: 0.2,
             standing_period_s: 1.0,
-            moved_min_m: 0.01 * vehicle.geometry.length_m,
+            moved_min_m: 0.01 * geometry.length_m,
             window_s: 0.3,
             start_s: 1.0,
             end_s: 0.2,

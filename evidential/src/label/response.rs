@@ -27,24 +27,31 @@ pub struct Responses {
 /// Delays and time constants that are tried [s].
 const DELAYS_S: [f64; 13] = [0.0, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4, 0.5, 0.6, 0.8, 1.0];
 const TIME_CONSTANTS_S: [f64; 14] = [0.0, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.4, 0.5, 0.6, 0.8, 1.0, 1.5, 2.0];
-/// The worst response tried must leave this share of the motion's energy more unexplained than the best, or the log
-/// does not tell: a command that never changes arrives as itself, whatever the response.
-const TELLING_SHARE: f64 = 0.005;
+/// Length of the stretches that each have a gain and a scatter of their own [s].
+const STRETCH_S: f64 = 5.0;
+/// The best response must be likelier than the worst by this much, or the log does not tell: a command that never
+/// changes arrives as itself, whatever the response [nats].
+const TELLING_NATS: f64 = 20.0;
+/// Added to the mean square of what a response leaves unexplained, so that no log is explained perfectly: 1 mm/s or
+/// 1 mrad/s.
+const FLOOR: f64 = 1e-6;
 
 impl Responses {
-    /// The responses that explain the motion of all runs best, the gain of every run free: a gain below one is what
-    /// the ground takes.
+    /// The responses that explain the motion of all runs best. Of every stretch of a few seconds the gain is free,
+    /// since what the ground takes is a gain below one, and so is the scatter: where the ground changed or the vehicle
+    /// got stuck, the motion says little of its servos.
     pub(super) fn estimate(runs: &[Signals]) -> Self {
         let speed = best(|response| {
-            let of_run = |run: &Signals| Energy::of(&run.speed_mps, &run.arrived_speed(response));
-            runs.iter().map(of_run).fold(Energy::default(), Energy::plus)
+            let of_run =
+                |run: &Signals| misfit_nats(&run.time_s, &run.speed_mps, &run.arrived_speed(response));
+            runs.iter().map(of_run).sum()
         });
         let speeds_mps: Vec<Vec<f64>> = runs.iter().map(|run| run.arrived_speed(&speed)).collect();
         let turn = best(|response| {
             let of_run = |(run, speed_mps): (&Signals, &Vec<f64>)| {
-                Energy::of(&run.yaw_rate_radps, &run.arrived_yaw_rate(response, speed_mps))
+                misfit_nats(&run.time_s, &run.yaw_rate_radps, &run.arrived_yaw_rate(response, speed_mps))
             };
-            runs.iter().zip(&speeds_mps).map(of_run).fold(Energy::default(), Energy::plus)
+            runs.iter().zip(&speeds_mps).map(of_run).sum()
         });
         Self { speed, turn }
     }
@@ -85,42 +92,114 @@ impl Response {
     }
 }
 
-/// Sums of squares of a motion.
-#[derive(Clone, Copy, Debug, Default)]
-struct Energy {
-    total: f64,
-    /// What is left once the expected motion, times the gain that fits best, is taken away.
-    unexplained: f64,
+/// Sum of [`stretch_nats`] over the stretches of a run.
+fn misfit_nats(time_s: &[f64], measured: &[f64], expected: &[f64]) -> f64 {
+    let Some(first_s) = time_s.first() else { return 0.0 };
+    let stretch = |row: usize| ((time_s[row] - first_s) / STRETCH_S).floor();
+    let rows: Vec<usize> = (0..time_s.len()).collect();
+    let stretches = rows.chunk_by(|&a, &b| stretch(a) == stretch(b));
+    stretches.map(|rows| stretch_nats(rows.iter().map(|&row| (measured[row], expected[row])))).sum()
 }
 
-impl Energy {
-    fn of(measured: &[f64], expected: &[f64]) -> Self {
-        let (mut yy, mut yf, mut ff) = (0.0, 0.0, 0.0);
-        for (y, f) in measured.iter().zip(expected).filter(|(y, f)| y.is_finite() && f.is_finite()) {
-            yy += y * y;
-            yf += y * f;
-            ff += f * f;
-        }
-        let explained = if ff > 0.0 { yf.max(0.0).powi(2) / ff } else { 0.0 };
-        Self { total: yy, unexplained: yy - explained }
+/// Negative logarithm of the likelihood of a motion, but for constants: it scatters normally around the expected one
+/// times a gain >= 0, gain and scatter being those that fit best. Pairs of measured and expected motion.
+fn stretch_nats(pairs: impl Iterator<Item = (f64, f64)>) -> f64 {
+    let (mut n, mut yy, mut yf, mut ff) = (0.0, 0.0, 0.0, 0.0);
+    for (y, f) in pairs.filter(|(y, f)| y.is_finite() && f.is_finite()) {
+        n += 1.0;
+        yy += y * y;
+        yf += y * f;
+        ff += f * f;
     }
-
-    fn plus(self, other: Self) -> Self {
-        Self { total: self.total + other.total, unexplained: self.unexplained + other.unexplained }
+    if n == 0.0 {
+        return 0.0;
     }
+    let explained = if ff > 0.0 { yf.max(0.0).powi(2) / ff } else { 0.0 };
+    // Rounding may leave a perfect fit below zero.
+    0.5 * n * ((yy - explained).max(0.0) / n + FLOOR).ln()
 }
 
-/// The response that leaves least unexplained; none when the motion does not tell them apart.
-fn best(energy: impl Fn(&Response) -> Energy) -> Response {
+/// The response that fits best; none when the motion does not tell them apart.
+fn best(misfit_nats: impl Fn(&Response) -> f64) -> Response {
     let candidates = DELAYS_S.into_iter().flat_map(|delay_s| {
         TIME_CONSTANTS_S.into_iter().map(move |time_constant_s| Response { delay_s, time_constant_s })
     });
-    let judged: Vec<(Response, Energy)> = candidates.map(|response| (response, energy(&response))).collect();
-    let of = |(_, energy): &&(Response, Energy)| energy.unexplained;
-    let least = judged.iter().min_by(|a, b| of(a).total_cmp(&of(b)));
-    let most = judged.iter().map(|judged| judged.1.unexplained).fold(0.0, f64::max);
-    match least {
-        Some((response, energy)) if most - energy.unexplained > TELLING_SHARE * energy.total => *response,
-        _ => Response::default(),
+    let (mut best, mut least, mut most) = (Response::default(), f64::INFINITY, f64::NEG_INFINITY);
+    for response in candidates {
+        let nats = misfit_nats(&response);
+        most = most.max(nats);
+        if nats < least {
+            (best, least) = (response, nats);
+        }
+    }
+    if most - least > TELLING_NATS { best } else { Response::default() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn steps(n: usize, dt_s: f64) -> Vec<f64> {
+        (0..n).map(|row| row as f64 * dt_s).collect()
+    }
+
+    #[test]
+    fn a_step_arrives_after_the_delay_as_an_exponential() {
+        let time_s = steps(60, 0.1);
+        let commanded: Vec<f64> = time_s.iter().map(|t| if *t < 0.95 { 0.0 } else { 2.0 }).collect();
+        let response = Response { delay_s: 0.25, time_constant_s: 0.4 };
+        let arrived = response.follow(&time_s, &commanded, 0.0);
+        // The command of the row at 1.0 s begins to act at 1.25 s.
+        for (t, value) in time_s.iter().zip(&arrived) {
+            let expected = if *t < 1.25 { 0.0 } else { 2.0 * (1.0 - (-(t - 1.25) / 0.4_f64).exp()) };
+            assert!((value - expected).abs() < 1e-9, "{t}: {value} {expected}");
+        }
+    }
+
+    #[test]
+    fn no_response_is_the_command_itself_and_what_is_no_number_changes_nothing() {
+        let time_s = steps(5, 0.1);
+        let commanded = [1.0, 2.0, f64::NAN, 3.0, f64::NAN];
+        assert_eq!(Response::default().follow(&time_s, &commanded, 9.0), [1.0, 2.0, 2.0, 3.0, 3.0]);
+        assert!(Response::default().follow(&[], &[], 1.0).is_empty());
+    }
+
+    #[test]
+    fn the_response_does_not_depend_on_how_often_a_held_command_is_logged() {
+        let response = Response { delay_s: 0.13, time_constant_s: 0.2 };
+        let command = |t: f64| (t / 0.5).floor();
+        let of = |dt_s: f64, n: usize| {
+            let time_s = steps(n, dt_s);
+            let commanded: Vec<f64> = time_s.iter().map(|t| command(*t + 1e-9)).collect();
+            response.follow(&time_s, &commanded, 0.0)
+        };
+        let (coarse, fine) = (of(0.5, 8), of(0.05, 71));
+        for (row, value) in coarse.iter().enumerate() {
+            assert!((value - fine[10 * row]).abs() < 1e-9, "{row}");
+        }
+    }
+
+    #[test]
+    fn misfit_prefers_the_true_gain_and_punishes_the_wrong_sign() {
+        let f: Vec<f64> = (0..50).map(|k| (0.3 * f64::from(k)).sin()).collect();
+        let of = |gain: f64| stretch_nats(f.iter().map(|v| (gain * v, *v)));
+        // Any gain fits perfectly: nothing but the floor is left, 25 ln 1e-6.
+        assert!((of(0.4) - 25.0 * FLOOR.ln()).abs() < 1e-6);
+        let left: f64 = f.iter().map(|v| v * v).sum::<f64>() / 50.0;
+        assert!((of(-1.0) - 25.0 * (left + FLOOR).ln()).abs() < 1e-9);
+        assert_eq!(stretch_nats([(f64::NAN, 1.0)].into_iter()), 0.0);
+    }
+
+    #[test]
+    fn every_stretch_has_its_own_gain() {
+        let time_s = steps(100, 0.1);
+        let expected = vec![1.0; 100];
+        let measured =
+            |at_s: f64| time_s.iter().map(|t| if *t < at_s { 0.9 } else { 0.3 }).collect::<Vec<_>>();
+        let perfect = 50.0 * FLOOR.ln();
+        assert!((misfit_nats(&time_s, &measured(4.95), &expected) - perfect).abs() < 1e-6);
+        // A change within a stretch spoils that one alone: 25 rows of each, 0.3 off their mean.
+        let spoilt = 25.0 * FLOOR.ln() + 25.0 * (0.09 + FLOOR).ln();
+        assert!((misfit_nats(&time_s, &measured(7.45), &expected) - spoilt).abs() < 1e-6);
     }
 }
