@@ -47,7 +47,10 @@ pub(crate) fn required<R: Read + Seek>(archive: &mut ZipArchive<R>, name: &str) 
 }
 
 /// An array that may be missing.
-pub(crate) fn optional<R: Read + Seek>(archive: &mut ZipArchive<R>, name: &str) -> Result<Option<Array>, Refusal> {
+pub(crate) fn optional<R: Read + Seek>(
+    archive: &mut ZipArchive<R>,
+    name: &str,
+) -> Result<Option<Array>, Refusal> {
     let broken = |error: &dyn std::fmt::Display| Refusal::new(name, "a complete array", one_line(error));
     match archive.by_name(&format!("{name}.npy")) {
         Ok(entry) => Array::read(name, entry).map(Some),
@@ -78,7 +81,11 @@ impl Array {
         })?;
         let n_values = shape.iter().try_fold(1_usize, |n, extent| n.checked_mul(*extent));
         let Some(n_values) = n_values.filter(|n| *n <= ELEMENTS_MAX) else {
-            return Err(Refusal::new(name, format!("at most {ELEMENTS_MAX} cells"), format!("shape {shape:?}")));
+            return Err(Refusal::new(
+                name,
+                format!("at most {ELEMENTS_MAX} cells"),
+                format!("shape {shape:?}"),
+            ));
         };
         let bytes = read_exactly(&mut source, n_values * decode.width)
             .map_err(|found| Refusal::new(name, format!("{} bytes", n_values * decode.width), found))?;

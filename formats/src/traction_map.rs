@@ -94,8 +94,8 @@ pub enum TractionMapError {
 /// Unreadable file, and all that [`parse_traction_map`] refuses.
 pub fn read_traction_map(path: &Path) -> Result<TractionMap, TractionMapError> {
     let name = path.display().to_string();
-    let bytes = std::fs::read(path)
-        .map_err(|source| TractionMapError::Unreadable { file: name.clone(), source })?;
+    let bytes =
+        std::fs::read(path).map_err(|source| TractionMapError::Unreadable { file: name.clone(), source })?;
     parse_traction_map(&name, &bytes)
 }
 

@@ -27,7 +27,8 @@ struct Draft {
 impl Draft {
     fn new() -> Self {
         // All mass of row r, column c in bin r + 3 c.
-        let pmf = Array3::from_shape_fn((12, 2, 3), |(bin, row, col)| f32::from(u8::from(bin == row + 3 * col)));
+        let pmf =
+            Array3::from_shape_fn((12, 2, 3), |(bin, row, col)| f32::from(u8::from(bin == row + 3 * col)));
         Self {
             bin_values: Bins::TRACTION.values().to_vec(),
             cell_m: 0.5,
@@ -129,14 +130,24 @@ fn wrong_shapes_and_bins_are_refused() {
 fn numbers_that_are_none_are_told_with_their_place() {
     let mut draft = Draft::new();
     draft.elevation[[0, 2]] = f32::INFINITY;
-    assert!(draft.refusal().contains("elevation: expected finite numbers in known cells, found inf at row 0, column 2"));
+    assert!(
+        draft
+            .refusal()
+            .contains("elevation: expected finite numbers in known cells, found inf at row 0, column 2")
+    );
     let mut draft = Draft::new();
     draft.density[[1, 0]] = f32::NAN;
     assert!(draft.refusal().contains("predicted_normalised_density"), "{}", draft.refusal());
-    for (value, found) in [(f32::NAN, "the probability NaN"), (-0.5, "the probability -0.5"), (0.5, "the sum 1.5")] {
+    for (value, found) in
+        [(f32::NAN, "the probability NaN"), (-0.5, "the probability -0.5"), (0.5, "the sum 1.5")]
+    {
         let mut draft = Draft::new();
         draft.pmf[[7, 1, 0]] = value;
-        assert!(draft.refusal().contains(&format!("found {found} at row 1, column 0")), "{}", draft.refusal());
+        assert!(
+            draft.refusal().contains(&format!("found {found} at row 1, column 0")),
+            "{}",
+            draft.refusal()
+        );
     }
 }
 

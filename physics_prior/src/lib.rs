@@ -43,6 +43,6 @@ pub use config::{PriorConfig, PriorConfigError};
 pub use lattice::Ratio;
 pub use prior_field::{PosePrior, PriorField};
 pub use skid_steer::{
-    ANGULAR, COMPENSATION, LINEAR, Quantiles, SkidSteerBelief, SkidSteerGround, SkidSteerPrior,
+    ANGULAR, COMPENSATION, HIDDEN, LINEAR, Quantiles, SkidSteerBelief, SkidSteerGround, SkidSteerPrior,
 };
 pub use prior_map::{Assumption, PriorMap, PriorMapError};

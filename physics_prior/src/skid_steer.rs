@@ -15,8 +15,10 @@
 //!   for wheeled vehicles): gross traction 0.75 (1 - exp(-0.3 C S)), motion resistance 1.2 / C + 0.04, both over the
 //!   load, with the wheel numeric C of hard, firm, tilled and soft soil, each as likely. Headings are equally likely.
 //! - **Turning on a slope.** What gravity takes of the friction circle is missing for scrubbing.
-//! - **What stands or hangs there.** Seen from above a twig over the path and a bush in it look alike: one half leaves
-//!   traction as it is, of the other half nothing is known.
+//! - **What is in the way.** One half of it is firm, trunks, logs and rocks, and stops the machine in translation and
+//!   in turning alike; the other half gives way, and nothing is known of how much. Some of it is too low for a map:
+//!   of a forest's floor after felling typically 4 % are stumps and 3 % boulders ([`HIDDEN`]; terrain model of Ersson
+//!   et al. 2013, as printed with Silva Fennica 1386).
 
 use traversability::{Bins, N_BINS, Pmf};
 
@@ -37,8 +39,10 @@ const WHEEL_NUMERICS: [f64; 4] = [50.0, 30.0, 20.0, 15.0];
 const GRIP: f64 = 0.75;
 /// Headings over which a slope is averaged.
 const N_HEADINGS: usize = 16;
-/// Share of what stands or hangs in a cell that may be in the way.
-const IN_THE_WAY: f64 = 0.5;
+/// Probability that a forest's floor holds something in the way that no map shows.
+pub const HIDDEN: f64 = 0.07;
+/// Share of what is in the way that is firm.
+const FIRM: f64 = 0.5;
 
 /// A distribution given by the values at the probabilities 0, 5, 25, 50, 75, 95 and 100 %.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -87,7 +91,7 @@ impl Quantiles {
 pub struct SkidSteerGround {
     /// Steepness: length of the gradient [-], finite and >= 0.
     pub steepness: f64,
-    /// Probability that something stands or hangs there, in [0, 1].
+    /// Probability that something is in the way, in [0, 1], apart from what is hidden.
     pub obstruction: f64,
 }
 
@@ -125,9 +129,14 @@ impl SkidSteerPrior {
         let SkidSteerGround { steepness, obstruction } = ground;
         assert!(steepness.is_finite() && steepness >= 0.0, "steepness: expected >= 0, found {steepness}");
         assert!((0.0..=1.0).contains(&obstruction), "obstruction: expected [0, 1], found {obstruction}");
-        let described = (1.0 - self.uniform_weight) * (1.0 - IN_THE_WAY * obstruction);
-        let spread = |pmf: Pmf| pmf.mixed_with(&Pmf::UNIFORM, (1.0 - described) as f32);
-        SkidSteerBelief { linear: spread(linear(steepness)), angular: spread(angular(steepness)) }
+        let blocked = 1.0 - (1.0 - HIDDEN) * (1.0 - obstruction);
+        let mut stopped = [0.0; N_BINS];
+        stopped[0] = 1.0;
+        let in_the_way = normalised(&stopped).mixed_with(&Pmf::UNIFORM, (1.0 - FIRM) as f32);
+        let over_all = |open: Pmf| {
+            open.mixed_with(&in_the_way, blocked as f32).mixed_with(&Pmf::UNIFORM, self.uniform_weight as f32)
+        };
+        SkidSteerBelief { linear: over_all(linear(steepness)), angular: over_all(angular(steepness)) }
     }
 }
 
@@ -224,7 +233,9 @@ mod tests {
     fn level_ground_keeps_the_measured_traction() {
         let level = belief(0.0, 0.0);
         let open = linear(0.0).mean(&Bins::TRACTION);
-        assert!((level.linear.mean(&Bins::TRACTION) - (0.8 * open + 0.1)).abs() < 1e-5);
+        // 7 % are blocked, of which half is stopped and half is anything; a fifth of all is anything.
+        let expected = 0.8 * (0.93 * open + 0.07 * 0.25) + 0.2 * 0.5;
+        assert!((level.linear.mean(&Bins::TRACTION) - expected).abs() < 1e-5);
         // Trapezoids between the quantiles: mean 0.735.
         assert!((open - 0.735).abs() < 0.02, "{open}");
         // Half is cut at a steering efficiency near 0.4, half near 0.75.
@@ -246,11 +257,13 @@ mod tests {
     }
 
     #[test]
-    fn what_stands_there_is_half_unknown() {
-        let [open, covered] = [0.0, 1.0].map(|obstruction| belief(0.1, obstruction));
-        for bin in 0..N_BINS {
-            let expected = 0.5 * open.linear.probabilities()[bin] + 0.5 / N_BINS as f32;
-            assert!((covered.linear.probabilities()[bin] - expected).abs() < 1e-6);
+    fn half_of_what_is_in_the_way_stops_the_machine() {
+        for pmf in [belief(0.1, 1.0).linear, belief(0.1, 1.0).angular] {
+            // 0.8 (1/2 stopped + 1/2 uniform) + 0.2 uniform.
+            for (bin, probability) in pmf.probabilities().iter().enumerate() {
+                let expected = 0.6 / 12.0 + if bin == 0 { 0.4 } else { 0.0 };
+                assert!((probability - expected).abs() < 1e-6, "{bin}: {probability}");
+            }
         }
     }
 

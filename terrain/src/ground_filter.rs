@@ -50,7 +50,12 @@ impl GroundFilter {
         let steepest_rad = std::f64::consts::FRAC_PI_2;
         let checks = [
             ("widest_object_m", self.widest_object_m, "a finite number > 0", self.widest_object_m > 0.0),
-            ("height_tolerance_m", self.height_tolerance_m, "a finite number >= 0", self.height_tolerance_m >= 0.0),
+            (
+                "height_tolerance_m",
+                self.height_tolerance_m,
+                "a finite number >= 0",
+                self.height_tolerance_m >= 0.0,
+            ),
             ("step_max_m", self.step_max_m, "a finite number > 0", self.step_max_m > 0.0),
             ("plane_radius_m", self.plane_radius_m, "a finite number > 0", self.plane_radius_m > 0.0),
             (
@@ -180,7 +185,10 @@ fn plane_around(
         else {
             continue;
         };
-        if at_row < geometry.n_rows && at_col < geometry.n_cols && is_ground[at_row * geometry.n_cols + at_col] {
+        if at_row < geometry.n_rows
+            && at_col < geometry.n_cols
+            && is_ground[at_row * geometry.n_cols + at_col]
+        {
             let height_m = surface_m.values()[at_row * geometry.n_cols + at_col];
             sums.add(col as f64 * geometry.resolution_m, row as f64 * geometry.resolution_m, height_m.into());
         }
@@ -237,7 +245,9 @@ mod tests {
     fn a_crown_as_wide_as_the_window_is_removed_and_a_wider_one_stays() {
         // 3.5 m across, and 10 m across.
         let crown = |n: usize| {
-            grid(move |row, col| plane(row, col) + if row.abs_diff(15).max(col.abs_diff(20)) <= n { 4.0 } else { 0.0 })
+            grid(move |row, col| {
+                plane(row, col) + if row.abs_diff(15).max(col.abs_diff(20)) <= n { 4.0 } else { 0.0 }
+            })
         };
         let ground = filter_ground(&crown(3), &GroundFilter { plane_radius_m: 3.0, ..FILTER }).unwrap();
         assert_is_plane(&ground);
@@ -260,7 +270,7 @@ mod tests {
 
     #[test]
     fn unknown_stays_unknown_and_tells_nothing() {
-        let hole = |row: usize, col: usize| (row + 2 * col) % 3 == 0;
+        let hole = |row: usize, col: usize| (row + 2 * col).is_multiple_of(3);
         let surface = grid(|row, col| if hole(row, col) { f32::NAN } else { plane(row, col) });
         let ground = filter_ground(&surface, &FILTER).unwrap();
         for (index, height) in ground.height_m.values().iter().enumerate() {

@@ -5,7 +5,9 @@
 use std::path::{Path, PathBuf};
 
 use bench::traction_map::{Head, Source, TractionMapReport, judge};
-use formats::read_traction_map;
+use bicycle::Column;
+use formats::{read_drive_log_csv, read_traction_map};
+use physics_prior::{ANGULAR, LINEAR, Quantiles};
 
 fn shared(file: &str) -> PathBuf {
     Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/data")).join(file)
@@ -42,4 +44,47 @@ fn physics_repairs_a_prediction_from_another_forest() {
     let angular = error(&report.angular, Source::FusedWithPhysics);
     assert!(angular < error(&report.angular, Source::Prediction), "{angular}");
     assert!(angular <= 1.05 * error(&report.angular, Source::Uniform), "{angular}");
+}
+
+/// Achieved over commanded motion of the recorded drive, one value per window of 2 s in steady state whose command is
+/// at least `command_min`; ascending.
+fn efficiencies(command: Column, achieved: Column, command_min: f64) -> Vec<f64> {
+    let file = read_drive_log_csv(&shared("logs/drive_warthog.csv")).unwrap();
+    let steady = &file.other_columns.iter().find(|column| column.name == "steady").unwrap().cells;
+    let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
+    let mut first = 0;
+    let mut found = Vec::new();
+    for run in file.log.runs() {
+        let is_steady = steady[first] == "1";
+        first += run.time_s().len();
+        let command = mean(run.column(command).unwrap());
+        if is_steady && command.abs() > command_min {
+            found.push(mean(run.column(achieved).unwrap()) / command);
+        }
+    }
+    found.sort_by(f64::total_cmp);
+    found
+}
+
+#[test]
+fn the_skid_steer_prior_has_the_quantiles_of_the_recorded_drive() {
+    let cases = [
+        (LINEAR, efficiencies(Column::CmdSpeed, Column::Vx, 0.5)),
+        (ANGULAR, efficiencies(Column::CmdWz, Column::Wz, 0.3)),
+    ];
+    for (quantiles, measured) in cases {
+        assert!(measured.len() > 150, "{} windows", measured.len());
+        for (knot, probability) in quantiles.values.iter().zip(Quantiles::PROBABILITIES).skip(1).take(5) {
+            let found = measured[(probability * (measured.len() - 1) as f64).round() as usize];
+            assert!((found - knot).abs() < 0.012, "{probability}: {found} instead of {knot}");
+        }
+    }
+}
+
+#[test]
+fn the_warthogs_effective_track_is_that_of_its_drive() {
+    // Yaw rate over that of its wheels: 1 / 1.69.
+    let efficiencies = efficiencies(Column::WheelWz, Column::Wz, 0.3);
+    let median = efficiencies[efficiencies.len() / 2];
+    assert!((1.0 / median - 1.69).abs() < 0.02, "{}", 1.0 / median);
 }

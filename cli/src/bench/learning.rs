@@ -44,11 +44,8 @@ fn file_name(path: &Path) -> String {
 }
 
 fn write(arguments: &BenchLearningArguments, name: &str, judgement: &Judgement) -> anyhow::Result<()> {
-    let written = Written {
-        revision: summary::revision(),
-        traction_map: name.to_owned(),
-        report: &judgement.report,
-    };
+    let written =
+        Written { revision: summary::revision(), traction_map: name.to_owned(), report: &judgement.report };
     for path in [Some(arguments.out.join("traction_map.json")), arguments.json.clone()].iter().flatten() {
         formats::write_json_atomic(path, &written)?;
     }

@@ -49,7 +49,11 @@ fn page(title: &str, map: &TractionMap, judgement: &Judgement) -> Canvas {
     draw_header(title, judgement, &mut canvas);
     draw_ground(map, judgement, &window, &mut canvas);
     let heads = [
-        ("linear", [&map.measured.linear, &map.predicted.linear], [&judgement.prior.linear, &judgement.fused.linear]),
+        (
+            "linear",
+            [&map.measured.linear, &map.predicted.linear],
+            [&judgement.prior.linear, &judgement.fused.linear],
+        ),
         (
             "angular",
             [&map.measured.angular, &map.predicted.angular],
