@@ -15,6 +15,12 @@ pub enum BenchError {
     /// The risk map cannot be made.
     #[error(transparent)]
     Prior(#[from] physics_prior::PriorMapError),
+    /// The networks make no sense.
+    #[error(transparent)]
+    Checkpoint(#[from] evidential::CheckpointError),
+    /// The map of what was learned cannot be made.
+    #[error(transparent)]
+    Belief(#[from] evidential::BeliefMapError),
     /// The cost-to-go field cannot be made.
     #[error(transparent)]
     CostToGo(#[from] mppi::CostToGoError),

@@ -5,6 +5,7 @@ pub mod closed_loop;
 pub mod collection;
 pub mod control;
 mod error;
+pub mod learned_map;
 pub mod navigation;
 pub mod prior_map;
 mod spread;

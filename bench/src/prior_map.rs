@@ -9,12 +9,13 @@ use serde::Serialize;
 use terrain::{CellRegion, GridGeometry, GridMap, SurfaceCell, TerrainClass};
 use traversability::CvarLevel;
 
-const WINDOW: GridGeometry = GridGeometry { resolution_m: 0.1, origin: [0, 0], n_rows: 96, n_cols: 81 };
-const N_YAWS: usize = 13;
+pub(crate) const WINDOW: GridGeometry =
+    GridGeometry { resolution_m: 0.1, origin: [0, 0], n_rows: 96, n_cols: 81 };
+pub(crate) const N_YAWS: usize = 13;
 /// 12 x 13 of 96 x 81 cells are 2 %.
-const CHANGED: [usize; 2] = [12, 13];
-const CVAR_LEVEL: f64 = 0.4;
-const SEED: u64 = 1;
+pub(crate) const CHANGED: [usize; 2] = [12, 13];
+pub(crate) const CVAR_LEVEL: f64 = 0.4;
+pub(crate) const SEED: u64 = 1;
 
 /// How to measure.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -90,7 +91,7 @@ pub fn measure(request: Request) -> Result<Report, BenchError> {
 }
 
 /// A block of 2 % of the cells, anywhere in the window.
-fn block(rng: &mut Xoshiro256PlusPlus) -> CellRegion {
+pub(crate) fn block(rng: &mut Xoshiro256PlusPlus) -> CellRegion {
     let mut side = |n: usize, length: usize| {
         let start = rng.random_range(0..=n - length);
         start..start + length
@@ -99,7 +100,7 @@ fn block(rng: &mut Xoshiro256PlusPlus) -> CellRegion {
 }
 
 /// Rough ground, some of it under plants, as uncertain as a range sensor leaves it.
-fn roughen(ground: &mut GridMap<SurfaceCell>, region: &CellRegion, rng: &mut Xoshiro256PlusPlus) {
+pub(crate) fn roughen(ground: &mut GridMap<SurfaceCell>, region: &CellRegion, rng: &mut Xoshiro256PlusPlus) {
     for cell in region.cells() {
         let [x_m, y_m] = WINDOW.centre_m(cell);
         let waves_m = 0.15 * (0.9 * x_m).sin() * (0.7 * y_m).cos();

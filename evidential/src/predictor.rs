@@ -13,7 +13,7 @@ mod tensors;
 use pulp::Simd;
 use traversability::{N_BINS, Pmf};
 
-pub(crate) use lanes::{Lanes, N_LANES};
+pub(crate) use lanes::{Lanes, N_LANES, register_of};
 pub(crate) use network::{BlockPrediction, Workspace};
 
 use crate::{Architecture, Checkpoint, CheckpointError};

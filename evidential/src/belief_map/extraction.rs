@@ -144,8 +144,8 @@ impl Reader<'_> {
     /// Bilinear heights; unknown corners are left out and the others count more, unless less than half is known.
     #[inline(always)]
     fn heights(&self, tap: &Tap) -> Heights {
-        let heights_m = tap.deltas.map(|delta| self.span(&self.ground.heights_m, delta));
-        let unknown = tap.deltas.map(|delta| self.span(&self.ground.unknown, delta));
+        let heights_m: [&Span; 4] = self.corners(&self.ground.heights_m, tap);
+        let unknown: [&Span; 4] = self.corners(&self.ground.unknown, tap);
         let [a, b, c, d] = tap.weights;
         let (mut height_m, mut known) = ([0.0; SPAN], [0.0; SPAN]);
         for k in 0..SPAN {
@@ -156,6 +156,12 @@ impl Reader<'_> {
             height_m[k] = if is_known { sum_m / (1.0 - missing) } else { 0.0 };
         }
         Heights { height_m, known }
+    }
+
+    #[inline(always)]
+    fn corners<'a>(&self, layer: &'a [f32], tap: &Tap) -> [&'a Span; 4] {
+        let [a, b, c, d] = tap.deltas;
+        [self.span(layer, a), self.span(layer, b), self.span(layer, c), self.span(layer, d)]
     }
 
     #[inline(always)]

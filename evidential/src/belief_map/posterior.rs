@@ -3,67 +3,87 @@
 //! The posterior's mean is a mixture of the prior's distribution and the networks'. Partial moments mix the same way
 //! (see [`traversability::PartialMoments`]), so no posterior distribution is ever built.
 
+use pulp::Simd;
 use traversability::{Bins, N_BINS};
 
-use crate::predictor::{Lanes, N_LANES};
+use crate::predictor::{Lanes, N_LANES, register_of};
+
+/// Partial moments of a block by bin.
+pub(super) type BlockMoments<'a> = [&'a [f32; N_LANES]; N_BINS];
+
+/// What CVaR is taken of: a mixture of two distributions.
+#[derive(Clone, Copy)]
+pub(super) struct Mixture<'a> {
+    /// Of the prior.
+    pub moments: BlockMoments<'a>,
+    /// Of the networks.
+    pub probabilities: &'a [Lanes; N_BINS],
+    /// Share of the networks.
+    pub share: &'a Lanes,
+}
 
 /// Share of the networks in the posterior, s n / (n_prior + s n).
 #[inline(always)]
-pub(super) fn learned_share(evidence: Lanes, prior_evidence: f32) -> Lanes {
-    evidence.map(|evidence| evidence / (prior_evidence + evidence))
-}
-
-/// CVaR of traction from the left.
-///
-/// `prior` holds partial moments by bin, `probabilities` the networks' distribution, `share` how much of it counts.
-#[inline(always)]
-pub(super) fn traction_cvar(
-    prior: &[&[f32; N_LANES]; N_BINS],
-    probabilities: &[Lanes; N_BINS],
-    share: &Lanes,
-    per_level: f32,
-) -> Lanes {
-    let values = Bins::TRACTION.values();
-    let (mut mass, mut moment) = (Lanes::ZERO, Lanes::ZERO);
-    let mut best = Lanes([values[0]; N_LANES]);
-    for bin in 1..N_BINS {
-        let step = values[bin] - values[bin - 1];
-        for lane in 0..N_LANES {
-            mass.0[lane] += probabilities[bin - 1].0[lane];
-            moment.0[lane] += mass.0[lane] * step;
-            let mixed = mixed(prior[bin][lane], moment.0[lane], share.0[lane]);
-            let tail = values[bin] - per_level * mixed;
-            best.0[lane] = if tail > best.0[lane] { tail } else { best.0[lane] };
-        }
+pub(super) fn learned_share<S: Simd>(simd: S, evidence: &Lanes, prior_evidence: f32) -> Lanes {
+    let mut share = Lanes::ZERO;
+    for register in 0..Lanes::n_registers::<S>() {
+        let evidence = evidence.get::<S>(register);
+        let total = simd.add_f32s(simd.splat_f32s(prior_evidence), evidence);
+        share.set::<S>(register, simd.div_f32s(evidence, total));
     }
-    best
+    share
 }
 
-/// CVaR of an angle from the right [rad]; see [`traction_cvar`].
-#[inline(always)]
-pub(super) fn angle_cvar_rad(
-    prior: &[&[f32; N_LANES]; N_BINS],
-    probabilities: &[Lanes; N_BINS],
-    share: &Lanes,
-    per_level: f32,
-) -> Lanes {
-    let values = Bins::ATTITUDE.values();
-    let (mut mass, mut moment) = (Lanes::ZERO, Lanes::ZERO);
-    let mut best = Lanes([values[N_BINS - 1]; N_LANES]);
-    for bin in (0..N_BINS - 1).rev() {
-        let step = values[bin + 1] - values[bin];
-        for lane in 0..N_LANES {
-            mass.0[lane] += probabilities[bin + 1].0[lane];
-            moment.0[lane] += mass.0[lane] * step;
-            let mixed = mixed(prior[bin][lane], moment.0[lane], share.0[lane]);
-            let tail = values[bin] + per_level * mixed;
-            best.0[lane] = if tail < best.0[lane] { tail } else { best.0[lane] };
+impl Mixture<'_> {
+    /// CVaR of traction from the left: the largest v - E[(v - Z)^+] / level.
+    #[inline(always)]
+    pub fn traction_cvar<S: Simd>(&self, simd: S, per_level: f32) -> Lanes {
+        let values = Bins::TRACTION.values();
+        let mut cvar = Lanes::ZERO;
+        for register in 0..Lanes::n_registers::<S>() {
+            let (mut mass, mut moment) = (simd.splat_f32s(0.0), simd.splat_f32s(0.0));
+            let mut best = simd.splat_f32s(values[0]);
+            for bin in 1..N_BINS {
+                let more = self.probabilities[bin - 1].get::<S>(register);
+                mass = simd.add_f32s(mass, more);
+                let step = simd.splat_f32s(values[bin] - values[bin - 1]);
+                moment = simd.add_f32s(moment, simd.mul_f32s(mass, step));
+                let mixed = self.mixed(simd, register, bin, moment);
+                let below = simd.mul_f32s(simd.splat_f32s(per_level), mixed);
+                best = simd.max_f32s(best, simd.sub_f32s(simd.splat_f32s(values[bin]), below));
+            }
+            cvar.set::<S>(register, best);
         }
+        cvar
     }
-    best
-}
 
-#[inline(always)]
-fn mixed(prior: f32, learned: f32, share: f32) -> f32 {
-    prior * (1.0 - share) + learned * share
+    /// CVaR of an angle from the right, the smallest v + E[(Z - v)^+] / level [rad].
+    #[inline(always)]
+    pub fn angle_cvar_rad<S: Simd>(&self, simd: S, per_level: f32) -> Lanes {
+        let values = Bins::ATTITUDE.values();
+        let mut cvar = Lanes::ZERO;
+        for register in 0..Lanes::n_registers::<S>() {
+            let (mut mass, mut moment) = (simd.splat_f32s(0.0), simd.splat_f32s(0.0));
+            let mut best = simd.splat_f32s(values[N_BINS - 1]);
+            for bin in (0..N_BINS - 1).rev() {
+                let more = self.probabilities[bin + 1].get::<S>(register);
+                mass = simd.add_f32s(mass, more);
+                let step = simd.splat_f32s(values[bin + 1] - values[bin]);
+                moment = simd.add_f32s(moment, simd.mul_f32s(mass, step));
+                let mixed = self.mixed(simd, register, bin, moment);
+                let above = simd.mul_f32s(simd.splat_f32s(per_level), mixed);
+                best = simd.min_f32s(best, simd.add_f32s(simd.splat_f32s(values[bin]), above));
+            }
+            cvar.set::<S>(register, best);
+        }
+        cvar
+    }
+
+    #[inline(always)]
+    fn mixed<S: Simd>(&self, simd: S, register: usize, bin: usize, learned: S::f32s) -> S::f32s {
+        let prior = register_of::<S>(self.moments[bin], register);
+        let share = self.share.get::<S>(register);
+        let rest = simd.sub_f32s(simd.splat_f32s(1.0), share);
+        simd.add_f32s(simd.mul_f32s(prior, rest), simd.mul_f32s(learned, share))
+    }
 }

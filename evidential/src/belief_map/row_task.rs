@@ -7,7 +7,7 @@ use terrain::{GridMap, SurfaceCell};
 use traversability::{Ground, GroundFlags, N_BINS, PartialMoments, Risk};
 
 use super::extraction::{Extract, Features, Line};
-use super::posterior::{angle_cvar_rad, learned_share, traction_cvar};
+use super::posterior::{BlockMoments, Mixture, learned_share};
 use super::{BeliefLayers, Fusion};
 use crate::Prior;
 use crate::predictor::{BlockPrediction, Lanes, N_LANES, Workspace};
@@ -200,7 +200,7 @@ impl BeliefLayers {
             fusion: &self.fusion,
             prediction: &scratch.workspace.prediction,
             moments: Moments { values: &scratch.moments, stride, first_lane },
-            blocked: &scratch.blocked[first_lane..first_lane + N_LANES.min(stride - first_lane)],
+            blocked: &scratch.blocked[first_lane..],
             unknown: &scratch.unknown[first_lane..],
             out_of_distribution: &mut scratch.out_of_distribution[first_lane..],
             risks: &mut scratch.risks[first_lane..],
@@ -218,11 +218,15 @@ struct Moments<'a> {
 
 impl<'a> Moments<'a> {
     #[inline(always)]
-    fn of(&self, parameter: usize) -> [&'a [f32; N_LANES]; N_BINS] {
-        std::array::from_fn(|bin| {
+    fn of(&self, parameter: usize) -> BlockMoments<'a> {
+        let mut moments = [&[0.0; N_LANES]; N_BINS];
+        for (bin, moments) in moments.iter_mut().enumerate() {
             let first = (parameter * N_BINS + bin) * self.stride + self.first_lane;
-            self.values[first..].first_chunk().unwrap_or(&[0.0; N_LANES])
-        })
+            if let Some(lanes) = self.values[first..].first_chunk() {
+                *moments = lanes;
+            }
+        }
+        moments
     }
 }
 
@@ -241,26 +245,45 @@ impl pulp::WithSimd for Fuse<'_> {
     type Output = ();
 
     #[inline(always)]
-    fn with_simd<S: pulp::Simd>(self, _: S) {
-        let BlockPrediction { probabilities, log_density, evidence } = self.prediction;
+    fn with_simd<S: pulp::Simd>(self, simd: S) {
         let per_level = self.fusion.per_level;
-        let cvars: [Lanes; 4] = std::array::from_fn(|parameter| {
-            let mut share = match self.fusion.prior {
-                Prior::None => Lanes([1.0; N_LANES]),
-                Prior::Physics | Prior::Uniform => {
-                    learned_share(evidence[parameter], self.fusion.prior_evidence)
-                }
+        let mut cvars = [Lanes::ZERO; 4];
+        for (parameter, cvar) in cvars.iter_mut().enumerate() {
+            let mixture = Mixture {
+                moments: self.moments.of(parameter),
+                probabilities: &self.prediction.probabilities[parameter],
+                share: &self.share(simd, parameter),
             };
-            for (share, is_unknown) in share.0.iter_mut().zip(self.unknown) {
-                *share = if *is_unknown { 0.0 } else { *share };
+            *cvar = match parameter {
+                0 | 1 => mixture.traction_cvar(simd, per_level),
+                _ => mixture.angle_cvar_rad(simd, per_level),
+            };
+        }
+        self.keep(&cvars);
+    }
+}
+
+impl Fuse<'_> {
+    /// How much of the networks' distribution counts.
+    #[inline(always)]
+    fn share<S: pulp::Simd>(&self, simd: S, parameter: usize) -> Lanes {
+        let mut share = match self.fusion.prior {
+            Prior::None => Lanes([1.0; N_LANES]),
+            Prior::Physics | Prior::Uniform => {
+                learned_share(simd, &self.prediction.evidence[parameter], self.fusion.prior_evidence)
             }
-            let (prior, learned) = (self.moments.of(parameter), &probabilities[parameter]);
-            match parameter {
-                0 | 1 => traction_cvar(&prior, learned, &share, per_level),
-                _ => angle_cvar_rad(&prior, learned, &share, per_level),
-            }
-        });
-        for (lane, risk) in self.risks.iter_mut().enumerate().take(self.blocked.len()) {
+        };
+        for (share, is_unknown) in share.0.iter_mut().zip(self.unknown) {
+            *share = if *is_unknown { 0.0 } else { *share };
+        }
+        share
+    }
+
+    #[inline(always)]
+    fn keep(self, cvars: &[Lanes; 4]) {
+        let log_density = &self.prediction.log_density;
+        let n_lanes = N_LANES.min(self.blocked.len());
+        for (lane, risk) in self.risks.iter_mut().enumerate().take(n_lanes) {
             let is_out = log_density.0[lane] < self.fusion.log_density_min && !self.unknown[lane];
             self.out_of_distribution[lane] = is_out;
             let free = Risk {

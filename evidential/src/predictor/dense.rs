@@ -4,9 +4,9 @@
 //! result; the weights, packed once in the order in which they are read, stream past it. That leaves no work for a
 //! general matrix product, whose packing would cost as much as these products do.
 
-use pulp::{Simd, bytemuck};
+use pulp::Simd;
 
-use super::lanes::{Lanes, N_LANES};
+use super::lanes::Lanes;
 
 /// Outputs that are accumulated in registers at a time.
 const ROWS: usize = 12;
@@ -65,56 +65,70 @@ impl Dense {
     /// The outputs of a block of footprints, one [`Lanes`] per output.
     #[inline(always)]
     pub fn apply<S: Simd>(&self, simd: S, input: &[Lanes], output: &mut [Lanes]) {
+        let slope = match self.activation {
+            Activation::Linear => simd.splat_f32s(1.0),
+            Activation::Leaky(slope) => simd.splat_f32s(slope),
+        };
         let tiles = self.weights.chunks_exact(input.len()).zip(&self.biases);
         for ((weights, biases), output) in tiles.zip(output[..self.n_outputs].chunks_mut(ROWS)) {
+            let tile = Tile { weights, biases, slope };
             // As many sums as there are registers for; a short last tile needs fewer.
             match (S::REGISTER_COUNT >= 32, output.len()) {
-                (true, 9..) => tile::<S, 12, 2>(simd, weights, biases, input, output),
-                (true, 5..=8) => tile::<S, 8, 2>(simd, weights, biases, input, output),
-                (true, _) => tile::<S, 4, 2>(simd, weights, biases, input, output),
-                (false, 9..) => tile::<S, 12, 1>(simd, weights, biases, input, output),
-                (false, 5..=8) => tile::<S, 8, 1>(simd, weights, biases, input, output),
-                (false, _) => tile::<S, 4, 1>(simd, weights, biases, input, output),
-            }
-            if let Activation::Leaky(slope) = self.activation {
-                for lanes in output {
-                    *lanes = lanes.map(|sum| if sum > 0.0 { sum } else { slope * sum });
-                }
+                (true, 9..) => tile.apply::<12, 2>(simd, input, output),
+                (true, 5..=8) => tile.apply::<8, 2>(simd, input, output),
+                (true, _) => tile.apply::<4, 2>(simd, input, output),
+                (false, 9..) => tile.apply::<12, 1>(simd, input, output),
+                (false, 5..=8) => tile.apply::<8, 1>(simd, input, output),
+                (false, _) => tile.apply::<4, 1>(simd, input, output),
             }
         }
     }
 }
 
-/// `N` outputs of one tile, `V` registers of lanes at a time.
-#[inline(always)]
-fn tile<S: Simd, const N: usize, const V: usize>(
-    simd: S,
-    weights: &[[f32; ROWS]],
-    biases: &[f32; ROWS],
-    input: &[Lanes],
-    output: &mut [Lanes],
-) {
-    for start in (0..N_LANES / S::F32_LANES).step_by(V) {
-        let mut sums: [[S::f32s; V]; N] = std::array::from_fn(|row| [simd.splat_f32s(biases[row]); V]);
-        for (weights, lanes) in weights.iter().zip(input) {
-            let lanes: &[S::f32s] = bytemuck::cast_slice(&lanes.0);
-            let lanes: [S::f32s; V] = std::array::from_fn(|v| lanes[start + v]);
+/// Up to [`ROWS`] outputs of a layer.
+struct Tile<'a, S: Simd> {
+    /// Shape [input].
+    weights: &'a [[f32; ROWS]],
+    biases: &'a [f32; ROWS],
+    /// Of the outputs below zero.
+    slope: S::f32s,
+}
+
+impl<S: Simd> Tile<'_, S> {
+    /// `N` of the outputs, `V` registers of lanes at a time.
+    #[inline(always)]
+    fn apply<const N: usize, const V: usize>(&self, simd: S, input: &[Lanes], output: &mut [Lanes]) {
+        for start in (0..Lanes::n_registers::<S>()).step_by(V) {
+            let mut sums = [[simd.splat_f32s(0.0); V]; N];
             for row in 0..N {
-                let weight = simd.splat_f32s(weights[row]);
+                sums[row] = [simd.splat_f32s(self.biases[row]); V];
+            }
+            for (weights, lanes) in self.weights.iter().zip(input) {
+                let mut values = [simd.splat_f32s(0.0); V];
                 for v in 0..V {
-                    sums[row][v] = simd.mul_add_f32s(weight, lanes[v], sums[row][v]);
+                    values[v] = lanes.get::<S>(start + v);
+                }
+                for row in 0..N {
+                    let weight = simd.splat_f32s(weights[row]);
+                    for v in 0..V {
+                        sums[row][v] = simd.mul_add_f32s(weight, values[v], sums[row][v]);
+                    }
                 }
             }
-        }
-        for (sums, lanes) in sums.iter().zip(output.iter_mut()) {
-            let lanes: &mut [S::f32s] = bytemuck::cast_slice_mut(&mut lanes.0);
-            lanes[start..start + V].copy_from_slice(sums);
+            for (sums, lanes) in sums.iter().zip(output.iter_mut()) {
+                for v in 0..V {
+                    let is_positive = simd.greater_than_f32s(sums[v], simd.splat_f32s(0.0));
+                    let below = simd.mul_f32s(self.slope, sums[v]);
+                    lanes.set::<S>(start + v, simd.select_f32s(is_positive, sums[v], below));
+                }
+            }
         }
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::lanes::N_LANES;
     use super::*;
 
     struct Apply<'a>(&'a Dense, &'a [Lanes], &'a mut [Lanes]);

@@ -1,7 +1,9 @@
 //! Numbers of several footprints side by side, and the functions that the networks need of them.
 //!
-//! Loops over lanes have a fixed length and no branches, so that they become vector instructions inside
-//! [`pulp::Arch::dispatch`]. Products and sums stay apart, so that every instruction set gives the same bits.
+//! Everything is written in registers of the instruction set that [`pulp::Arch::dispatch`] picks. What is no matrix
+//! product keeps products and sums apart, so that every instruction set gives the same bits.
+
+use pulp::{Simd, bytemuck};
 
 /// Footprints that are worked on together: two registers of the widest instruction set.
 pub(crate) const N_LANES: usize = 32;
@@ -14,23 +16,26 @@ pub(crate) struct Lanes(pub [f32; N_LANES]);
 impl Lanes {
     pub const ZERO: Self = Self([0.0; N_LANES]);
 
-    #[inline(always)]
-    pub fn map(self, function: impl Fn(f32) -> f32) -> Self {
-        let mut result = self;
-        for lane in 0..N_LANES {
-            result.0[lane] = function(self.0[lane]);
-        }
-        result
+    /// Registers that hold the lanes.
+    pub const fn n_registers<S: Simd>() -> usize {
+        N_LANES / S::F32_LANES
     }
 
     #[inline(always)]
-    pub fn zip(self, other: Self, function: impl Fn(f32, f32) -> f32) -> Self {
-        let mut result = self;
-        for lane in 0..N_LANES {
-            result.0[lane] = function(self.0[lane], other.0[lane]);
-        }
-        result
+    pub fn get<S: Simd>(&self, register: usize) -> S::f32s {
+        register_of::<S>(&self.0, register)
     }
+
+    #[inline(always)]
+    pub fn set<S: Simd>(&mut self, register: usize, values: S::f32s) {
+        bytemuck::cast_slice_mut::<f32, S::f32s>(&mut self.0)[register] = values;
+    }
+}
+
+/// One of the registers that hold some lanes.
+#[inline(always)]
+pub(crate) fn register_of<S: Simd>(lanes: &[f32; N_LANES], register: usize) -> S::f32s {
+    bytemuck::cast_slice::<f32, S::f32s>(lanes)[register]
 }
 
 /// Largest argument of [`exp`] and, negated, the smallest: e^87 and e^-87 are normal numbers in f32.
@@ -38,7 +43,7 @@ const EXP_MAX: f32 = 87.0;
 
 /// Exponential function, relative error below 2e-7; arguments are cut to [-87, 87].
 #[inline(always)]
-pub(crate) fn exp(x: f32) -> f32 {
+pub(crate) fn exp<S: Simd>(simd: S, x: S::f32s) -> S::f32s {
     // 1.5 * 2^23: adding it rounds to an integer, which stands in the low bits.
     const ROUND: f32 = 12_582_912.0;
     // ln 2 in two parts, the first exact in few bits.
@@ -46,22 +51,23 @@ pub(crate) fn exp(x: f32) -> f32 {
     // Minimax of (e^r - 1 - r) / r^2 on |r| <= ln 2 / 2 (Cephes).
     const COEFFICIENTS: [f32; 6] =
         [1.987_569_1e-4, 1.398_199_9e-3, 8.333_452e-3, 4.166_579_5e-2, 1.666_666_5e-1, 0.5];
-    let x = x.clamp(-EXP_MAX, EXP_MAX);
-    let rounded = x * std::f32::consts::LOG2_E + ROUND;
-    let power = rounded - ROUND;
-    let r = x - power * LN_2[0] - power * LN_2[1];
-    let mut series = COEFFICIENTS[0];
-    for coefficient in &COEFFICIENTS[1..] {
-        series = series * r + coefficient;
-    }
-    let two_to_power = f32::from_bits((rounded.to_bits() << 23).wrapping_add(127 << 23));
-    (series * (r * r) + r + 1.0) * two_to_power
+    let real = |value: f32| simd.splat_f32s(value);
+    let x = simd.min_f32s(simd.max_f32s(x, real(-EXP_MAX)), real(EXP_MAX));
+    let rounded = simd.add_f32s(simd.mul_f32s(x, real(std::f32::consts::LOG2_E)), real(ROUND));
+    let power = simd.sub_f32s(rounded, real(ROUND));
+    let r = simd.sub_f32s(x, simd.mul_f32s(power, real(LN_2[0])));
+    let r = simd.sub_f32s(r, simd.mul_f32s(power, real(LN_2[1])));
+    let series = polynomial(simd, r, &COEFFICIENTS);
+    let near = simd.add_f32s(simd.mul_f32s(series, simd.mul_f32s(r, r)), simd.add_f32s(r, real(1.0)));
+    let bits = simd.wrapping_dyn_shl_u32s(simd.transmute_u32s_f32s(rounded), simd.splat_u32s(23));
+    let two_to_power = simd.transmute_f32s_u32s(simd.add_u32s(bits, simd.splat_u32s(127 << 23)));
+    simd.mul_f32s(near, two_to_power)
 }
 
 /// Natural logarithm of a normal positive number, absolute error below 2e-7 times one or the result; what is smaller
 /// counts as the smallest normal number.
 #[inline(always)]
-pub(crate) fn ln(x: f32) -> f32 {
+pub(crate) fn ln<S: Simd>(simd: S, x: S::f32s) -> S::f32s {
     // Minimax of (ln(1 + m) - m + m^2 / 2) / m^3 on sqrt(1/2) <= 1 + m <= sqrt(2) (Cephes).
     const COEFFICIENTS: [f32; 9] = [
         7.037_683_6e-2,
@@ -76,46 +82,74 @@ pub(crate) fn ln(x: f32) -> f32 {
     ];
     // sqrt(1/2), below which the mantissa takes its factor 2 from the exponent.
     const SPLIT: u32 = 0x3f35_04f3;
-    let bits = x.max(f32::MIN_POSITIVE).to_bits();
-    let shifted = bits.wrapping_sub(SPLIT);
-    let exponent = ((shifted as i32) >> 23) as f32;
-    let m = f32::from_bits((shifted & 0x007f_ffff).wrapping_add(SPLIT)) - 1.0;
-    let mut series = COEFFICIENTS[0];
-    for coefficient in &COEFFICIENTS[1..] {
-        series = series * m + coefficient;
+    // The bits of 2^23, whose last digit counts ones.
+    const COUNTER: u32 = 0x4b00_0000;
+    let (real, word) = (|value: f32| simd.splat_f32s(value), |value: u32| simd.splat_u32s(value));
+    let bits = simd.transmute_u32s_f32s(simd.max_f32s(x, real(f32::MIN_POSITIVE)));
+    let shifted = simd.sub_u32s(bits, word(SPLIT));
+    let biased = simd.wrapping_dyn_shr_u32s(simd.add_u32s(shifted, word(127 << 23)), word(23));
+    let exponent = simd.transmute_f32s_u32s(simd.or_u32s(biased, word(COUNTER)));
+    let exponent = simd.sub_f32s(exponent, real(8_388_608.0 + 127.0));
+    let mantissa = simd.add_u32s(simd.and_u32s(shifted, word(0x007f_ffff)), word(SPLIT));
+    let m = simd.sub_f32s(simd.transmute_f32s_u32s(mantissa), real(1.0));
+    let series = polynomial(simd, m, &COEFFICIENTS);
+    let squared = simd.mul_f32s(m, m);
+    let small =
+        simd.sub_f32s(simd.mul_f32s(simd.mul_f32s(series, m), squared), simd.mul_f32s(squared, real(0.5)));
+    let small = simd.add_f32s(small, simd.mul_f32s(exponent, real(-2.121_944_4e-4)));
+    simd.add_f32s(simd.add_f32s(m, small), simd.mul_f32s(exponent, real(0.693_359_375)))
+}
+
+/// A polynomial by its coefficients, highest power first.
+#[inline(always)]
+fn polynomial<S: Simd, const N: usize>(simd: S, x: S::f32s, coefficients: &[f32; N]) -> S::f32s {
+    let mut sum = simd.splat_f32s(coefficients[0]);
+    for coefficient in &coefficients[1..] {
+        sum = simd.add_f32s(simd.mul_f32s(sum, x), simd.splat_f32s(*coefficient));
     }
-    let squared = m * m;
-    let small = series * m * squared - 0.5 * squared + exponent * -2.121_944_4e-4;
-    m + small + exponent * 0.693_359_375
+    sum
 }
 
 /// 1 / (1 + e^-x).
 #[inline(always)]
-pub(crate) fn sigmoid(x: f32) -> f32 {
-    1.0 / (1.0 + exp(-x))
+pub(crate) fn sigmoid<S: Simd>(simd: S, x: S::f32s) -> S::f32s {
+    let one = simd.splat_f32s(1.0);
+    simd.div_f32s(one, simd.add_f32s(one, exp(simd, simd.neg_f32s(x))))
 }
 
 /// Turns one number per bin into probabilities.
 #[inline(always)]
-pub(crate) fn softmax<const N: usize>(logits: &mut [Lanes; N]) {
-    let mut largest = logits[0];
-    for logit in &logits[1..] {
-        largest = largest.zip(*logit, |a, b| if a > b { a } else { b });
-    }
-    let mut sum = Lanes::ZERO;
-    for logit in logits.iter_mut() {
-        *logit = logit.zip(largest, |logit, largest| exp(logit - largest));
-        sum = sum.zip(*logit, |sum, weight| sum + weight);
-    }
-    let per_sum = sum.map(|sum| 1.0 / sum);
-    for logit in logits.iter_mut() {
-        *logit = logit.zip(per_sum, |weight, per_sum| weight * per_sum);
+pub(crate) fn softmax<S: Simd, const N: usize>(simd: S, logits: &mut [Lanes; N]) {
+    for register in 0..Lanes::n_registers::<S>() {
+        let mut largest = logits[0].get::<S>(register);
+        for logit in &logits[1..] {
+            largest = simd.max_f32s(largest, logit.get::<S>(register));
+        }
+        let mut sum = simd.splat_f32s(0.0);
+        for logit in logits.iter_mut() {
+            let weight = exp(simd, simd.sub_f32s(logit.get::<S>(register), largest));
+            sum = simd.add_f32s(sum, weight);
+            logit.set::<S>(register, weight);
+        }
+        let per_sum = simd.div_f32s(simd.splat_f32s(1.0), sum);
+        for logit in logits.iter_mut() {
+            logit.set::<S>(register, simd.mul_f32s(logit.get::<S>(register), per_sum));
+        }
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// In the one lane of the plainest instruction set.
+    fn exp(x: f32) -> f32 {
+        super::exp(pulp::Scalar, x)
+    }
+
+    fn ln(x: f32) -> f32 {
+        super::ln(pulp::Scalar, x)
+    }
 
     #[test]
     fn the_exponential_agrees_with_the_library() {
@@ -144,9 +178,34 @@ mod tests {
     fn probabilities_follow_from_logits_of_any_size() {
         let mut logits = [Lanes([-1e6; N_LANES]), Lanes([3.0; N_LANES]), Lanes([3.0 + 2f32.ln(); N_LANES])];
         logits[0].0[1] = 1e6;
-        softmax(&mut logits);
+        softmax(pulp::Scalar, &mut logits);
         for (found, expected) in [(logits[0].0[0], 0.0), (logits[1].0[0], 1.0 / 3.0), (logits[0].0[1], 1.0)] {
             assert!((found - expected).abs() < 1e-6, "{found} {expected}");
         }
+    }
+
+    /// All functions of some numbers.
+    struct Functions<'a>(&'a mut [Lanes; 3]);
+
+    impl pulp::WithSimd for Functions<'_> {
+        type Output = ();
+
+        fn with_simd<S: Simd>(self, simd: S) {
+            for register in 0..Lanes::n_registers::<S>() {
+                let x = self.0[0].get::<S>(register);
+                self.0[1].set::<S>(register, super::exp(simd, x));
+                self.0[2].set::<S>(register, sigmoid(simd, super::ln(simd, simd.mul_f32s(x, x))));
+            }
+            softmax(simd, self.0);
+        }
+    }
+
+    #[test]
+    fn every_instruction_set_gives_the_same_bits() {
+        let x = Lanes(std::array::from_fn(|lane| 0.37 * lane as f32 - 5.0));
+        let (mut widest, mut plain) = ([x; 3], [x; 3]);
+        pulp::Arch::new().dispatch(Functions(&mut widest));
+        pulp::WithSimd::with_simd(Functions(&mut plain), pulp::Scalar);
+        assert_eq!(widest, plain);
     }
 }

@@ -94,13 +94,7 @@ impl Network {
             }
             false => None,
         };
-        Ok(Self {
-            encoder,
-            hidden: Dense::new(&weights, &biases, leaky),
-            heads,
-            head_hidden,
-            evidence,
-        })
+        Ok(Self { encoder, hidden: Dense::new(&weights, &biases, leaky), heads, head_hidden, evidence })
     }
 
     /// Whether predictions come with density and evidence.
@@ -147,7 +141,7 @@ impl Network {
         for ((head, hidden), probabilities) in self.heads.iter().zip(parts).zip(&mut prediction.probabilities)
         {
             head.apply(simd, hidden, probabilities);
-            softmax(probabilities);
+            softmax(simd, probabilities);
         }
         if let Some(evidence) = &self.evidence {
             let hidden = &hidden[N_HEADS * self.head_hidden..];
@@ -180,12 +174,16 @@ impl EvidenceHead {
         prediction: &mut BlockPrediction,
     ) {
         self.scales.apply(simd, hidden, &mut prediction.evidence);
-        prediction.log_density = self.flow.log_density(latent);
-        let count = prediction.log_density.map(|log_density| {
-            exp((log_density + self.log_budget).clamp(-LOG_EVIDENCE_MAX, LOG_EVIDENCE_MAX))
-        });
-        for evidence in &mut prediction.evidence {
-            *evidence = evidence.zip(count, |logit, count| sigmoid(logit) * count);
+        self.flow.log_density(simd, latent, &mut prediction.log_density);
+        let (least, most) = (simd.splat_f32s(-LOG_EVIDENCE_MAX), simd.splat_f32s(LOG_EVIDENCE_MAX));
+        for register in 0..Lanes::n_registers::<S>() {
+            let log_density = prediction.log_density.get::<S>(register);
+            let log_count = simd.add_f32s(log_density, simd.splat_f32s(self.log_budget));
+            let count = exp(simd, simd.min_f32s(simd.max_f32s(log_count, least), most));
+            for evidence in &mut prediction.evidence {
+                let scale = sigmoid(simd, evidence.get::<S>(register));
+                evidence.set::<S>(register, simd.mul_f32s(scale, count));
+            }
         }
     }
 }

@@ -1,6 +1,8 @@
 //! Density of latents under stacked radial flows (NOTES 1.1).
 
-use super::lanes::{Lanes, N_LANES, ln};
+use pulp::Simd;
+
+use super::lanes::{Lanes, ln};
 
 /// One layer: z + b h (z - centre) with h = 1 / (a + |z - centre|).
 #[derive(Clone, Debug)]
@@ -32,40 +34,46 @@ impl RadialFlow {
 
     /// Log densities of latents, which are used up.
     #[inline(always)]
-    pub fn log_density(&self, latent: &mut [Lanes]) -> Lanes {
-        let mut log_determinant = Lanes::ZERO;
-        for layer in &self.layers {
-            layer.apply(latent, &mut log_determinant);
+    pub fn log_density<S: Simd>(&self, simd: S, latent: &mut [Lanes], log_density: &mut Lanes) {
+        for register in 0..Lanes::n_registers::<S>() {
+            let mut log_determinant = simd.splat_f32s(0.0);
+            for layer in &self.layers {
+                let more = layer.apply(simd, latent, register);
+                log_determinant = simd.add_f32s(log_determinant, more);
+            }
+            // That of the standard normal distribution, times -2.
+            let mut normal = simd.splat_f32s(self.n_latent as f32 * std::f32::consts::TAU.ln());
+            for z in latent.iter() {
+                let z = z.get::<S>(register);
+                normal = simd.add_f32s(normal, simd.mul_f32s(z, z));
+            }
+            let half = simd.mul_f32s(normal, simd.splat_f32s(0.5));
+            log_density.set::<S>(register, simd.sub_f32s(log_determinant, half));
         }
-        let per_dimension = self.n_latent as f32 * std::f32::consts::TAU.ln();
-        let mut squares = Lanes::ZERO;
-        for z in latent.iter() {
-            squares = squares.zip(*z, |sum, z| sum + z * z);
-        }
-        log_determinant
-            .zip(squares, |log_determinant, squares| log_determinant - 0.5 * (per_dimension + squares))
     }
 }
 
 impl Radial {
+    /// Moves the latents of one register; returns the logarithm of the Jacobian's determinant.
     #[inline(always)]
-    fn apply(&self, latent: &mut [Lanes], log_determinant: &mut Lanes) {
-        let mut squares = Lanes::ZERO;
+    fn apply<S: Simd>(&self, simd: S, latent: &mut [Lanes], register: usize) -> S::f32s {
+        let real = |value: f32| simd.splat_f32s(value);
+        let mut squares = real(0.0);
         for (z, centre) in latent.iter().zip(&self.centre) {
-            squares = squares.zip(*z, |sum, z| sum + (z - centre) * (z - centre));
+            let off = simd.sub_f32s(z.get::<S>(register), real(*centre));
+            squares = simd.add_f32s(squares, simd.mul_f32s(off, off));
         }
-        let mut stretch = Lanes::ZERO;
-        let rest = latent.len() as f32 - 1.0;
-        for lane in 0..N_LANES {
-            let h = 1.0 / (self.a + squares.0[lane].sqrt());
-            let bh = self.b * h;
-            stretch.0[lane] = bh;
-            // The second factor is 1 + b h - b r h^2 = 1 + a b h^2.
-            log_determinant.0[lane] += rest * ln(1.0 + bh) + ln(1.0 + self.a * bh * h);
-        }
+        let h = simd.div_f32s(real(1.0), simd.add_f32s(real(self.a), simd.sqrt_f32s(squares)));
+        let bh = simd.mul_f32s(real(self.b), h);
         for (z, centre) in latent.iter_mut().zip(&self.centre) {
-            *z = z.zip(stretch, |z, bh| z + bh * (z - centre));
+            let here = z.get::<S>(register);
+            let step = simd.mul_f32s(bh, simd.sub_f32s(here, real(*centre)));
+            z.set::<S>(register, simd.add_f32s(here, step));
         }
+        // Across the radius 1 + b h, along it 1 + b h - b r h^2 = 1 + a b h^2.
+        let across = ln(simd, simd.add_f32s(real(1.0), bh));
+        let along = simd.add_f32s(real(1.0), simd.mul_f32s(simd.mul_f32s(real(self.a), bh), h));
+        simd.add_f32s(simd.mul_f32s(real(latent.len() as f32 - 1.0), across), ln(simd, along))
     }
 }
 
