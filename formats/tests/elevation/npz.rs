@@ -191,7 +191,7 @@ fn a_hostile_npz_is_refused_without_being_believed() {
     assert!(refuse("<f4", "(-3, 2)", &[]).contains("expected a NumPy header with 'shape'"));
     assert_eq!(
         refuse("<U8", "(2, 2)", &[0; 128]),
-        "a.npz: elevation: expected type f4, f8, i1 to i8, u1 to u8 or b1, found type <U8"
+        "a.npz: elevation: expected type f2, f4, f8, i1 to i8, u1 to u8 or b1, found type <U8"
     );
     let path = raw_npz(&folder, "no dictionary", &[]);
     assert!(folder.refusal(&path).contains("expected a NumPy header with 'descr'"));
