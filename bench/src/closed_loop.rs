@@ -6,6 +6,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
 use bicycle::{Decision, Model, Vehicle};
+use evidential::{Checkpoint, ShippedError, Unfamiliar, shipped};
 use navigator::{Belief, Config, Navigator, NavigatorError, RiskOracle, Setup, Surface};
 use rayon::prelude::*;
 use scenarios::{Episode, EpisodeConfig, EpisodeError, Task, Traversability, Truth, TruthField, World};
@@ -15,14 +16,58 @@ use traversability::{CvarLevel, Risk};
 
 /// What the controller knows of the ground.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
+#[serde(rename_all = "kebab-case")]
 pub enum Method {
+    /// What was learned, over the physics prior by evidence.
+    Pietra,
+    /// The same; ground unlike the training data is avoided.
+    PietraAvoid,
+    /// What was learned, over the uniform prior by evidence; ground unlike the training data is avoided.
+    Evora,
+    /// What was learned with a loss that keeps it close to physics, alone.
+    PhysicsInformed,
+    /// What was learned, alone.
+    Vanilla,
     /// The physics prior on the map.
     Physics,
     /// No slip and full traction everywhere.
     Nominal,
     /// The plant's true traction and attitude.
     Truth,
+}
+
+impl Method {
+    /// Name on the command line and in files.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Pietra => "pietra",
+            Self::PietraAvoid => "pietra-avoid",
+            Self::Evora => "evora",
+            Self::PhysicsInformed => "physics-informed",
+            Self::Vanilla => "vanilla",
+            Self::Physics => "physics",
+            Self::Nominal => "nominal",
+            Self::Truth => "truth",
+        }
+    }
+
+    /// How the networks that it drives on were trained, and what becomes of ground unlike their training data; `None`
+    /// for a method without networks.
+    pub const fn learned(self) -> Option<(evidential::Method, Unfamiliar)> {
+        match self {
+            Self::Pietra => Some((evidential::Method::Pietra, Unfamiliar::Fuse)),
+            Self::PietraAvoid => Some((evidential::Method::Pietra, Unfamiliar::Avoid)),
+            Self::Evora => Some((evidential::Method::Evora, Unfamiliar::Avoid)),
+            Self::PhysicsInformed => Some((evidential::Method::PhysicsInformed, Unfamiliar::Fuse)),
+            Self::Vanilla => Some((evidential::Method::Vanilla, Unfamiliar::Fuse)),
+            Self::Physics | Self::Nominal | Self::Truth => None,
+        }
+    }
+
+    /// Whether it knows distributions, of which a CVaR level makes a risk.
+    pub const fn has_level(self) -> bool {
+        !matches!(self, Self::Nominal | Self::Truth)
+    }
 }
 
 /// Where the controller's map comes from.
@@ -49,6 +94,8 @@ pub struct Drive<'a> {
     pub episode: EpisodeConfig,
     /// What the controller knows of the ground.
     pub method: Method,
+    /// Networks in place of those that come with the program, for a method that has any.
+    pub networks: Option<Arc<Checkpoint>>,
     /// Where its map comes from.
     pub map_source: MapSource,
     /// Share of the worst outcomes to plan for.
@@ -66,6 +113,19 @@ pub enum DriveError {
     /// The planner.
     #[error(transparent)]
     Navigator(#[from] NavigatorError),
+    /// No networks that come with the program will do.
+    #[error(transparent)]
+    Shipped(#[from] ShippedError),
+    /// The networks were trained in another way than the method asks for.
+    #[error("networks for method {method}: expected trained by {expected}, found by {found}")]
+    Training {
+        /// What was asked for.
+        method: &'static str,
+        /// How its networks are trained.
+        expected: &'static str,
+        /// How these were trained.
+        found: &'static str,
+    },
 }
 
 /// One control cycle, and what it cost on this machine.
@@ -90,12 +150,8 @@ pub struct ClosedLoop {
 impl ClosedLoop {
     /// Puts the vehicle at the start with a planner that has seen nothing.
     pub fn new(drive: Drive<'_>) -> Result<Self, DriveError> {
-        let Drive { task, vehicle, model, config, episode, method, map_source, level, seed } = drive;
-        let belief = match method {
-            Method::Physics => Belief::Physics,
-            Method::Nominal => Belief::Nominal,
-            Method::Truth => Belief::Given(truth(vehicle, &task.world, &config)),
-        };
+        let belief = belief(&drive)?;
+        let Drive { task, vehicle, model, config, episode, map_source, level, seed, .. } = drive;
         let surface = match map_source {
             MapSource::Sensed => Surface::Sensed,
             MapSource::Oracle => Surface::Given(true_surface(&task.world, config.elevation.resolution_m)),
@@ -131,6 +187,27 @@ impl ClosedLoop {
             control_ms: milliseconds(mapped, decided),
         })
     }
+}
+
+fn belief(drive: &Drive<'_>) -> Result<Belief, DriveError> {
+    let Drive { task, vehicle, config, method, networks, .. } = drive;
+    let Some((training, unfamiliar)) = method.learned() else {
+        return Ok(match method {
+            Method::Truth => Belief::Given(truth(vehicle, &task.world, config)),
+            Method::Nominal => Belief::Nominal,
+            _ => Belief::Physics,
+        });
+    };
+    let checkpoint = match networks {
+        Some(checkpoint) => Arc::clone(checkpoint),
+        None => Arc::new(shipped(training, &vehicle.geometry)?),
+    };
+    let found = checkpoint.sidecar.method;
+    if found != training {
+        let (method, expected, found) = (method.name(), training.name(), found.name());
+        return Err(DriveError::Training { method, expected, found });
+    }
+    Ok(Belief::Learned { checkpoint, unfamiliar })
 }
 
 /// Yaws that the truth is asked for within one yaw bin.

@@ -17,7 +17,7 @@ use serde::Serialize;
 use traversability::CvarLevel;
 
 use crate::closed_loop::{DriveError, Method};
-pub use drive::{DriveResult, name_of, name_of_outcome};
+pub use drive::{DriveResult, name_of_outcome};
 use drive::{Finished, Job};
 pub use row::{Row, WILSON_Z, wilson_interval};
 
@@ -27,9 +27,9 @@ pub const VEHICLE: &str = "pietra_full_size";
 /// Which drives to do, and how.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Request {
-    /// What the controller knows of the ground; a row each, physics one for every level.
+    /// What the controller knows of the ground; a row each, for every level where there are levels.
     pub methods: Vec<Method>,
-    /// Risk tolerances of [`Method::Physics`]; the others know no distribution, hence no level.
+    /// Risk tolerances of the methods that know distributions, see [`Method::has_level`].
     pub levels: Vec<CvarLevel>,
     /// Seeds 1 to this.
     pub n_seeds: u64,
@@ -155,9 +155,9 @@ pub fn measure(
 
 /// Row by row, each row by ascending seed.
 fn jobs(request: &Request) -> Vec<Job> {
-    let rows = request.methods.iter().flat_map(|&method| match method {
-        Method::Physics => request.levels.iter().map(|&level| (method, Some(level))).collect(),
-        Method::Nominal | Method::Truth => vec![(method, None)],
+    let rows = request.methods.iter().flat_map(|&method| match method.has_level() {
+        true => request.levels.iter().map(|&level| (method, Some(level))).collect(),
+        false => vec![(method, None)],
     });
     rows.flat_map(|(method, level)| (1..=request.n_seeds).map(move |seed| Job { method, level, seed }))
         .collect()

@@ -1,6 +1,7 @@
 //! `surefoot drive`: world, vehicle, navigator and episode, tied together.
 #![allow(clippy::disallowed_methods, reason = "--pace real follows the wall clock")]
 
+mod knowledge;
 mod record;
 mod scene;
 
@@ -13,7 +14,7 @@ use formats::{config_hash, write_json_atomic};
 use scenarios::EpisodeConfig;
 use traversability::CvarLevel;
 
-use crate::arguments::{DriveArguments, Goal, MapSource, Method, Pace, StartPose};
+use crate::arguments::{DriveArguments, Goal, MapSource, Pace, StartPose};
 use crate::output::OutputFiles;
 use crate::picture::{DrivePicture, RiskLayer, draw_drive};
 use crate::progress::{DriveProgress, ProgressLine};
@@ -32,6 +33,9 @@ pub(crate) fn run(arguments: &DriveArguments) -> anyhow::Result<()> {
     let mut recording = Recording::create(&files.recording, about).map_err(UsageError::from_input)?;
     recording.goal(&scene.task.world, scene.task.goal_m)?;
     interrupt::catch_interrupts()?;
+    if let Some(why) = &scene.knowledge.why_not_learned {
+        println!("  method physics: {why}");
+    }
     let kept = follow(arguments, &scene, &mut closed, &mut recording)?;
     recording.finish()?;
     let summary = summarise(arguments, &scene, &closed, &kept.tally, config_hash);
@@ -84,11 +88,8 @@ fn drive<'a>(arguments: &DriveArguments, scene: &'a Scene) -> Result<Drive<'a>, 
         model: scene.model.clone(),
         config: scene.config.clone(),
         episode,
-        method: match arguments.method {
-            Method::Physics => closed_loop::Method::Physics,
-            Method::Nominal => closed_loop::Method::Nominal,
-            Method::Truth => closed_loop::Method::Truth,
-        },
+        method: scene.knowledge.method,
+        networks: scene.knowledge.networks.clone(),
         map_source: match arguments.map_source() {
             MapSource::Sensed => closed_loop::MapSource::Sensed,
             MapSource::Oracle => closed_loop::MapSource::Oracle,
@@ -155,7 +156,7 @@ fn about(arguments: &DriveArguments, scene: &Scene, config_hash: &str) -> BTreeM
         ("world", scene.task.world.name.clone()),
         ("seed", arguments.seed.to_string()),
         ("alpha", arguments.alpha.to_string()),
-        ("method", format!("{:?}", arguments.method).to_lowercase()),
+        ("method", scene.knowledge.method.name().to_owned()),
         ("config_hash", config_hash.to_owned()),
         ("revision", revision().to_owned()),
     ];
@@ -193,7 +194,7 @@ fn summarise(
         world: scene.task.world.name.clone(),
         start: StartPose { x_m, y_m, yaw_rad },
         goal: Goal { x_m: goal_m[0], y_m: goal_m[1] },
-        method: arguments.method,
+        method: scene.knowledge.method,
         alpha: arguments.alpha,
         isa: format!("{:?}", closed.navigator.controller().diagnostics().isa).to_lowercase(),
         threads: arguments.n_threads(),
@@ -235,9 +236,9 @@ fn draw(
     );
     let title = format!("{}: {}", summary.vehicle, summary.outcome);
     let subtitles = [format!(
-        "{}, method {:?}, alpha {}, seed {}: {:.1} m in {:.1} s, largest roll {:.0} deg, largest pitch {:.0} deg",
+        "{}, method {}, alpha {}, seed {}: {:.1} m in {:.1} s, largest roll {:.0} deg, largest pitch {:.0} deg",
         summary.world,
-        summary.method,
+        summary.method.name(),
         summary.alpha,
         summary.seed,
         summary.path_length_m,

@@ -7,7 +7,8 @@ use bicycle::StopReason;
 use serde::{Deserialize, Serialize};
 
 use crate::WorkFailed;
-use crate::arguments::{Goal, Method, StartPose};
+use crate::arguments::{Goal, StartPose};
+use bench::closed_loop::Method;
 pub use scenarios::Outcome;
 
 /// Distribution of a duration over the cycles of a drive.
@@ -151,18 +152,10 @@ impl fmt::Display for Summary {
         row("start", format!("{:.2},{:.2},{:.3}", self.start.x_m, self.start.y_m, self.start.yaw_rad))?;
         row("goal", format!("{:.2},{:.2}", self.goal.x_m, self.goal.y_m))?;
         row("vehicle", self.vehicle.clone())?;
-        row("method", format!("{}, alpha {}", told_method(self.method), self.alpha))?;
+        row("method", format!("{}, alpha {}", self.method.name(), self.alpha))?;
         row("ran on", format!("{}, threads {}", self.isa, self.threads))?;
         let config = self.config_hash.get(..12).unwrap_or(&self.config_hash);
         row("made by", format!("revision {}, config {config}", self.revision))
-    }
-}
-
-fn told_method(method: Method) -> &'static str {
-    match method {
-        Method::Physics => "physics",
-        Method::Nominal => "nominal",
-        Method::Truth => "truth",
     }
 }
 

@@ -15,7 +15,7 @@ use terrain::{CellRegion, GridGeometry, GridMap, SurfaceCell};
 use traversability::{CvarLevel, PartialMoments, Risk, RiskMap};
 
 use crate::predictor::{Predictor, PredictorError};
-use crate::{Checkpoint, Prior};
+use crate::{Checkpoint, Prior, VehicleMismatch};
 use patch_ground::PatchGround;
 use patch_stencil::PatchStencil;
 use row_task::{RowTask, Scratch};
@@ -52,14 +52,12 @@ pub enum BeliefMapError {
     #[error(transparent)]
     Prior(#[from] PriorMapError),
     /// The networks were trained on another vehicle.
-    #[error("{field} of the vehicle: expected {expected} as in training, found {found}")]
+    #[error("networks of method {method}: {mismatch}")]
     Vehicle {
-        /// Which length.
-        field: &'static str,
-        /// Of the vehicle in training [m].
-        expected: f64,
-        /// Of this vehicle [m].
-        found: f64,
+        /// Name of the method.
+        method: &'static str,
+        /// What differs.
+        mismatch: VehicleMismatch,
     },
     /// A method without a flow cannot tell what is unlike the training data.
     #[error("method {method}: expected one with a density to avoid unfamiliar ground by, found none")]
@@ -139,10 +137,12 @@ impl BeliefMap {
         n_yaws: usize,
     ) -> Result<Self, BeliefMapError> {
         let sidecar = &learned.checkpoint.sidecar;
-        check_vehicle(geometry, learned)?;
+        let method = sidecar.method.name();
+        let fits = learned.checkpoint.check_vehicle(geometry);
+        fits.map_err(|mismatch| BeliefMapError::Vehicle { method, mismatch })?;
         let predictor = Predictor::new(&learned.checkpoint)?;
         if learned.unfamiliar == Unfamiliar::Avoid && sidecar.density.is_none() {
-            return Err(BeliefMapError::NoDensity { method: sidecar.method.name() });
+            return Err(BeliefMapError::NoDensity { method });
         }
         let prior = PriorConfig { obstacle_margin_m: learned.obstacle_margin_m, ..sidecar.prior };
         let assumption = Assumption::Physics { prior, level: learned.level };
@@ -363,25 +363,5 @@ impl BeliefLayers {
             start..(start..n).rev().find(reads).map_or(start, |last| last + 1)
         };
         CellRegion { rows: readers(1, window.n_rows), cols: readers(0, window.n_cols) }
-    }
-}
-
-/// Lengths that agree to this share are the same.
-const LENGTH_TOLERANCE: f64 = 1e-6;
-
-fn check_vehicle(geometry: &Geometry, learned: &Learned) -> Result<(), BeliefMapError> {
-    let layout = &learned.checkpoint.sidecar.layout;
-    let pairs = [
-        ("wheelbase_m", layout.wheels.wheelbase_m, geometry.wheelbase_m),
-        ("track_m", layout.wheels.track_m, geometry.track_m),
-        ("wheel_radius_m", layout.height_scale_m, geometry.wheel_radius_m),
-    ];
-    let differs = |(_, expected, found): &(&str, f64, f64)| {
-        let is_same = (found - expected).abs() <= LENGTH_TOLERANCE * expected.abs();
-        !is_same
-    };
-    match pairs.into_iter().find(differs) {
-        Some((field, expected, found)) => Err(BeliefMapError::Vehicle { field, expected, found }),
-        None => Ok(()),
     }
 }

@@ -24,8 +24,10 @@ mod method;
 mod network;
 mod predictor;
 mod random;
+mod shipped;
 mod standardise;
 mod training;
+mod vehicle;
 
 pub use architecture::Architecture;
 pub use belief_map::{BeliefMap, BeliefMapError, Learned, Unfamiliar};
@@ -38,6 +40,8 @@ pub use features::{FeatureLayout, Standardisation};
 pub use label::{Label, LabelConfig, LabelError, Response, Responses, Reversing, estimate_responses, labels};
 pub use method::{Method, Prior};
 pub use predictor::{Evidence, Prediction, Predictor, PredictorError};
+pub use shipped::{ShippedError, shipped};
 pub use training::{
     Epoch, Outcome, Percentiles, Phase, Settings, SettingsError, TrainError, TrainingEnd, train,
 };
+pub use vehicle::VehicleMismatch;

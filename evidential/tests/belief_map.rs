@@ -272,7 +272,10 @@ fn what_does_not_fit_is_refused_with_what_was_expected_and_found() {
     };
     let other = bicycle::Geometry { track_m: 1.5, ..CAR };
     let message = new(other, Unfamiliar::Fuse, 0.1, 7).unwrap_err().to_string();
-    assert_eq!(message, "track_m of the vehicle: expected 0.2 as in training, found 1.5");
+    assert_eq!(
+        message,
+        "networks of method vanilla: trained on vehicle rc_car, track_m: expected 0.2 as there, found 1.5"
+    );
     let message = new(CAR, Unfamiliar::Avoid, 0.1, 7).unwrap_err().to_string();
     assert!(message.contains("vanilla") && message.contains("expected"), "{message}");
     assert!(matches!(new(CAR, Unfamiliar::Fuse, 0.1, 0), Err(BeliefMapError::Prior(PriorMapError::NoYaws))));

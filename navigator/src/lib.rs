@@ -3,6 +3,7 @@
 //! [`Navigator::observe`] takes in what was measured and keeps the maps; [`Navigator::decide`] asks the controller.
 //! They are apart because a robot maps and controls at different rates; a closed loop calls one after the other.
 
+mod author;
 mod config;
 mod guard;
 mod navigator;

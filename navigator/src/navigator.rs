@@ -64,7 +64,7 @@ pub enum NavigatorError {
     Fuse(#[from] terrain::FuseError),
     /// The risk map cannot be made.
     #[error(transparent)]
-    Risk(#[from] physics_prior::PriorMapError),
+    Risk(#[from] evidential::BeliefMapError),
     /// The cost-to-go field cannot be made.
     #[error(transparent)]
     CostToGo(#[from] mppi::CostToGoError),

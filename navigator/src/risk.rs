@@ -4,10 +4,13 @@ use std::f64::consts::TAU;
 use std::sync::Arc;
 
 use bicycle::Geometry;
-use physics_prior::{Assumption, PriorConfig, PriorMap, PriorMapError};
+use evidential::{BeliefMapError, Checkpoint, Learned, Unfamiliar};
+use physics_prior::{Assumption, PriorConfig};
 use rayon::prelude::*;
 use terrain::{CellRegion, GridGeometry, GridMap, SurfaceCell};
 use traversability::{CvarLevel, Risk, RiskMap, RiskMapView};
+
+use crate::author::Author;
 
 /// Fills a window, shape [row, col, yaw], with the risk of the poses of the body frame that a [`RiskMap`] of this
 /// geometry and number of yaws stands for.
@@ -18,6 +21,13 @@ pub type RiskOracle = Arc<dyn Fn(&GridGeometry, usize, &mut [Risk]) + Send + Syn
 pub enum Belief {
     /// The physics prior.
     Physics,
+    /// What was learned from driving, fused with the prior that it was trained with.
+    Learned {
+        /// Networks that were trained on this vehicle.
+        checkpoint: Arc<Checkpoint>,
+        /// What becomes of ground that is unlike the training data.
+        unfamiliar: Unfamiliar,
+    },
     /// No slip, full traction, level everywhere.
     Nominal,
     /// What somebody who knows says; obstacles still come from the map.
@@ -41,7 +51,7 @@ const STUCK_YAW_RAD: f64 = std::f64::consts::FRAC_PI_4;
 
 /// A risk map and what it is made with.
 pub(crate) struct RiskLayer {
-    prior: PriorMap,
+    author: Author,
     /// Who knows, and the answer for the present window.
     oracle: Option<(RiskOracle, Vec<Risk>)>,
     stuck: Vec<StuckPose>,
@@ -59,24 +69,37 @@ impl RiskLayer {
         level: CvarLevel,
         geometry: &Geometry,
         config: &crate::Config,
-    ) -> Result<Self, PriorMapError> {
-        let assumption = match belief {
-            Belief::Physics => Assumption::Physics { prior: *prior, level },
-            Belief::Nominal | Belief::Given(_) => {
-                Assumption::Nominal { obstacle_margin_m: prior.obstacle_margin_m }
-            }
-        };
+    ) -> Result<Self, BeliefMapError> {
         let window = &config.risk_map;
         let resolution_m = config.risk_resolution_m();
         let grid = GridGeometry::centred(resolution_m, window.n_rows, window.n_cols, 0.0, 0.0);
+        let surface_m = config.elevation.resolution_m;
+        let by_prior = |assumption: Assumption| {
+            Author::prior(geometry, &assumption, surface_m, grid, window.n_yaws)
+        };
+        let author = match belief {
+            Belief::Physics => by_prior(Assumption::Physics { prior: *prior, level })?,
+            Belief::Learned { checkpoint, unfamiliar } => {
+                let learned = Learned {
+                    checkpoint: Arc::clone(checkpoint),
+                    unfamiliar: *unfamiliar,
+                    obstacle_margin_m: prior.obstacle_margin_m,
+                    level,
+                };
+                Author::networks(geometry, &learned, surface_m, grid, window.n_yaws)?
+            }
+            Belief::Nominal | Belief::Given(_) => {
+                by_prior(Assumption::Nominal { obstacle_margin_m: prior.obstacle_margin_m })?
+            }
+        };
         let oracle = match belief {
             Belief::Given(oracle) => {
                 Some((Arc::clone(oracle), vec![Risk::OUTSIDE; grid.n_cells() * window.n_yaws]))
             }
-            Belief::Physics | Belief::Nominal => None,
+            Belief::Physics | Belief::Learned { .. } | Belief::Nominal => None,
         };
         Ok(Self {
-            prior: PriorMap::new(geometry, &assumption, config.elevation.resolution_m, grid, window.n_yaws)?,
+            author,
             oracle,
             stuck: Vec::with_capacity(STUCK_MAX),
             length_m: geometry.length_m,
@@ -113,14 +136,14 @@ impl RiskLayer {
         position_m: [f64; 2],
         surface: &GridMap<SurfaceCell>,
         changed: &CellRegion,
-    ) -> Result<(), PriorMapError> {
+    ) -> Result<(), BeliefMapError> {
         let is_moved = self.follow(position_m);
         if self.is_filled {
-            self.prior.update_dirty(surface, changed)?;
+            self.author.update_dirty(surface, changed)?;
         } else {
-            self.prior.update_all(surface)?;
+            self.author.update_all(surface)?;
         }
-        let known = self.prior.risk_map().view();
+        let known = self.author.risk_map().view();
         self.map.place_at(known.geometry.origin);
         let (risks, ground) = self.map.arrays_mut();
         risks.copy_from_slice(known.risks);
@@ -140,13 +163,13 @@ impl RiskLayer {
 
     /// Returns whether the window moved.
     fn follow(&mut self, position_m: [f64; 2]) -> bool {
-        let now = *self.prior.risk_map().geometry();
+        let now = *self.author.risk_map().geometry();
         let [x_m, y_m] = position_m;
         let wanted = GridGeometry::centred(now.resolution_m, now.n_rows, now.n_cols, x_m, y_m);
         let is_far = |axis: usize| (wanted.origin[axis] - now.origin[axis]).abs() >= self.recentre_cells;
         let moves = !self.is_filled || is_far(0) || is_far(1);
         if moves {
-            self.prior.place_at(wanted.origin);
+            self.author.place_at(wanted.origin);
         }
         moves
     }

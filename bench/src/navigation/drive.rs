@@ -55,15 +55,6 @@ pub(super) struct Finished {
     pub isa: Isa,
 }
 
-/// A method as it is written on the command line.
-pub fn name_of(method: Method) -> &'static str {
-    match method {
-        Method::Physics => "physics",
-        Method::Nominal => "nominal",
-        Method::Truth => "truth",
-    }
-}
-
 /// How a drive ended, in a word or two.
 pub fn name_of_outcome(outcome: Outcome) -> &'static str {
     match outcome {
@@ -79,7 +70,7 @@ pub fn name_of_outcome(outcome: Outcome) -> &'static str {
 
 impl fmt::Display for Job {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        formatter.write_str(name_of(self.method))?;
+        formatter.write_str(self.method.name())?;
         if let Some(level) = self.level {
             write!(formatter, ", alpha {}", level.get())?;
         }
@@ -111,6 +102,7 @@ impl Job {
             config: settings.config.clone(),
             episode: settings.episode.clone(),
             method: self.method,
+            networks: None,
             map_source: MapSource::Sensed,
             level: self.level.unwrap_or(CvarLevel::MEAN),
             seed: self.seed,

@@ -4,7 +4,6 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 use scenarios::ArenaConfig;
-use serde::{Deserialize, Serialize};
 
 use super::values::{self, Goal, StartPose, WorldSource};
 use crate::UsageError;
@@ -46,9 +45,15 @@ pub struct DriveArguments {
     #[arg(long, value_name = "FILE", help_heading = "Vehicle and controller")]
     pub model: Option<PathBuf>,
 
-    /// What the controller knows of the ground
-    #[arg(long, value_enum, default_value_t = Method::Physics, help_heading = "Vehicle and controller")]
-    pub method: Method,
+    /// What the controller knows of the ground [default: pietra where its networks fit the vehicle, else physics; with
+    /// --weights the method that these were trained for]
+    #[arg(long, value_enum, help_heading = "Vehicle and controller")]
+    pub method: Option<Method>,
+
+    /// Networks in place of those that come with the program: a folder with weights.safetensors and weights.json, as
+    /// `surefoot train` leaves it
+    #[arg(long, value_name = "DIR", help_heading = "Vehicle and controller")]
+    pub weights: Option<PathBuf>,
 
     /// Risk tolerance in (0, 1]: the share of worst outcomes to plan for; 1 plans for the mean
     #[arg(long, value_name = "LEVEL", value_parser = values::cvar_level, default_value = "0.6",
@@ -139,15 +144,39 @@ pub enum MapSource {
 }
 
 /// What the controller knows of the ground.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Method {
+    /// What was learned from driving, and physics where the evidence ends
+    Pietra,
+    /// The same; ground unlike the training data is avoided
+    PietraAvoid,
+    /// What was learned, with nothing to fall back on; ground unlike the training data is avoided
+    Evora,
+    /// What was learned with a loss that keeps it close to physics, without evidence
+    PhysicsInformed,
+    /// What was learned, without evidence
+    Vanilla,
     /// Traction and attitude from the physics prior on the map
     Physics,
     /// No slip and full traction everywhere: what ignoring the ground costs
     Nominal,
     /// The plant's true traction and attitude: the best any prediction could do
     Truth,
+}
+
+impl From<Method> for bench::closed_loop::Method {
+    fn from(asked: Method) -> Self {
+        match asked {
+            Method::Pietra => Self::Pietra,
+            Method::PietraAvoid => Self::PietraAvoid,
+            Method::Evora => Self::Evora,
+            Method::PhysicsInformed => Self::PhysicsInformed,
+            Method::Vanilla => Self::Vanilla,
+            Method::Physics => Self::Physics,
+            Method::Nominal => Self::Nominal,
+            Method::Truth => Self::Truth,
+        }
+    }
 }
 
 /// How simulated time passes.
@@ -254,7 +283,7 @@ mod tests {
         let drive = parse(&[]);
         assert_eq!(drive.world, WorldSource::Rocks);
         assert_eq!((drive.alpha, drive.seed, drive.time_limit), (0.6, 1, 120.0));
-        assert_eq!((drive.method, drive.map_source()), (Method::Physics, MapSource::Sensed));
+        assert_eq!((drive.method, drive.map_source()), (None, MapSource::Sensed));
         assert_eq!(drive.vehicle_name_or_path(), "pietra_full_size");
         assert!(drive.n_threads() >= 1);
     }

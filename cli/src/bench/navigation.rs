@@ -2,16 +2,16 @@
 
 use std::io::IsTerminal;
 
-use ::bench::closed_loop::{self, DriveError};
+use ::bench::closed_loop::DriveError;
 use ::bench::navigation::{
-    BrokenDrive, DriveResult, NavigationError, Report, Request, Row, measure, name_of, name_of_outcome,
+    BrokenDrive, DriveResult, NavigationError, Report, Request, Row, measure, name_of_outcome,
 };
 use indicatif::{ProgressBar, ProgressStyle};
 use navigator::NavigatorError;
 use serde::Serialize;
 use traversability::CvarLevel;
 
-use crate::arguments::{BenchNavigationArguments, Method};
+use crate::arguments::BenchNavigationArguments;
 use crate::picture::draw_navigation_table;
 use crate::{UsageError, output, summary};
 
@@ -45,21 +45,13 @@ pub(crate) fn run_navigation(arguments: &BenchNavigationArguments) -> anyhow::Re
 fn request(arguments: &BenchNavigationArguments) -> Result<Request, UsageError> {
     let levels = arguments.alpha.iter().map(|&alpha| CvarLevel::new(alpha));
     Ok(Request {
-        methods: arguments.methods.iter().map(|&method| known_by(method)).collect(),
+        methods: arguments.methods.iter().map(|&method| method.into()).collect(),
         levels: levels.collect::<Result<_, _>>().map_err(UsageError::from_input)?,
         n_seeds: arguments.seeds,
         time_limit_s: arguments.time_limit,
         n_threads: arguments.n_threads(),
         isa: arguments.isa.into(),
     })
-}
-
-fn known_by(method: Method) -> closed_loop::Method {
-    match method {
-        Method::Physics => closed_loop::Method::Physics,
-        Method::Nominal => closed_loop::Method::Nominal,
-        Method::Truth => closed_loop::Method::Truth,
-    }
 }
 
 /// Counts drives on standard error; draws nothing where that is not a terminal.
@@ -127,7 +119,7 @@ fn told_row(row: &Row) -> String {
     );
     let time = row.median_time_to_goal_s.map_or("-".to_owned(), |time_s| format!("{time_s:.1} s"));
     let goal = format!("{} of {}", row.n_goal, row.n);
-    format!("  {:<9}{:>6}{goal:>10}   {success:<22}{time:>14}\n", name_of(row.method), told_alpha(row.alpha))
+    format!("  {:<9}{:>6}{goal:>10}   {success:<22}{time:>14}\n", row.method.name(), told_alpha(row.alpha))
 }
 
 /// Alpha as it was asked for, "any" where the method knows none.
@@ -139,7 +131,7 @@ fn told_alpha(alpha: Option<f64>) -> String {
 fn told_drive(drive: &DriveResult) -> String {
     let told = format!(
         "{:<9}{:>6}   seed {:<4} {} after {:.1} s",
-        name_of(drive.method),
+        drive.method.name(),
         told_alpha(drive.alpha),
         drive.seed,
         name_of_outcome(drive.outcome),
@@ -162,7 +154,7 @@ mod tests {
 
     fn drive(seed: u64, outcome: Outcome) -> DriveResult {
         DriveResult {
-            method: closed_loop::Method::Physics,
+            method: ::bench::closed_loop::Method::Physics,
             alpha: Some(0.6),
             seed,
             outcome,

@@ -11,6 +11,7 @@ use scenarios::{
     Task, WorldLayers, check_pair, feasible_pair, world_from_layers,
 };
 
+use super::knowledge::Knowledge;
 use crate::UsageError;
 use crate::arguments::{DriveArguments, WorldSource};
 
@@ -27,6 +28,7 @@ pub(super) struct Scene {
     pub model: Model,
     pub config: Config,
     pub task: Task,
+    pub knowledge: Knowledge,
 }
 
 /// Reads and builds everything; whatever cannot be is refused here, before anything drives.
@@ -43,8 +45,9 @@ pub(super) fn prepare(arguments: &DriveArguments) -> Result<Scene, UsageError> {
     }
     config.controller.n_threads = arguments.n_threads();
     config.controller.isa = arguments.isa.into();
+    let knowledge = Knowledge::choose(arguments, &vehicle)?;
     let task = task(arguments, &vehicle)?;
-    Ok(Scene { vehicle, model, config, task })
+    Ok(Scene { vehicle, model, config, task, knowledge })
 }
 
 fn task(arguments: &DriveArguments, vehicle: &Vehicle) -> Result<Task, UsageError> {

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use bench::navigation::{DriveResult, Report, Row, name_of, name_of_outcome};
+use bench::navigation::{DriveResult, Report, Row, name_of_outcome};
 use scenarios::Outcome;
 
 use super::axes::{Axes, Range, number};
@@ -99,8 +99,8 @@ fn row_y(axes: &Axes, row: usize) -> f64 {
 /// "physics, alpha 0.6", or the method alone where it needs no level.
 fn row_name(row: &Row) -> String {
     match row.alpha {
-        Some(alpha) => format!("{}, alpha {alpha}", name_of(row.method)),
-        None => name_of(row.method).to_owned(),
+        Some(alpha) => format!("{}, alpha {alpha}", row.method.name()),
+        None => row.method.name().to_owned(),
     }
 }
 

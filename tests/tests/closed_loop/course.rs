@@ -74,6 +74,7 @@ impl Course {
             config: self.config.clone(),
             episode: self.episode.clone(),
             method: self.method,
+            networks: None,
             map_source: MapSource::Sensed,
             level: CvarLevel::new(0.6).unwrap(),
             seed: self.seed,

@@ -1,0 +1,86 @@
+//! The networks that come with the program.
+
+use bicycle::Geometry;
+
+use crate::{Checkpoint, CheckpointError, Method, VehicleMismatch};
+
+/// The two files of a checkpoint.
+struct Files {
+    method: Method,
+    weights: &'static [u8],
+    sidecar: &'static [u8],
+}
+
+/// Every checkpoint under `evidential/weights/`; a method may have one for each of several vehicles.
+const FILES: &[Files] = &[];
+
+/// Why no networks that come with the program will do.
+#[derive(Debug, thiserror::Error)]
+pub enum ShippedError {
+    /// None of that method.
+    #[error("networks of method {method}: expected some that come with the program, found none")]
+    Absent {
+        /// Name of the method.
+        method: &'static str,
+    },
+    /// All of that method were trained on other vehicles.
+    #[error("networks of method {method}: {mismatch}")]
+    Vehicle {
+        /// Name of the method.
+        method: &'static str,
+        /// How the last one differs.
+        mismatch: VehicleMismatch,
+    },
+    /// They are broken.
+    #[error(transparent)]
+    Checkpoint(#[from] CheckpointError),
+}
+
+/// The networks of a method that were trained on a vehicle of this geometry.
+///
+/// # Errors
+/// None come with the program, or none that fit the vehicle.
+pub fn shipped(method: Method, geometry: &Geometry) -> Result<Checkpoint, ShippedError> {
+    let mut refused = ShippedError::Absent { method: method.name() };
+    for files in FILES.iter().filter(|files| files.method == method) {
+        let checkpoint = Checkpoint::from_bytes(files.weights, files.sidecar)?;
+        match checkpoint.check_vehicle(geometry) {
+            Ok(()) => return Ok(checkpoint),
+            Err(mismatch) => refused = ShippedError::Vehicle { method: method.name(), mismatch },
+        }
+    }
+    Err(refused)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn all_that_is_shipped_can_be_used_and_is_small() {
+        for files in FILES {
+            let checkpoint = Checkpoint::from_bytes(files.weights, files.sidecar).unwrap();
+            assert_eq!(checkpoint.sidecar.method, files.method);
+            crate::Predictor::new(&checkpoint).unwrap();
+        }
+        let n_bytes: usize = FILES.iter().map(|files| files.weights.len() + files.sidecar.len()).sum();
+        assert!(n_bytes < 1_000_000, "{n_bytes} bytes");
+    }
+
+    #[test]
+    fn a_vehicle_that_nobody_trained_is_told_so() {
+        let nobody = Geometry {
+            wheelbase_m: 7.0,
+            track_m: 3.0,
+            length_m: 9.0,
+            width_m: 3.5,
+            rear_overhang_m: 1.0,
+            ground_clearance_m: 0.5,
+            wheel_radius_m: 0.8,
+        };
+        for method in Method::ALL {
+            let told = shipped(method, &nobody).unwrap_err().to_string();
+            assert!(told.contains(method.name()) && told.contains("expected"), "{told}");
+        }
+    }
+}

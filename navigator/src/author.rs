@@ -1,0 +1,71 @@
+//! Who judges the ground: physics, or what was learned.
+
+use bicycle::Geometry;
+use evidential::{BeliefMap, BeliefMapError, Learned};
+use physics_prior::{Assumption, PriorMap};
+use terrain::{CellRegion, GridGeometry, GridMap, SurfaceCell};
+use traversability::RiskMap;
+
+/// Makes a risk map of the surface and keeps it up to date.
+pub(crate) enum Author {
+    /// The physics prior, or none.
+    Prior(Box<PriorMap>),
+    /// Networks, fused with a prior.
+    Networks(Box<BeliefMap>),
+}
+
+impl Author {
+    /// See [`PriorMap::new`].
+    pub fn prior(
+        geometry: &Geometry,
+        assumption: &Assumption,
+        surface_resolution_m: f64,
+        risk: GridGeometry,
+        n_yaws: usize,
+    ) -> Result<Self, BeliefMapError> {
+        Ok(Self::Prior(Box::new(PriorMap::new(geometry, assumption, surface_resolution_m, risk, n_yaws)?)))
+    }
+
+    /// See [`BeliefMap::new`].
+    pub fn networks(
+        geometry: &Geometry,
+        learned: &Learned,
+        surface_resolution_m: f64,
+        risk: GridGeometry,
+        n_yaws: usize,
+    ) -> Result<Self, BeliefMapError> {
+        Ok(Self::Networks(Box::new(BeliefMap::new(geometry, learned, surface_resolution_m, risk, n_yaws)?)))
+    }
+
+    pub fn risk_map(&self) -> &RiskMap {
+        match self {
+            Self::Prior(map) => map.risk_map(),
+            Self::Networks(map) => map.risk_map(),
+        }
+    }
+
+    pub fn place_at(&mut self, origin: [i64; 2]) {
+        match self {
+            Self::Prior(map) => map.place_at(origin),
+            Self::Networks(map) => map.place_at(origin),
+        }
+    }
+
+    pub fn update_all(&mut self, surface: &GridMap<SurfaceCell>) -> Result<(), BeliefMapError> {
+        match self {
+            Self::Prior(map) => Ok(map.update_all(surface)?),
+            Self::Networks(map) => map.update_all(surface),
+        }
+    }
+
+    pub fn update_dirty(
+        &mut self,
+        surface: &GridMap<SurfaceCell>,
+        changed: &CellRegion,
+    ) -> Result<(), BeliefMapError> {
+        match self {
+            Self::Prior(map) => Ok(map.update_dirty(surface, changed)?),
+            Self::Networks(map) => map.update_dirty(surface, changed),
+        }
+    }
+}
