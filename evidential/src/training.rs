@@ -82,9 +82,6 @@ pub enum TrainError {
     /// The arithmetic library refused.
     #[error(transparent)]
     Arithmetic(#[from] candle_core::Error),
-    /// No thread to compute on.
-    #[error("expected a thread to train on: {0}")]
-    Thread(#[from] rayon::ThreadPoolBuildError),
     /// The result cannot be kept.
     #[error(transparent)]
     Checkpoint(#[from] crate::CheckpointError),
@@ -149,7 +146,7 @@ pub enum TrainingEnd {
     Interrupted,
 }
 
-/// Trains on one thread, whatever the machine has, so that several trainings run side by side.
+/// Trains on the calling thread alone, so that several trainings run side by side.
 ///
 /// `revision` names the program in the checkpoint. `progress` hears of every pass and may break off: the best weights
 /// so far are returned then.
@@ -163,12 +160,11 @@ pub fn train(
     validation: &Dataset,
     settings: &Settings,
     revision: &str,
-    progress: &mut (dyn FnMut(&Epoch) -> ControlFlow<()> + Send),
+    progress: &mut dyn FnMut(&Epoch) -> ControlFlow<()>,
 ) -> Result<Outcome, TrainError> {
     settings.validate()?;
     check(training, validation)?;
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
-    pool.install(|| Run::new(training, validation, settings)?.finish(training, revision, progress))
+    Run::new(training, validation, settings)?.finish(training, revision, progress)
 }
 
 fn check(training: &Dataset, validation: &Dataset) -> Result<(), TrainError> {
@@ -212,7 +208,7 @@ struct Run<'a> {
     end: TrainingEnd,
 }
 
-type Progress<'a> = &'a mut (dyn FnMut(&Epoch) -> ControlFlow<()> + Send);
+type Progress<'a> = &'a mut dyn FnMut(&Epoch) -> ControlFlow<()>;
 
 /// Whether a phase goes on after a pass.
 enum Next {
