@@ -450,4 +450,4 @@ impl Best {
 }
 
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;

@@ -221,3 +221,8 @@ fn loss_that_runs_away_names_epoch_and_step() {
     let place = format!("{phase}, epoch {epoch}, step {step}: expected a finite loss, found {found}");
     assert!(error.to_string().starts_with(&place), "{error}");
 }
+
+/// A small checkpoint with evidence.
+pub(crate) fn checkpoint() -> Checkpoint {
+    trained(&Settings { epochs_max: 1, flow_epochs_max: 1, ..quick(Method::Pietra) }).checkpoint
+}
