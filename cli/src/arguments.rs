@@ -3,15 +3,18 @@
 mod bench;
 mod collect;
 mod drive;
+mod train;
 mod values;
 
 use clap::{Parser, Subcommand};
 
 pub use bench::{
-    BenchCommand, BenchControlArguments, BenchLearningArguments, BenchNavigationArguments, BenchPriorMapArguments, BenchWork,
+    BenchCommand, BenchControlArguments, BenchLearningArguments, BenchNavigationArguments,
+    BenchPriorMapArguments, BenchWork,
 };
 pub use collect::{CollectArguments, CollectMap, CollectSplit, CollectWorld};
 pub use drive::{DriveArguments, InstructionSet, MapSource, Method, Pace};
+pub use train::{TrainArguments, TrainCommand};
 pub use values::{Goal, StartPose, WorldSource};
 
 /// Everything after `surefoot`.
@@ -40,6 +43,12 @@ pub enum Command {
     /// Gather data to learn from, by simulated drives or from a recorded one
     #[command(long_about = collect::LONG_ABOUT)]
     Collect(Box<CollectArguments>),
+    /// Fit the networks to gathered data
+    Train {
+        /// What to fit.
+        #[command(subcommand)]
+        command: TrainCommand,
+    },
     /// Measure how fast the controller and the risk map are, and how often drives reach their goal
     Bench {
         /// What to measure.
@@ -61,6 +70,8 @@ Examples:
   surefoot drive --world arena          an RC car in a hall with a ramp and bushes
   surefoot drive --help                 every option, with its unit and default
   surefoot collect                      data to learn from, out of 200 simulated trials
+  surefoot train traversability --train train.safetensors --validation validation.safetensors
+                                        networks that know what the drives have taught
   surefoot bench control --threads 2    milliseconds of one control update
 
 Units are SI: metres, seconds, radians. x points east, y north; yaw is counter-clockwise from east.

@@ -13,6 +13,7 @@ pub mod output;
 pub mod picture;
 pub mod progress;
 pub mod summary;
+mod train;
 
 use std::io::Write;
 use std::process::ExitCode;
@@ -20,7 +21,7 @@ use std::process::ExitCode;
 use clap::Parser;
 use clap::error::ErrorKind;
 
-use arguments::{Arguments, BenchCommand, Command};
+use arguments::{Arguments, BenchCommand, Command, TrainCommand};
 pub use failure::{UsageError, WorkFailed};
 
 /// Runs the command line of this process.
@@ -42,6 +43,9 @@ fn dispatch(command: Command) -> anyhow::Result<()> {
     match command {
         Command::Drive(drive) => drive::run(&drive),
         Command::Collect(collect) => collect::run(&collect),
+        Command::Train { command: TrainCommand::Traversability(traversability) } => {
+            train::run(&traversability)
+        }
         Command::Bench { command: BenchCommand::Control(control) } => bench::run_control(&control),
         Command::Bench { command: BenchCommand::PriorMap(prior_map) } => bench::run_prior_map(&prior_map),
         Command::Bench { command: BenchCommand::Learning(learning) } => bench::run_learning(&learning),

@@ -94,7 +94,7 @@ pub(super) fn height_m(word: &str) -> Result<f64, String> {
     number_where(word, "a height from 0 to 2 metres", |value| (0.0..=2.0).contains(&value))
 }
 
-fn number_where(word: &str, expected: &str, allowed: impl Fn(f64) -> bool) -> Result<f64, String> {
+pub(super) fn number_where(word: &str, expected: &str, allowed: impl Fn(f64) -> bool) -> Result<f64, String> {
     word.trim()
         .parse()
         .ok()
@@ -132,7 +132,7 @@ pub(super) fn height_scale(word: &str) -> Result<f64, String> {
     number_where(word, "a factor from 0.1 to 10", |value| (0.1..=10.0).contains(&value))
 }
 
-fn count(word: &str, most: usize, of: &str) -> Result<usize, String> {
+pub(super) fn count(word: &str, most: usize, of: &str) -> Result<usize, String> {
     word.trim()
         .parse()
         .ok()

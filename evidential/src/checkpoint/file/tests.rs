@@ -7,10 +7,14 @@ static CHECKPOINT: LazyLock<Checkpoint> = LazyLock::new(training::tests::checkpo
 
 /// The refusal of the two files after a change of the sidecar's JSON.
 fn refused(change: impl FnOnce(&mut serde_json::Value)) -> String {
-    let mut sidecar: serde_json::Value = serde_json::from_slice(&CHECKPOINT.sidecar_bytes().unwrap()).unwrap();
+    let mut sidecar: serde_json::Value =
+        serde_json::from_slice(&CHECKPOINT.sidecar_bytes().unwrap()).unwrap();
     change(&mut sidecar);
     let weights = CHECKPOINT.weights_bytes().unwrap();
-    Checkpoint::from_bytes(&weights, &serde_json::to_vec(&sidecar).unwrap()).map(|_| ()).unwrap_err().to_string()
+    Checkpoint::from_bytes(&weights, &serde_json::to_vec(&sidecar).unwrap())
+        .map(|_| ())
+        .unwrap_err()
+        .to_string()
 }
 
 /// The refusal of weights whose hash the sidecar holds.
@@ -33,7 +37,10 @@ fn checkpoint_survives_its_files_to_the_last_bit() {
 fn other_format_bins_or_lengths_are_refused_with_expected_and_found() {
     assert_eq!(refused(|s| s["format"] = 2.into()), "format: expected 1, found 2");
     let told = refused(|s| s["traction_bins"][1] = 0.1.into());
-    assert!(told.starts_with("traction_bins: expected [0.0, 0.05,") && told.contains("found [0.0, 0.1,"), "{told}");
+    assert!(
+        told.starts_with("traction_bins: expected [0.0, 0.05,") && told.contains("found [0.0, 0.1,"),
+        "{told}"
+    );
     let told = refused(|s| s["attitude_bins_rad"] = serde_json::json!([0.0, 1.0]));
     assert!(told.starts_with("attitude_bins_rad: expected") && told.ends_with("found [0.0, 1.0]"), "{told}");
     let told = refused(|s| s["layout"]["height_patch"]["n_rows"] = 13.into());
@@ -90,7 +97,8 @@ fn truncated_and_hostile_weights_are_refused() {
         hostile[..8].copy_from_slice(&length.to_le_bytes());
         assert!(refused_weights(&hostile).starts_with("weights: expected safetensors, found: "));
     }
-    let header = br#"{"encoder.0.bias":{"dtype":"F32","shape":[4611686018427387904,4],"data_offsets":[0,4]}}"#;
+    let header =
+        br#"{"encoder.0.bias":{"dtype":"F32","shape":[4611686018427387904,4],"data_offsets":[0,4]}}"#;
     let mut hostile = (header.len() as u64).to_le_bytes().to_vec();
     hostile.extend(header);
     hostile.extend([0; 4]);
@@ -124,5 +132,7 @@ fn other_vehicle_layout_or_prior_is_refused() {
     let told = CHECKPOINT.require_layout(&other).unwrap_err().to_string();
     assert!(told.starts_with("layout of the weights: expected FeatureLayout"), "{told}");
     let other = physics_prior::PriorConfig { evidence: 3.0, ..prior };
-    assert!(CHECKPOINT.require_prior(&other).unwrap_err().to_string().starts_with("physics prior of the weights"));
+    assert!(
+        CHECKPOINT.require_prior(&other).unwrap_err().to_string().starts_with("physics prior of the weights")
+    );
 }
