@@ -97,14 +97,16 @@ fn label(signals: &Signals, aligned: &Aligned, row: usize, config: &LabelConfig)
     }
     let is_forward = aligned.speed_mps[window.clone()].iter().all(|&speed_mps| speed_mps >= 0.0);
     let is_meant = is_forward || config.reversing == Reversing::Labelled;
-    let settled = |raw: &[f64], filtered: &[f64], scale: f64| {
-        window.clone().all(|row| (raw[row] - filtered[row]).abs() <= config.unsettled_share_max * scale)
+    let settled = |raw: &[f64], arrived: &[f64], most: f64| {
+        window.clone().all(|row| (raw[row] - arrived[row]).abs() <= most)
     };
-    let is_speed_settled = settled(&signals.commanded_mps, &aligned.speed_mps, commanded_mps.abs());
+    let speed_most_mps = config.unsettled_speed_share_max * commanded_mps.abs();
+    let is_speed_settled = settled(&signals.commanded_mps, &aligned.speed_mps, speed_most_mps);
     let linear = (is_meant && is_speed_settled && commanded_mps.abs() >= config.speed_min_mps)
         .then(|| speed_mps / commanded_mps);
     let commanded_radps = mean(&aligned.yaw_rate_radps);
-    let is_turn_settled = settled(&signals.commanded_radps, &aligned.yaw_rate_radps, commanded_radps.abs());
+    let turn_most_radps = config.unsettled_turn_share_max * commanded_radps.abs();
+    let is_turn_settled = settled(&signals.commanded_radps, &aligned.yaw_rate_radps, turn_most_radps);
     let angular = (is_meant && is_turn_settled && commanded_radps.abs() >= config.yaw_rate_min_radps)
         .then(|| mean(&signals.yaw_rate_radps) / commanded_radps);
     let ratio = |ratio: Option<f64>| {

@@ -137,7 +137,7 @@ fn responses_are_those_of_the_machine() {
 #[test]
 fn ratios_without_alignment_are_wrong_where_those_with_it_are_right() {
     let log = LAGGING.drive(18.0, sine);
-    let lax = LabelConfig { unsettled_share_max: 1e9, start_s: 4.0, ..config() };
+    let lax = LabelConfig { unsettled_turn_share_max: 1e9, start_s: 4.0, ..config() };
     let run = log.runs().next().unwrap();
     let worst = |responses: &Responses| {
         let labels = labels(&run, &GEOMETRY, responses, &lax).unwrap();
@@ -164,8 +164,10 @@ fn a_command_that_never_changes_tells_no_response() {
 fn a_stuck_vehicle_has_no_traction_and_says_so_once_a_second() {
     let stuck = Machine { ground: |_| [0.0, 0.0], ..LAGGING };
     let log = stuck.drive(10.0, |_| [2.0, 0.3]);
-    let responses =
-        Responses { speed: Response { delay_s: 0.1, time_constant_s: 0.4 }, turn: Response::default() };
+    let responses = Responses {
+        speed: Response { delay_s: 0.1, rate_max_per_s: None, time_constant_s: 0.4 },
+        turn: Response::default(),
+    };
     let run = log.runs().next().unwrap();
     let labels = labels(&run, &GEOMETRY, &responses, &config()).unwrap();
     assert_eq!(labels.len(), 9);
@@ -280,7 +282,8 @@ fn settings_out_of_range_are_refused() {
         (LabelConfig { standing_period_s: f64::NAN, ..usual }, "standing_period_s"),
         (LabelConfig { speed_min_mps: -1.0, ..usual }, "speed_min_mps"),
         (LabelConfig { yaw_rate_min_radps: 0.0, ..usual }, "yaw_rate_min_radps"),
-        (LabelConfig { unsettled_share_max: f64::INFINITY, ..usual }, "unsettled_share_max"),
+        (LabelConfig { unsettled_speed_share_max: f64::INFINITY, ..usual }, "unsettled_speed_share_max"),
+        (LabelConfig { unsettled_turn_share_max: 0.0, ..usual }, "unsettled_turn_share_max"),
         (LabelConfig { moved_min_m: -0.1, ..usual }, "moved_min_m"),
         (LabelConfig { window_s: -0.1, ..usual }, "window_s"),
         (LabelConfig { start_s: f64::NAN, ..usual }, "start_s"),

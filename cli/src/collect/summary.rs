@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::fmt;
 
 use bench::collection::{Collection, HeightScale};
-use evidential::{Dataset, LabelConfig, PARAMETER_BINS, PARAMETER_NAMES, Responses};
+use evidential::{Dataset, LabelConfig, PARAMETER_BINS, PARAMETER_NAMES, Response, Responses};
 use serde::Serialize;
 
 /// The content of `--json`.
@@ -118,10 +118,11 @@ impl fmt::Display for CollectSummary {
             percentiles.map(|(percent, value_m)| format!("{percent} %: {value_m:.3}")).collect();
         writeln!(out, "  unevenness [m]   {}", percentiles.join("  "))?;
         for (name, response) in [("speed", self.responses.speed), ("turn", self.responses.turn)] {
+            let Response { delay_s, rate_max_per_s, time_constant_s } = response;
+            let rate = rate_max_per_s.map_or(String::new(), |rate| format!("at most {rate:.2} per s, "));
             writeln!(
                 out,
-                "  {name} follows its command after {:.2} s with a time constant of {:.2} s",
-                response.delay_s, response.time_constant_s
+                "  {name} follows its command: delay {delay_s:.2} s, {rate}lag {time_constant_s:.2} s"
             )?;
         }
         if let Some(found) = &self.height_scale {

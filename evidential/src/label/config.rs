@@ -23,9 +23,11 @@ pub struct LabelConfig {
     pub speed_min_mps: f64,
     /// Angular traction means nothing below this commanded yaw rate [rad/s].
     pub yaw_rate_min_radps: f64,
-    /// Traction means nothing where the command and what has arrived of it differ by more than this share of the
-    /// latter: an error of a fifth in the response is an error of a fifth of this share in traction [-].
-    pub unsettled_share_max: f64,
+    /// Linear traction means nothing where the commanded speed and what has arrived of it differ by more than this
+    /// share of the latter: a response that is wrong by a fifth makes traction wrong by a fifth of this share [-].
+    pub unsettled_speed_share_max: f64,
+    /// The same of angular traction and the commanded yaw rate [-].
+    pub unsettled_turn_share_max: f64,
     /// What is done with reverse commands.
     pub reversing: Reversing,
 }
@@ -78,7 +80,8 @@ impl LabelConfig {
             end_s: 0.2,
             speed_min_mps: 0.1 * limits.speed_max_mps,
             yaw_rate_min_radps: 0.2 * turn_radps,
-            unsettled_share_max: 0.3,
+            unsettled_speed_share_max: 0.1,
+            unsettled_turn_share_max: 0.3,
             reversing: Reversing::Masked,
         }
     }
@@ -90,7 +93,8 @@ impl LabelConfig {
             ("standing_period_s", self.standing_period_s),
             ("speed_min_mps", self.speed_min_mps),
             ("yaw_rate_min_radps", self.yaw_rate_min_radps),
-            ("unsettled_share_max", self.unsettled_share_max),
+            ("unsettled_speed_share_max", self.unsettled_speed_share_max),
+            ("unsettled_turn_share_max", self.unsettled_turn_share_max),
         ];
         let not_negative = [
             ("moved_min_m", self.moved_min_m),

@@ -1,15 +1,18 @@
-//! How a command becomes motion: a delay and a first-order lag, found in the log itself.
+//! How a command becomes motion: a delay, a limited rate and a first-order lag, found in the log itself.
 
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::signals::Signals;
 
-/// What stands between a command and its effect.
+/// What stands between a command and its effect, in this order.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Response {
     /// Until anything happens [s].
     pub delay_s: f64,
+    /// Fastest change of what is aimed at, per second in units of the command; `None` = any.
+    pub rate_max_per_s: Option<f64>,
     /// Time constant of the first-order lag after that [s].
     pub time_constant_s: f64,
 }
@@ -18,15 +21,18 @@ pub struct Response {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Responses {
-    /// Of the speed.
+    /// Of the speed [m/s].
     pub speed: Response,
-    /// Of the steering, or of the yaw rate where that is what is commanded.
+    /// Of the steering, as curvature [1/m], or of the yaw rate where that is what is commanded [rad/s].
     pub turn: Response,
 }
 
-/// Delays and time constants that are tried [s].
-const DELAYS_S: [f64; 13] = [0.0, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4, 0.5, 0.6, 0.8, 1.0];
-const TIME_CONSTANTS_S: [f64; 14] = [0.0, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.4, 0.5, 0.6, 0.8, 1.0, 1.5, 2.0];
+/// Delays that are tried [s].
+const DELAYS_S: [f64; 12] = [0.0, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.4, 0.5, 0.6, 0.8, 1.0];
+/// Time constants that are tried [s].
+const TIME_CONSTANTS_S: [f64; 12] = [0.0, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.4, 0.5, 0.7, 1.0, 1.5];
+/// Times from zero to the largest command that are tried, beside any rate [s].
+const RAMPS_S: [f64; 10] = [0.25, 0.5, 0.75, 1.0, 1.2, 1.4, 1.6, 2.0, 3.0, 4.0];
 /// Length of the stretches that each have a gain and a scatter of their own [s].
 const STRETCH_S: f64 = 5.0;
 /// The best response must be likelier than the worst by this much, or the log does not tell: a command that never
@@ -41,13 +47,18 @@ impl Responses {
     /// since what the ground takes is a gain below one, and so is the scatter: where the ground changed or the vehicle
     /// got stuck, the motion says little of its servos.
     pub(super) fn estimate(runs: &[Signals]) -> Self {
-        let speed = best(|response| {
+        let commanded_mps = runs.iter().flat_map(|run| &run.commanded_mps);
+        let fastest_mps =
+            commanded_mps.filter(|speed| speed.is_finite()).fold(0.0, |a: f64, b| a.max(b.abs()));
+        // Machines ramp their speed; the steering that they cannot follow at once is a small part of any drive.
+        let rates = RAMPS_S.map(|ramp_s| Some(fastest_mps / ramp_s).filter(|rate| *rate > 0.0));
+        let speed = best(&[&[None], &rates[..]].concat(), |response| {
             let of_run =
                 |run: &Signals| misfit_nats(&run.time_s, &run.speed_mps, &run.arrived_speed(response));
             runs.iter().map(of_run).sum()
         });
         let speeds_mps: Vec<Vec<f64>> = runs.iter().map(|run| run.arrived_speed(&speed)).collect();
-        let turn = best(|response| {
+        let turn = best(&[None], |response| {
             let of_run = |(run, speed_mps): (&Signals, &Vec<f64>)| {
                 misfit_nats(&run.time_s, &run.yaw_rate_radps, &run.arrived_yaw_rate(response, speed_mps))
             };
@@ -62,34 +73,56 @@ impl Response {
     /// it is taken to have been held too; `start` had arrived then. A command that is not finite changes nothing.
     pub(super) fn follow(&self, time_s: &[f64], commanded: &[f64], start: f64) -> Vec<f64> {
         let mut arrived = Vec::with_capacity(time_s.len());
-        let mut value = start;
         // The command whose effect begins next.
         let mut next = 0;
         let mut held = commanded.first().copied().filter(|command| command.is_finite()).unwrap_or(start);
+        let mut state = Arrival { aim: start, value: start };
         let Some(mut then_s) = time_s.first().copied() else { return arrived };
         for &now_s in time_s {
             while next < commanded.len() && time_s[next] + self.delay_s <= now_s {
                 let begins_s = (time_s[next] + self.delay_s).max(then_s);
-                value = self.after(begins_s - then_s, value, held);
+                self.advance(&mut state, held, begins_s - then_s);
                 then_s = begins_s;
                 held = if commanded[next].is_finite() { commanded[next] } else { held };
                 next += 1;
             }
-            value = self.after(now_s - then_s, value, held);
+            self.advance(&mut state, held, now_s - then_s);
             then_s = now_s;
-            arrived.push(value);
+            arrived.push(state.value);
         }
         arrived
     }
 
-    /// What has arrived of a held command after a while.
-    fn after(&self, duration_s: f64, value: f64, held: f64) -> f64 {
-        if self.time_constant_s > 0.0 {
-            held + (value - held) * (-duration_s / self.time_constant_s).exp()
-        } else {
-            held
+    /// A while of a held command: the aim runs to it and stays there.
+    fn advance(&self, state: &mut Arrival, held: f64, duration_s: f64) {
+        let rate = self.rate_max_per_s.unwrap_or(f64::INFINITY).copysign(held - state.aim);
+        let ramp_s = ((held - state.aim) / rate).clamp(0.0, duration_s);
+        if ramp_s > 0.0 {
+            self.lag(state, rate, ramp_s);
+        }
+        if ramp_s < duration_s || self.rate_max_per_s.is_none() {
+            state.aim = held;
+            self.lag(state, 0.0, duration_s - ramp_s);
         }
     }
+
+    /// The lag behind an aim that moves at a rate.
+    fn lag(&self, state: &mut Arrival, rate: f64, duration_s: f64) {
+        // In the long run the value trails the aim by the way of one time constant.
+        let trailing = rate * self.time_constant_s;
+        let offset = state.value - (state.aim - trailing);
+        state.aim += rate * duration_s;
+        let left = if self.time_constant_s > 0.0 { (-duration_s / self.time_constant_s).exp() } else { 0.0 };
+        state.value = state.aim - trailing + offset * left;
+    }
+}
+
+/// A command on its way.
+struct Arrival {
+    /// After the limited rate.
+    aim: f64,
+    /// After the lag.
+    value: f64,
 }
 
 /// Sum of [`stretch_nats`] over the stretches of a run.
@@ -120,19 +153,24 @@ fn stretch_nats(pairs: impl Iterator<Item = (f64, f64)>) -> f64 {
 }
 
 /// The response that fits best; none when the motion does not tell them apart.
-fn best(misfit_nats: impl Fn(&Response) -> f64) -> Response {
-    let candidates = DELAYS_S.into_iter().flat_map(|delay_s| {
-        TIME_CONSTANTS_S.into_iter().map(move |time_constant_s| Response { delay_s, time_constant_s })
-    });
-    let (mut best, mut least, mut most) = (Response::default(), f64::INFINITY, f64::NEG_INFINITY);
-    for response in candidates {
-        let nats = misfit_nats(&response);
-        most = most.max(nats);
-        if nats < least {
-            (best, least) = (response, nats);
+fn best(rates: &[Option<f64>], misfit_nats: impl Fn(&Response) -> f64 + Sync + Send) -> Response {
+    let mut candidates = Vec::with_capacity(rates.len() * DELAYS_S.len() * TIME_CONSTANTS_S.len());
+    for &rate_max_per_s in rates {
+        for delay_s in DELAYS_S {
+            candidates.extend(TIME_CONSTANTS_S.map(|time_constant_s| Response {
+                delay_s,
+                rate_max_per_s,
+                time_constant_s,
+            }));
         }
     }
-    if most - least > TELLING_NATS { best } else { Response::default() }
+    let nats: Vec<f64> = candidates.par_iter().map(misfit_nats).collect();
+    let most = nats.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let least = candidates.iter().zip(&nats).min_by(|a, b| a.1.total_cmp(b.1));
+    match least {
+        Some((response, least)) if most - least > TELLING_NATS => *response,
+        _ => Response::default(),
+    }
 }
 
 #[cfg(test)]
@@ -147,13 +185,32 @@ mod tests {
     fn a_step_arrives_after_the_delay_as_an_exponential() {
         let time_s = steps(60, 0.1);
         let commanded: Vec<f64> = time_s.iter().map(|t| if *t < 0.95 { 0.0 } else { 2.0 }).collect();
-        let response = Response { delay_s: 0.25, time_constant_s: 0.4 };
+        let response = Response { delay_s: 0.25, rate_max_per_s: None, time_constant_s: 0.4 };
         let arrived = response.follow(&time_s, &commanded, 0.0);
         // The command of the row at 1.0 s begins to act at 1.25 s.
         for (t, value) in time_s.iter().zip(&arrived) {
             let expected = if *t < 1.25 { 0.0 } else { 2.0 * (1.0 - (-(t - 1.25) / 0.4_f64).exp()) };
             assert!((value - expected).abs() < 1e-9, "{t}: {value} {expected}");
         }
+    }
+
+    #[test]
+    fn a_limited_rate_is_a_ramp_that_the_lag_trails_by_its_time_constant() {
+        let time_s = steps(80, 0.05);
+        let commanded: Vec<f64> = time_s.iter().map(|_| 2.0).collect();
+        let response = Response { delay_s: 0.0, rate_max_per_s: Some(1.0), time_constant_s: 0.1 };
+        let arrived = response.follow(&time_s, &commanded, 0.0);
+        for (t, value) in time_s.iter().zip(&arrived) {
+            // y' = (u - y) / T for u = t gives t - T + T exp(-t / T); then u = 2.
+            let ramp = |t: f64| t - 0.1 + 0.1 * (-t / 0.1).exp();
+            let expected =
+                if *t <= 2.0 { ramp(*t) } else { 2.0 + (ramp(2.0) - 2.0) * (-(t - 2.0) / 0.1).exp() };
+            assert!((value - expected).abs() < 1e-9, "{t}: {value} {expected}");
+        }
+        // Downwards alike, and without a lag the ramp itself.
+        let bare = Response { time_constant_s: 0.0, ..response };
+        let down = bare.follow(&time_s[..11], &[-2.0; 11], 0.25);
+        assert!((down[10] + 0.25).abs() < 1e-9, "{down:?}");
     }
 
     #[test]
@@ -166,7 +223,7 @@ mod tests {
 
     #[test]
     fn the_response_does_not_depend_on_how_often_a_held_command_is_logged() {
-        let response = Response { delay_s: 0.13, time_constant_s: 0.2 };
+        let response = Response { delay_s: 0.13, rate_max_per_s: Some(1.7), time_constant_s: 0.2 };
         let command = |t: f64| (t / 0.5).floor();
         let of = |dt_s: f64, n: usize| {
             let time_s = steps(n, dt_s);
