@@ -21,6 +21,12 @@ pub enum BenchError {
     /// The map of what was learned cannot be made.
     #[error(transparent)]
     Belief(#[from] evidential::BeliefMapError),
+    /// The elevation map cannot be made.
+    #[error(transparent)]
+    Elevation(#[from] terrain::ElevationConfigError),
+    /// The elevation map refused a pose.
+    #[error(transparent)]
+    Fuse(#[from] terrain::FuseError),
     /// The cost-to-go field cannot be made.
     #[error(transparent)]
     CostToGo(#[from] mppi::CostToGoError),

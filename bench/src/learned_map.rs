@@ -2,12 +2,13 @@
 //!
 //! What a map costs does not depend on the values of the weights, so networks of any size are measured untrained.
 
+mod scan_drive;
 mod untrained;
 
 use std::sync::Arc;
 
 use bicycle::Geometry;
-use evidential::{Architecture, BeliefMap, Checkpoint, FeatureLayout, Learned, Predictor, Unfamiliar};
+use evidential::{BeliefMap, Checkpoint, FeatureLayout, Learned, Predictor, Unfamiliar};
 use physics_prior::{Assumption, PriorMap};
 use rand::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -20,6 +21,7 @@ use crate::prior_map::{CHANGED, CVAR_LEVEL, N_YAWS, SEED, WINDOW, block, roughen
 use crate::stopwatch::timed_ms;
 use crate::{BenchError, Spread};
 
+pub use scan_drive::{ScanDrive, ScanDriveReport, measure_scan_drive};
 pub use untrained::{Sizes, untrained};
 
 /// How to measure.
@@ -172,19 +174,6 @@ fn predict(predictor: &Predictor, footprints: &[Vec<f32>]) -> Result<(), BenchEr
     let chunks = footprints.par_chunks(CHUNK);
     let predicted = chunks.map(|chunk| predictor.predict(chunk).map(drop));
     Ok(predicted.collect::<Result<(), _>>().map_err(evidential::BeliefMapError::from)?)
-}
-
-/// The sizes of an architecture, as they are asked for.
-impl From<&Architecture> for Sizes {
-    fn from(architecture: &Architecture) -> Self {
-        Self {
-            encoder_hidden: architecture.encoder_hidden.clone(),
-            n_latent: architecture.n_latent,
-            head_hidden: architecture.head_hidden,
-            evidence_hidden: architecture.evidence_hidden,
-            n_flow_layers: architecture.n_flow_layers,
-        }
-    }
 }
 
 #[cfg(test)]

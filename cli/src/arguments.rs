@@ -3,6 +3,7 @@
 mod bench;
 mod collect;
 mod drive;
+mod learned_map;
 mod train;
 mod values;
 
@@ -14,6 +15,7 @@ pub use bench::{
 };
 pub use collect::{CollectArguments, CollectMap, CollectSplit, CollectWorld};
 pub use drive::{DriveArguments, InstructionSet, MapSource, Method, Pace};
+pub use learned_map::{BenchLearnedMapArguments, NetworkSizes};
 pub use train::{TrainArguments, TrainCommand};
 pub use values::{Goal, StartPose, WorldSource};
 

@@ -48,6 +48,9 @@ fn dispatch(command: Command) -> anyhow::Result<()> {
         }
         Command::Bench { command: BenchCommand::Control(control) } => bench::run_control(&control),
         Command::Bench { command: BenchCommand::PriorMap(prior_map) } => bench::run_prior_map(&prior_map),
+        Command::Bench { command: BenchCommand::LearnedMap(learned_map) } => {
+            bench::run_learned_map(&learned_map)
+        }
         Command::Bench { command: BenchCommand::Learning(learning) } => bench::run_learning(&learning),
         Command::Bench { command: BenchCommand::Navigation(navigation) } => {
             bench::run_navigation(&navigation)

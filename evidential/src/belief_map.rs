@@ -178,20 +178,20 @@ impl BeliefMap {
         self.layers.fusion.per_level = level.reciprocal();
     }
 
-    /// Takes over the whole surface. What lies beyond its window is unknown.
+    /// Takes over the whole surface. What lies beyond its window is unknown. Returns the cells that were judged: all.
     ///
     /// # Errors
     /// The surface has another resolution than the map was made for.
-    pub fn update_all(&mut self, surface: &GridMap<SurfaceCell>) -> Result<(), BeliefMapError> {
+    pub fn update_all(&mut self, surface: &GridMap<SurfaceCell>) -> Result<CellRegion, BeliefMapError> {
         let dirty = self.layers.field.read_all(surface)?;
         self.layers.read_ground(surface, None);
         self.fill(surface, &dirty);
-        Ok(())
+        Ok(dirty)
     }
 
     /// Takes over the cells of the surface that changed since the last update, and judges anew only the poses that
     /// they reach; the result is that of [`BeliefMap::update_all`], bit by bit. It is a full update when one of the
-    /// windows or the level changed.
+    /// windows or the level changed. Returns the cells that were judged.
     ///
     /// # Errors
     /// The surface has another resolution than the map was made for.
@@ -199,7 +199,7 @@ impl BeliefMap {
         &mut self,
         surface: &GridMap<SurfaceCell>,
         changed: &CellRegion,
-    ) -> Result<(), BeliefMapError> {
+    ) -> Result<CellRegion, BeliefMapError> {
         let is_whole = self.layers.field.is_outdated(surface);
         let by_prior = self.layers.field.read_changed(surface, changed)?;
         let dirty = if is_whole {
@@ -210,7 +210,7 @@ impl BeliefMap {
             union(by_prior, by_networks)
         };
         self.fill(surface, &dirty);
-        Ok(())
+        Ok(dirty)
     }
 
     /// Bytes that the map takes while it is updated: ground, prior, networks, buffers and result.

@@ -54,7 +54,7 @@ impl Author {
     pub fn update_all(&mut self, surface: &GridMap<SurfaceCell>) -> Result<(), BeliefMapError> {
         match self {
             Self::Prior(map) => Ok(map.update_all(surface)?),
-            Self::Networks(map) => map.update_all(surface),
+            Self::Networks(map) => map.update_all(surface).map(drop),
         }
     }
 
@@ -65,7 +65,7 @@ impl Author {
     ) -> Result<(), BeliefMapError> {
         match self {
             Self::Prior(map) => Ok(map.update_dirty(surface, changed)?),
-            Self::Networks(map) => map.update_dirty(surface, changed),
+            Self::Networks(map) => map.update_dirty(surface, changed).map(drop),
         }
     }
 }

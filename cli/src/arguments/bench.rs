@@ -15,6 +15,9 @@ pub enum BenchCommand {
     /// The risk map of the physics prior, whole and after a part of the ground has changed
     #[command(long_about = PRIOR_MAP_ABOUT)]
     PriorMap(BenchPriorMapArguments),
+    /// The risk map of what was learned, whole and after a part of the ground has changed
+    #[command(long_about = super::learned_map::LONG_ABOUT)]
+    LearnedMap(super::BenchLearnedMapArguments),
     /// Drives over the default rock field, with every method and risk tolerance
     #[command(long_about = NAVIGATION_ABOUT)]
     Navigation(BenchNavigationArguments),
