@@ -172,6 +172,7 @@ impl Lifted {
 }
 
 #[cfg(test)]
+#[allow(clippy::excessive_precision, reason = "the tables hold what was computed with more digits")]
 mod tests {
     use super::*;
     use rand::SeedableRng;

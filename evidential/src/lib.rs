@@ -41,8 +41,8 @@ pub use features::{FeatureLayout, Standardisation};
 pub use label::{Label, LabelConfig, LabelError, Response, Responses, Reversing, estimate_responses, labels};
 pub use method::{Method, Prior};
 pub use predictor::{Evidence, Prediction, Predictor, PredictorError};
-pub use sweep::{Grid, Selection, SelectionError, Selections, Trial, fingerprint};
 pub use shipped::{ShippedError, shipped};
+pub use sweep::{Grid, Selection, SelectionError, Selections, Trial, fingerprint};
 pub use training::{
     Epoch, Outcome, Percentiles, Phase, Settings, SettingsError, TrainError, TrainingEnd, train,
 };

@@ -112,8 +112,8 @@ impl LossTerms {
         let mut sum = 0.0;
         let rows = outputs.chunks_exact(width).zip(targets.chunks_exact(N_TARGETS));
         for ((output, target), slot) in rows.zip(gradient.chunks_exact_mut(width)) {
-            for head in 0..N_HEADS {
-                let shares = Shares { data: data_share[head], all: 1.0 / n as f64 };
+            for (head, &data) in data_share.iter().enumerate() {
+                let shares = Shares { data, all: 1.0 / n as f64 };
                 sum += self.head(head, output, target, shares, slot);
             }
         }

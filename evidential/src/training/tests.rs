@@ -142,7 +142,7 @@ fn interruption_keeps_the_best_weights_so_far() {
 fn training_ends_when_validation_no_longer_gets_better() {
     let settings = Settings { epochs_max: 60, patience: 2, learning_rate: 2e-2, ..quick(Method::Vanilla) };
     let curves = trained(&settings).curves;
-    let best = curves.iter().filter(|epoch| epoch.is_best).next_back().unwrap().epoch;
+    let best = curves.iter().rfind(|epoch| epoch.is_best).unwrap().epoch;
     assert!(curves.len() < 60);
     assert_eq!(curves.len(), best + 2);
     let least = curves.iter().map(|epoch| epoch.validation_error).fold(f64::INFINITY, f64::min);
@@ -196,7 +196,8 @@ fn data_that_does_not_fit_is_refused() {
 #[test]
 fn data_sets_of_different_origin_are_refused() {
     let settings = quick(Method::Vanilla);
-    let cases: [(&str, fn(&mut DatasetOrigin)); 3] = [
+    type Change = fn(&mut DatasetOrigin);
+    let cases: [(&str, Change); 3] = [
         ("vehicle", |origin| origin.vehicle = "another".to_owned()),
         ("layout", |origin| origin.layout.height_scale_m *= 2.0),
         ("prior", |origin| origin.prior.evidence = 5.0),
