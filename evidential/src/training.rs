@@ -19,8 +19,8 @@ use crate::loss::{BatchLoss, LossTerms};
 use crate::network::Network;
 use crate::random::stream;
 use crate::{
-    Architecture, Checkpoint, Dataset, DatasetError, DensityRange, PARAMETER_BINS, PARAMETER_NAMES, Sidecar,
-    Standardisation,
+    Architecture, Checkpoint, Dataset, DatasetError, DatasetOrigin, DensityRange, PARAMETER_BINS,
+    PARAMETER_NAMES, Sidecar, Standardisation,
 };
 use evaluation::Evaluation;
 pub use evaluation::Percentiles;
@@ -164,7 +164,10 @@ pub fn train(
 ) -> Result<Outcome, TrainError> {
     settings.validate()?;
     check(training, validation)?;
-    Run::new(training, validation, settings)?.finish(training, revision, progress)
+    let mut run = Run::new(training, validation, settings)?;
+    run.fit(progress)?;
+    let checkpoint = run.checkpoint(&training.origin, revision)?;
+    run.outcome(checkpoint)
 }
 
 fn check(training: &Dataset, validation: &Dataset) -> Result<(), TrainError> {
@@ -240,39 +243,44 @@ impl<'a> Run<'a> {
         })
     }
 
-    fn finish(
-        mut self,
-        data: &Dataset,
-        revision: &str,
-        progress: Progress<'_>,
-    ) -> Result<Outcome, TrainError> {
+    /// Both phases, the second only if nobody broke off the first.
+    fn fit(&mut self, progress: Progress<'_>) -> Result<(), TrainError> {
         self.fit_jointly(progress)?;
         if self.settings.method.is_evidential() && self.end == TrainingEnd::Finished {
             self.fit_flow(progress)?;
         }
-        let density = self.density_range()?;
-        let evaluation = Evaluation::new(&self.network, &self.validation, &self.terms)?;
+        Ok(())
+    }
+
+    /// The networks as they are, with what they mean.
+    fn checkpoint(&self, origin: &DatasetOrigin, revision: &str) -> Result<Checkpoint, TrainError> {
         let sidecar = Sidecar {
             format: Sidecar::FORMAT,
             method: self.settings.method,
-            vehicle: data.origin.vehicle.clone(),
-            architecture: self.settings.architecture(data.origin.layout.n_features()),
-            layout: data.origin.layout,
-            standardisation: self.standardisation,
+            vehicle: origin.vehicle.clone(),
+            architecture: self.settings.architecture(origin.layout.n_features()),
+            layout: origin.layout,
+            standardisation: self.standardisation.clone(),
             traction_bins: PARAMETER_BINS[0].values().to_vec(),
             attitude_bins_rad: PARAMETER_BINS[2].values().to_vec(),
-            prior: data.origin.prior,
-            density,
+            prior: origin.prior,
+            density: self.density_range()?,
             training: serde_json::json!(self.settings),
             git_revision: revision.to_owned(),
             weights_sha256: String::new(),
         };
+        Ok(Checkpoint::new(sidecar, self.network.tensors()?)?)
+    }
+
+    fn outcome(self, checkpoint: Checkpoint) -> Result<Outcome, TrainError> {
+        let evaluation = Evaluation::new(&self.network, &self.validation, &self.terms)?;
+        let learned_weight =
+            (!evaluation.learned_weights.is_empty()).then(|| Percentiles::of(evaluation.learned_weights));
         Ok(Outcome {
-            checkpoint: Checkpoint::new(sidecar, self.network.tensors()?)?,
+            checkpoint,
             curves: self.curves,
             validation_emd2: evaluation.emd2,
-            learned_weight: (!evaluation.learned_weights.is_empty())
-                .then(|| Percentiles::of(evaluation.learned_weights)),
+            learned_weight,
             end: self.end,
         })
     }

@@ -7,7 +7,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 use traversability::N_BINS;
 
 use super::*;
-use crate::{DatasetOrigin, Example, FeatureLayout, Method};
+use crate::{Example, FeatureLayout, Method, Predictor, loss};
 
 const GEOMETRY: Geometry = Geometry {
     wheelbase_m: 2.0,
@@ -226,4 +226,29 @@ fn loss_that_runs_away_names_epoch_and_step() {
 /// A small checkpoint with evidence.
 pub(crate) fn checkpoint() -> Checkpoint {
     trained(&Settings { epochs_max: 1, flow_epochs_max: 1, ..quick(Method::Pietra) }).checkpoint
+}
+
+#[test]
+fn fast_inference_says_what_the_trained_networks_say() {
+    let settings = quick(Method::Pietra);
+    let mut run = Run::new(&TRAINING, &VALIDATION, &settings).unwrap();
+    run.fit(&mut |_| ControlFlow::Continue(())).unwrap();
+    let (inputs, _) = run.validation.chunk(0, run.validation.n).unwrap();
+    let outputs = run.network.outputs(&inputs).unwrap().to_vec2::<f32>().unwrap();
+    let checkpoint = run.checkpoint(&TRAINING.origin, "here").unwrap();
+    let footprints: Vec<&[f32]> = VALIDATION.examples.iter().map(|e| e.features.as_slice()).collect();
+    let predictions = Predictor::new(&checkpoint).unwrap().predict(&footprints).unwrap();
+    for (output, prediction) in outputs.iter().zip(&predictions) {
+        let evidence = prediction.evidence.unwrap();
+        let log_density = output[4 * N_BINS + 4];
+        assert!((evidence.log_density - log_density).abs() < 1e-5 * log_density.abs().max(1.0));
+        let n = loss::evidence(f64::from(log_density), run.terms.log_budget);
+        for parameter in 0..4 {
+            let expected = loss::softmax(&output[parameter * N_BINS..(parameter + 1) * N_BINS]);
+            let found = prediction.pmfs[parameter].probabilities();
+            assert!(found.iter().zip(expected).all(|(f, e)| (f64::from(*f) - e).abs() < 1e-5));
+            let expected = n * loss::sigmoid(f64::from(output[4 * N_BINS + parameter]));
+            assert!((f64::from(evidence.counts[parameter]) / expected - 1.0).abs() < 1e-4);
+        }
+    }
 }
