@@ -159,6 +159,16 @@ pub enum CollectionError {
     /// The layers of a recording's ground make no world.
     #[error("elevation: {0}")]
     Layers(#[from] LayersError),
+    /// A recording of nothing.
+    #[error(
+        "log: expected a vehicle that moves or is told to, at finite poses, found none in {n_rows} rows of {n_runs} runs"
+    )]
+    NothingLabelled {
+        /// Rows of the log.
+        n_rows: usize,
+        /// Its runs.
+        n_runs: usize,
+    },
     /// A recording's ground lies elsewhere.
     #[error(
         "elevation: expected ground under at least half of the {n_labels} labelled poses, x {:.1} to {:.1}, y {:.1} to \

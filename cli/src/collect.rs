@@ -145,6 +145,7 @@ fn told(error: CollectionError) -> anyhow::Error {
         | CollectionError::Setting { .. }
         | CollectionError::Labels(_)
         | CollectionError::Layers(_)
+        | CollectionError::NothingLabelled { .. }
         | CollectionError::NotCovered { .. }
         | CollectionError::Dataset(_)
         | CollectionError::Survey(_) => UsageError::from_input(error).into(),

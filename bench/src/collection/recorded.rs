@@ -37,6 +37,10 @@ pub fn collect_recorded(
         .map(|run| labels(&run, &vehicle.geometry, &responses, &labelling))
         .collect::<Result<_, _>>()?;
     let poses_m = || drives.iter().flatten().map(|label| [label.pose[0], label.pose[1]]);
+    let n_labels = poses_m().count();
+    if n_labels == 0 {
+        return Err(CollectionError::NothingLabelled { n_rows: log.n_rows(), n_runs: log.runs().len() });
+    }
     let (world, surface) = ground(vehicle, layers, poses_m(), &source.ground, config.elevation.resolution_m)?;
 
     let layout = FeatureLayout::for_vehicle(&vehicle.geometry);
@@ -53,7 +57,6 @@ pub fn collect_recorded(
         });
         all.extend(examples);
     }
-    let n_labels = poses_m().count();
     if (all.len() as f64) < COVERED_SHARE_MIN * n_labels as f64 {
         let (drive, ground) = (around(poses_m()), layers.bounds());
         return Err(CollectionError::NotCovered { n_labels, n_covered: all.len(), drive, ground });
