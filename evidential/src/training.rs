@@ -4,88 +4,35 @@
 //! weights are kept. Then the predictor is frozen and the flow alone is fitted to the latents of the training data by
 //! maximum likelihood, as NatPN and EVORA do.
 
+mod error;
 mod evaluation;
 mod samples;
 mod settings;
+mod steps;
 
 use std::ops::ControlFlow;
 
-use candle_core::{Device, Tensor, Var};
-use candle_nn::{AdamW, Optimizer, ParamsAdamW};
-use rand::seq::SliceRandom;
+use candle_core::{Device, Tensor};
 use serde::{Deserialize, Serialize};
 
 use crate::loss::{BatchLoss, LossTerms};
 use crate::network::Network;
-use crate::random::stream;
 use crate::{
     Architecture, Checkpoint, Dataset, DatasetError, DatasetOrigin, DensityRange, PARAMETER_BINS,
     PARAMETER_NAMES, Sidecar, Standardisation,
 };
+pub use error::TrainError;
 use evaluation::Evaluation;
 pub use evaluation::Percentiles;
 use samples::{Samples, gather};
 pub use settings::{Settings, SettingsError};
+use steps::{Best, Place, adam, order, pass};
 
 /// Keys of the random streams that order the examples.
 const JOINT_KEY: u64 = 2;
 const FLOW_KEY: u64 = 3;
 /// Rows that pass the encoder at a time where nothing is learnt.
 const CHUNK: usize = 1024;
-
-/// Why nothing was trained.
-#[derive(Debug, thiserror::Error)]
-pub enum TrainError {
-    /// A setting out of range.
-    #[error("settings: {0}")]
-    Settings(#[from] SettingsError),
-    /// Data that nothing can be learnt from.
-    #[error("{which} data: {problem}")]
-    Data {
-        /// Training or validation.
-        which: &'static str,
-        /// What is wrong.
-        problem: DatasetError,
-    },
-    /// Every parameter has one value throughout.
-    #[error(
-        "training data: expected measurements in at least two bins of some parameter, found one bin each in {n} examples"
-    )]
-    OneClass {
-        /// Number of examples.
-        n: usize,
-    },
-    /// Training and validation data do not belong together.
-    #[error("validation data, {what}: expected that of the training data, {expected}, found {found}")]
-    Mismatch {
-        /// What differs.
-        what: &'static str,
-        /// Of the training data.
-        expected: String,
-        /// Of the validation data.
-        found: String,
-    },
-    /// The loss became infinite or no number.
-    #[error(
-        "{phase}, epoch {epoch}, step {step}: expected a finite loss, found {found}; a smaller learning rate may help"
-    )]
-    NonFiniteLoss {
-        /// What was trained.
-        phase: Phase,
-        /// From 1.
-        epoch: usize,
-        /// From 1.
-        step: usize,
-        /// The loss.
-        found: f64,
-    },
-    /// The arithmetic library refused.
-    #[error(transparent)]
-    Arithmetic(#[from] candle_core::Error),
-    /// The result cannot be kept.
-    #[error(transparent)]
-    Checkpoint(#[from] crate::CheckpointError),
-}
 
 /// What is being trained.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -385,75 +332,6 @@ fn mean_surprise(network: &Network, latents: &Tensor) -> candle_core::Result<Ten
     match network.log_densities(latents)? {
         Some(densities) => densities.mean_all()?.neg(),
         None => candle_core::bail!("expected networks with a flow"),
-    }
-}
-
-/// Where a training stands.
-#[derive(Clone, Copy)]
-struct Place {
-    phase: Phase,
-    epoch: usize,
-}
-
-fn adam(variables: Vec<Var>, learning_rate: f64) -> candle_core::Result<AdamW> {
-    AdamW::new(variables, ParamsAdamW { lr: learning_rate, weight_decay: 0.0, ..ParamsAdamW::default() })
-}
-
-/// The order of examples in one pass.
-fn order(seed: u64, key: u64, epoch: usize, n: usize) -> Vec<u32> {
-    let mut order: Vec<u32> = (0..n as u32).collect();
-    order.shuffle(&mut stream(seed, &[key, epoch as u64]));
-    order
-}
-
-/// Steps once per batch; the mean loss.
-fn pass(
-    order: &[u32],
-    batch: usize,
-    place: Place,
-    optimiser: &mut AdamW,
-    loss_of: impl Fn(&[u32]) -> candle_core::Result<Tensor>,
-) -> Result<f64, TrainError> {
-    let mut sum = 0.0;
-    for (step, indices) in order.chunks(batch).enumerate() {
-        let loss = loss_of(indices)?;
-        let found = scalar(&loss)?;
-        if !found.is_finite() {
-            let Place { phase, epoch } = place;
-            return Err(TrainError::NonFiniteLoss { phase, epoch, step: step + 1, found });
-        }
-        optimiser.backward_step(&loss)?;
-        sum += found * indices.len() as f64;
-    }
-    Ok(sum / order.len() as f64)
-}
-
-/// The best weights so far.
-struct Best {
-    variables: Vec<Var>,
-    kept: Vec<Tensor>,
-    error: f64,
-    epoch: usize,
-}
-
-impl Best {
-    fn new(variables: Vec<Var>) -> Self {
-        Self { variables, kept: Vec::new(), error: f64::INFINITY, epoch: 0 }
-    }
-
-    /// Copies the weights if their error is the smallest.
-    fn offer(&mut self, epoch: usize, error: f64) -> candle_core::Result<bool> {
-        let is_best = error < self.error;
-        if is_best {
-            self.kept = self.variables.iter().map(|variable| variable.copy()).collect::<Result<_, _>>()?;
-            (self.error, self.epoch) = (error, epoch);
-        }
-        Ok(is_best)
-    }
-
-    /// Puts the best weights back.
-    fn restore(self) -> candle_core::Result<()> {
-        self.variables.iter().zip(&self.kept).try_for_each(|(variable, kept)| variable.set(&kept.detach()))
     }
 }
 
