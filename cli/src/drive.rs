@@ -38,7 +38,7 @@ pub(crate) fn run(arguments: &DriveArguments) -> anyhow::Result<()> {
     }
     let kept = follow(arguments, &scene, &mut closed, &mut recording)?;
     recording.finish()?;
-    let summary = summarise(arguments, &scene, &closed, &kept.tally, config_hash);
+    let summary = summarise(arguments, &scene, &closed, &kept, config_hash);
     for path in &files.summaries {
         write_json_atomic(path, &summary)?;
     }
@@ -167,10 +167,12 @@ fn summarise(
     arguments: &DriveArguments,
     scene: &Scene,
     closed: &ClosedLoop,
-    tally: &Tally,
+    kept: &Kept,
     config_hash: String,
 ) -> Summary {
-    let episode = &closed.episode;
+    let (episode, tally) = (&closed.episode, &kept.tally);
+    let networks = scene.knowledge.networks.as_ref();
+    let has_density = networks.is_some_and(|networks| networks.sidecar.density.is_some());
     let outcome = episode.outcome().map_or(Outcome::Stopped, Outcome::from);
     let pose = episode.motion().pose;
     let [x_m, y_m, yaw_rad] = scene.task.start;
@@ -196,6 +198,7 @@ fn summarise(
         goal: Goal { x_m: goal_m[0], y_m: goal_m[1] },
         method: scene.knowledge.method,
         alpha: arguments.alpha,
+        unfamiliar_share: has_density.then(|| kept.known.unfamiliar_share()),
         isa: format!("{:?}", closed.navigator.controller().diagnostics().isa).to_lowercase(),
         threads: arguments.n_threads(),
         config_hash,
@@ -260,6 +263,7 @@ fn draw(
                 worst: 0.0,
             }),
             known: seen.as_ref(),
+            unfamiliar: Some(&known.unfamiliar),
             driven: &driven,
             planned: &[],
             start_m: [x_m, y_m],

@@ -40,6 +40,9 @@ pub struct DrivePicture<'a> {
     pub risk: Option<RiskLayer<'a>>,
     /// Which cells the mapping ever knew; the rest fades. `None` = everything is known.
     pub known: Option<&'a GridMap<bool>>,
+    /// Which cells were unlike what the controller's networks were trained on; they are hatched. `None` = nobody can
+    /// tell.
+    pub unfamiliar: Option<&'a GridMap<bool>>,
     /// The path driven, in the order of time; may be empty.
     pub driven: &'a [PathSample],
     /// A reference path or the like, east and north [m]; may be empty.

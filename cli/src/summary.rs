@@ -76,6 +76,9 @@ pub struct Summary {
     pub method: Method,
     /// Risk tolerance (CVaR level).
     pub alpha: f64,
+    /// Share of the ground that was ever known that is unlike what the networks were trained on; null for a method
+    /// that cannot tell.
+    pub unfamiliar_share: Option<f64>,
     /// Instruction set that the controller used.
     pub isa: String,
     /// Threads of the controller.
@@ -153,6 +156,9 @@ impl fmt::Display for Summary {
         row("goal", format!("{:.2},{:.2}", self.goal.x_m, self.goal.y_m))?;
         row("vehicle", self.vehicle.clone())?;
         row("method", format!("{}, alpha {}", self.method.name(), self.alpha))?;
+        if let Some(share) = self.unfamiliar_share {
+            row("unfamiliar", format!("{:.0} % of the known ground is unlike the training data", 1e2 * share))?;
+        }
         row("ran on", format!("{}, threads {}", self.isa, self.threads))?;
         let config = self.config_hash.get(..12).unwrap_or(&self.config_hash);
         row("made by", format!("revision {}, config {config}", self.revision))
@@ -192,6 +198,7 @@ mod tests {
             goal: Goal { x_m: 45.0, y_m: 25.0 },
             method: Method::Physics,
             alpha: 0.6,
+            unfamiliar_share: Some(0.125),
             isa: "avx512".to_owned(),
             threads: 2,
             config_hash: formats::config_hash(&0.6).unwrap(),
@@ -234,7 +241,7 @@ mod tests {
     #[test]
     fn a_person_can_read_it() {
         let told = example(Outcome::Goal).to_string();
-        for part in ["goal reached", "43.9 m driven", "roll 12.5 deg", "no feasible rollout 3x", "never ran"]
+        for part in ["goal reached", "43.9 m driven", "roll 12.5 deg", "no feasible rollout 3x", "never ran", "12 % of"]
         {
             assert!(told.contains(part), "{part} in {told}");
         }

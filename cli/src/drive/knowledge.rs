@@ -87,7 +87,8 @@ impl Knowledge {
 
 /// A whole file, refused when it is too large for networks.
 fn read(path: &Path) -> Result<Vec<u8>, String> {
-    let told = |error: std::io::Error| format!("{}: {error}", path.display());
+    let told =
+        |error: std::io::Error| format!("{}: expected a readable file, found: {error}", path.display());
     let n_bytes = std::fs::metadata(path).map_err(told)?.len();
     if n_bytes > FILE_BYTES_MAX {
         return Err(format!("{}: expected at most {FILE_BYTES_MAX} bytes, found {n_bytes}", path.display()));

@@ -92,6 +92,8 @@ pub(super) struct KnownRisk {
     /// Worst expected linear traction, zero in headings that break a limit, mean over all headings; NaN where the
     /// ground was never known.
     pub traction: GridMap<f32>,
+    /// Where it was unlike what the networks were trained on.
+    pub unfamiliar: GridMap<bool>,
     roll_max_rad: f32,
     pitch_max_rad: f32,
 }
@@ -102,8 +104,10 @@ impl KnownRisk {
         let first = bounds.south_west_m.map(|edge_m| (edge_m / resolution_m).floor() as i64);
         let last = bounds.north_east_m.map(|edge_m| (edge_m / resolution_m).ceil() as i64);
         let [n_cols, n_rows] = [0, 1].map(|axis| (last[axis] - first[axis]) as usize);
+        let geometry = GridGeometry { resolution_m, origin: first, n_rows, n_cols };
         Self {
-            traction: GridMap::filled(GridGeometry { resolution_m, origin: first, n_rows, n_cols }, f32::NAN),
+            traction: GridMap::filled(geometry, f32::NAN),
+            unfamiliar: GridMap::filled(geometry, false),
             roll_max_rad: limits.roll_max_rad as f32,
             pitch_max_rad: limits.pitch_max_rad as f32,
         }
@@ -120,11 +124,21 @@ impl KnownRisk {
             for col in 1..window.n_cols - 1 {
                 let Some(all_col) = place(col, offset[0], all.n_cols) else { continue };
                 let cell = terrain::Cell { row, col };
-                if !map.ground[window.index(cell)].flags.contains(GroundFlags::UNKNOWN) {
-                    self.traction[terrain::Cell { row: all_row, col: all_col }] = self.mean(map, cell);
+                let flags = map.ground[window.index(cell)].flags;
+                if !flags.contains(GroundFlags::UNKNOWN) {
+                    let place = terrain::Cell { row: all_row, col: all_col };
+                    self.traction[place] = self.mean(map, cell);
+                    self.unfamiliar[place] = flags.contains(GroundFlags::OUT_OF_DISTRIBUTION);
                 }
             }
         }
+    }
+
+    /// Share of the ground that was ever known that was unlike the training data.
+    pub fn unfamiliar_share(&self) -> f64 {
+        let n_known = self.traction.values().iter().filter(|value| !value.is_nan()).count();
+        let n_unfamiliar = self.unfamiliar.values().iter().filter(|is| **is).count();
+        n_unfamiliar as f64 / n_known.max(1) as f64
     }
 
     fn mean(&self, map: &RiskMapView<'_>, cell: terrain::Cell) -> f32 {

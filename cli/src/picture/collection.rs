@@ -88,6 +88,7 @@ fn draw_map(collection: &Collection, vehicle: &Vehicle, canvas: &mut Canvas) {
         world,
         risk: None,
         known: None,
+        unfamiliar: None,
         driven: &[],
         planned: &[],
         start_m: [0.0; 2],

@@ -16,6 +16,8 @@ impl Rgb {
     pub(super) const OBSTACLE: Self = Self(0x3b, 0x3f, 0x4a);
     /// Ground that was never seen fades towards this.
     pub(super) const UNSEEN: Self = Self(0xdf, 0xe4, 0xea);
+    /// Ground unlike anything in the training data.
+    pub(super) const UNFAMILIAR: Self = Self(0x6a, 0x2c, 0x91);
     pub(super) const GOAL: Self = Self(0xff, 0xc4, 0x2e);
     pub(super) const FAILURE: Self = Self(0xd6, 0x1f, 0x3a);
     pub(super) const ROLL: Self = Self(0x1f, 0x6f, 0xd1);

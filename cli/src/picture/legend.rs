@@ -1,8 +1,9 @@
 //! The column beside the map: what colours and marks mean.
 
 use super::axes::{Range, number};
-use super::canvas::{Anchor, Canvas, Point, Rect, Stroke, TextStyle};
+use super::canvas::{Anchor, Canvas, Image, Point, Rect, Stroke, TextStyle};
 use super::colour::{Ramp, Rgb};
+use super::relief::hatch;
 use super::{DrivePicture, map};
 
 /// Height of the whole column [px].
@@ -86,6 +87,7 @@ struct Entry {
 
 enum Mark {
     Swatch(Rgb),
+    Hatch(Rgb),
     Driven,
     Planned,
     Footprint,
@@ -99,12 +101,14 @@ fn entries(picture: &DrivePicture<'_>) -> Vec<Entry> {
     let vegetation = patches.iter().any(|patch| patch.vegetation_height_m > 0.0);
     let obstacles = patches.iter().any(|patch| patch.class == terrain::TerrainClass::Obstacle);
     let driven = !picture.driven.is_empty();
+    let unfamiliar = picture.unfamiliar.is_some_and(|cells| cells.values().contains(&true));
     let soft = Ramp::GROUND.at(0.5).blend(Rgb::VEGETATION, 0.6);
     let unseen = Ramp::GROUND.at(0.5).blend(Rgb::UNSEEN, 0.62);
     [
         (vegetation, Mark::Swatch(soft), "plants, denser = higher"),
         (obstacles, Mark::Swatch(Rgb::OBSTACLE), "obstacle"),
         (picture.known.is_some(), Mark::Swatch(unseen), "never seen"),
+        (unfamiliar, Mark::Hatch(Ramp::GROUND.at(0.5)), "unlike the training"),
         (driven, Mark::Driven, "driven, by speed"),
         (!picture.planned.is_empty(), Mark::Planned, "planned"),
         (driven, Mark::Footprint, "vehicle"),
@@ -125,6 +129,13 @@ impl Entry {
         match self.mark {
             Mark::Swatch(colour) => {
                 canvas.rect(plate, colour, 1.0);
+                canvas.frame(plate, Stroke::solid(Rgb::INK_SOFT, 1.0));
+            }
+            Mark::Hatch(colour) => {
+                let width = plate.width as usize;
+                let pixel = |i: usize| hatch([i % width, i / width], colour);
+                let pixels = (0..width * plate.height as usize).map(pixel).collect();
+                canvas.image(plate.x, plate.y, &Image { width, pixels });
                 canvas.frame(plate, Stroke::solid(Rgb::INK_SOFT, 1.0));
             }
             Mark::Driven => draw_driven_sample(ends, canvas),

@@ -32,7 +32,9 @@ pub(super) fn relief(picture: &DrivePicture<'_>, axes: &Axes) -> Image {
             let ground = Ramp::GROUND.at((heights[i] - low) / (high - low).max(0.2)).lit(light[i]);
             let covered = cover(picture, x_m, y_m, light[i], ground);
             let risky = picture.risk.as_ref().map_or(covered, |risk| tint(risk, x_m, y_m, covered));
-            fade(picture.known, x_m, y_m, risky)
+            let is_unfamiliar = picture.unfamiliar.and_then(|cells| cells.at(x_m, y_m)).is_some_and(|is| *is);
+            let hatched = if is_unfamiliar { hatch([i % width, i / width], risky) } else { risky };
+            fade(picture.known, x_m, y_m, hatched)
         })
         .collect();
     Image { width, pixels }
@@ -150,6 +152,14 @@ fn tint(risk: &RiskLayer<'_>, x_m: f64, y_m: f64, ground: Rgb) -> Rgb {
     }
 }
 
+/// Distance of the lines that hatch unfamiliar ground, and their width [px].
+const HATCH: [usize; 2] = [9, 2];
+
+/// Lines from the lower left to the upper right.
+pub(super) fn hatch([right, down]: [usize; 2], colour: Rgb) -> Rgb {
+    if (right + down) % HATCH[0] < HATCH[1] { colour.blend(Rgb::UNFAMILIAR, 0.75) } else { colour }
+}
+
 fn fade(known: Option<&GridMap<bool>>, x_m: f64, y_m: f64, colour: Rgb) -> Rgb {
     match known {
         Some(known) if known.at(x_m, y_m) != Some(&true) => colour.blend(Rgb::UNSEEN, 0.62),
@@ -195,6 +205,7 @@ mod tests {
             world: &world,
             risk: Some(RiskLayer { values: &risk, label: "", harmless: 1.0, worst: 0.0 }),
             known: Some(&known),
+            unfamiliar: None,
             driven: &[],
             planned: &[],
             start_m: [1.0, 1.0],
