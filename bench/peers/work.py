@@ -36,11 +36,12 @@ def risk_map():
     return (values * [0.5, 0.5, 0.6, 0.6] + [0.5, 0.5, 0.0, 0.0]).astype(np.float32)
 
 
-def arguments():
+def arguments(description=__doc__, more=lambda parser: None):
     """Number of threads and updates; the process is held to as many processors as it may use threads."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--threads", type=int, default=1)
     parser.add_argument("--updates", type=int, default=200)
+    more(parser)
     chosen = parser.parse_args()
     allowed = sorted(os.sched_getaffinity(0))
     if not 1 <= chosen.threads <= len(allowed):

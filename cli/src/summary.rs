@@ -157,7 +157,10 @@ impl fmt::Display for Summary {
         row("vehicle", self.vehicle.clone())?;
         row("method", format!("{}, alpha {}", self.method.name(), self.alpha))?;
         if let Some(share) = self.unfamiliar_share {
-            row("unfamiliar", format!("{:.0} % of the known ground is unlike the training data", 1e2 * share))?;
+            row(
+                "unfamiliar",
+                format!("{:.0} % of the known ground is unlike the training data", 1e2 * share),
+            )?;
         }
         row("ran on", format!("{}, threads {}", self.isa, self.threads))?;
         let config = self.config_hash.get(..12).unwrap_or(&self.config_hash);
@@ -241,8 +244,14 @@ mod tests {
     #[test]
     fn a_person_can_read_it() {
         let told = example(Outcome::Goal).to_string();
-        for part in ["goal reached", "43.9 m driven", "roll 12.5 deg", "no feasible rollout 3x", "never ran", "12 % of"]
-        {
+        for part in [
+            "goal reached",
+            "43.9 m driven",
+            "roll 12.5 deg",
+            "no feasible rollout 3x",
+            "never ran",
+            "12 % of",
+        ] {
             assert!(told.contains(part), "{part} in {told}");
         }
         assert!(!told.contains("stale scan"), "reasons that never came are left out: {told}");

@@ -86,7 +86,10 @@ fn navigation_refuses_what_cannot_be_driven() {
     for (words, part) in [
         (["--seeds", "0"], "--seeds: expected a number of seeds from 1 to 1000, found \"0\""),
         (["--alpha", "0.4,2"], "--alpha: expected a number above 0 and at most 1, found \"2\""),
-        (["--methods", "physics,luck"], "--methods: expected pietra, pietra-avoid, evora, physics-informed, vanilla, physics, nominal, truth, found \"luck\""),
+        (
+            ["--methods", "physics,luck"],
+            "--methods: expected pietra, pietra-avoid, evora, physics-informed, vanilla, physics, nominal, truth, found \"luck\"",
+        ),
         (["--out", "/dev/null"], "--out: "),
     ] {
         let output = surefoot(&[["bench", "navigation"].as_slice(), &words].concat());

@@ -35,9 +35,7 @@ fn summary(folder: &Path) -> Summary {
 fn networks_from_a_folder_are_driven_on_by_their_method_or_one_that_shares_them() {
     let folder = tempfile::tempdir().unwrap();
     write_networks(folder.path(), |_| {});
-    for (words, method) in
-        [(&[][..], Method::Pietra), (&["--method", "pietra-avoid"], Method::PietraAvoid)]
-    {
+    for (words, method) in [(&[][..], Method::Pietra), (&["--method", "pietra-avoid"], Method::PietraAvoid)] {
         let output = drive(folder.path(), words);
         assert_eq!(output.status.code(), Some(1), "a second is too short: {output:?}");
         let summary = summary(folder.path());

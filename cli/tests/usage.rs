@@ -128,7 +128,14 @@ fn other_bad_values_are_refused_with_what_would_do() {
         (&["drive", "--time-limit", "inf"], &["--time-limit", "finite", "inf"]),
         (&["drive", "--world", "arena", "--bush-height", "-1"], &["--bush-height", "0 to 2 metres", "-1"]),
         (&["drive", "--bush-height", "0.1"], &["--bush-height", "--world arena"]),
-        (&["drive", "--method", "magic"], &["--method", "pietra, pietra-avoid, evora, physics-informed, vanilla, physics, nominal, truth", "magic"]),
+        (
+            &["drive", "--method", "magic"],
+            &[
+                "--method",
+                "pietra, pietra-avoid, evora, physics-informed, vanilla, physics, nominal, truth",
+                "magic",
+            ],
+        ),
         (&["drive", "--isa", "sse9"], &["--isa", "auto, avx512, avx2, portable", "sse9"]),
         (&["drive", "--pace", "slow"], &["--pace", "fast, real", "slow"]),
         (&["bench", "control", "--updates", "0"], &["--updates", "from 1", "0"]),

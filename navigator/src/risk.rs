@@ -74,9 +74,8 @@ impl RiskLayer {
         let resolution_m = config.risk_resolution_m();
         let grid = GridGeometry::centred(resolution_m, window.n_rows, window.n_cols, 0.0, 0.0);
         let surface_m = config.elevation.resolution_m;
-        let by_prior = |assumption: Assumption| {
-            Author::prior(geometry, &assumption, surface_m, grid, window.n_yaws)
-        };
+        let by_prior =
+            |assumption: Assumption| Author::prior(geometry, &assumption, surface_m, grid, window.n_yaws);
         let author = match belief {
             Belief::Physics => by_prior(Assumption::Physics { prior: *prior, level })?,
             Belief::Learned { checkpoint, unfamiliar } => {

@@ -42,7 +42,7 @@ pub use belief::PriorBelief;
 pub use config::{PriorConfig, PriorConfigError};
 pub use lattice::Ratio;
 pub use prior_field::{PosePrior, PriorField};
+pub use prior_map::{Assumption, PriorMap, PriorMapError};
 pub use skid_steer::{
     ANGULAR, COMPENSATION, HIDDEN, LINEAR, Quantiles, SkidSteerBelief, SkidSteerGround, SkidSteerPrior,
 };
-pub use prior_map::{Assumption, PriorMap, PriorMapError};

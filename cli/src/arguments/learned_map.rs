@@ -53,7 +53,9 @@ impl FromStr for NetworkSizes {
 
     fn from_str(word: &str) -> Result<Self, String> {
         let expected = || {
-            format!("expected widths from 1 to {WIDTH_MAX} as hidden-hidden:latent, such as 96-64:16, found {word:?}")
+            format!(
+                "expected widths from 1 to {WIDTH_MAX} as hidden-hidden:latent, such as 96-64:16, found {word:?}"
+            )
         };
         let width = |word: &str| word.parse().ok().filter(|width| (1..=WIDTH_MAX).contains(width));
         let (hidden, latent) = word.split_once(':').ok_or_else(expected)?;

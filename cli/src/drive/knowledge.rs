@@ -48,11 +48,9 @@ impl Knowledge {
 
     fn best_for(vehicle: &Vehicle) -> Self {
         match shipped(evidential::Method::Pietra, &vehicle.geometry) {
-            Ok(networks) => Self {
-                method: Method::Pietra,
-                networks: Some(Arc::new(networks)),
-                why_not_learned: None,
-            },
+            Ok(networks) => {
+                Self { method: Method::Pietra, networks: Some(Arc::new(networks)), why_not_learned: None }
+            }
             Err(error) => Self {
                 method: Method::Physics,
                 networks: None,
@@ -68,8 +66,10 @@ impl Knowledge {
             .map_err(|error| told(UsageError::from_input(error).0))?;
         let trained = checkpoint.sidecar.method;
         checkpoint.check_vehicle(&vehicle.geometry).map_err(|error| told(error.to_string()))?;
-        let drives_on_these = |method: &Method| method.learned().is_some_and(|(training, _)| training == trained);
-        let all = [Method::Pietra, Method::PietraAvoid, Method::Evora, Method::PhysicsInformed, Method::Vanilla];
+        let drives_on_these =
+            |method: &Method| method.learned().is_some_and(|(training, _)| training == trained);
+        let all =
+            [Method::Pietra, Method::PietraAvoid, Method::Evora, Method::PhysicsInformed, Method::Vanilla];
         let method = match asked {
             Some(method) => Some(method).filter(drives_on_these),
             None => all.into_iter().find(drives_on_these),
