@@ -34,7 +34,7 @@ pub(crate) fn run(arguments: &CollectArguments) -> anyhow::Result<()> {
     let vehicle = read_vehicle(arguments.vehicle_name_or_path()).map_err(UsageError::from_input)?;
     let began = Instant::now();
     let (collection, scale) = match (&arguments.log, &arguments.elevation) {
-        (Some(log), Some(elevation)) => (recorded::gather(&vehicle, log, elevation)?, None),
+        (Some(log), Some(elevation)) => (recorded::gather(arguments, &vehicle, log, elevation)?, None),
         _ => drive(arguments, &vehicle)?,
     };
     let summary = CollectSummary::of(&collection, scale, began.elapsed().as_secs_f64());

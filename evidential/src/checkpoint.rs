@@ -27,9 +27,16 @@ pub struct DensityRange {
     pub min: f64,
     /// Largest.
     pub max: f64,
+    /// Logarithm of the certainty budget N of equation 10. Training uses that of a normal distribution
+    /// ([`Architecture::log_budget`]); afterwards it is set so that evidence equals the prior's at the least likely
+    /// [`DensityRange::EDGE_SHARE`] of the validation footprints: one scale for every method, seed and dataset.
+    pub log_budget: f64,
 }
 
 impl DensityRange {
+    /// Share of the validation footprints, all in distribution, that shall weigh less than the prior.
+    pub const EDGE_SHARE: f64 = 0.02;
+
     /// EVORA's normalised density: 0 at the least likely training footprint, 1 at the likeliest.
     pub fn normalised(&self, log_density: f64) -> f64 {
         (log_density - self.min) / (self.max - self.min)

@@ -72,6 +72,20 @@ impl FeatureLayout {
         is_grounded.then_some(features)
     }
 
+    /// Features of the same footprint seen in a mirror that swaps left and right. A vehicle that is the same on both
+    /// sides has the same tractions, |roll| and |pitch| there.
+    pub fn mirrored(&self, features: &[f32]) -> Vec<f32> {
+        let (heights, cover) = features.split_at(self.height_patch.n_samples());
+        let mut mirrored = Vec::with_capacity(features.len());
+        for row in heights.chunks_exact(self.height_patch.n_cols) {
+            mirrored.extend(row.iter().rev());
+        }
+        for row in cover.chunks_exact(N_COVER * self.cover_patch.n_cols) {
+            mirrored.extend(row.chunks_exact(N_COVER).rev().flatten());
+        }
+        mirrored
+    }
+
     fn sampled(
         &self,
         surface: &GridMap<SurfaceCell>,

@@ -113,6 +113,7 @@ pub fn train(
     check(training, validation)?;
     let mut run = Run::new(training, validation, settings)?;
     run.fit(progress)?;
+    run.calibrate()?;
     let checkpoint = run.checkpoint(&training.origin, revision)?;
     run.outcome(checkpoint)
 }
@@ -180,7 +181,7 @@ impl<'a> Run<'a> {
         };
         Ok(Self {
             settings,
-            training: Samples::new(training, &standardisation),
+            training: Samples::with_mirrored(training, &standardisation),
             validation: Samples::new(validation, &standardisation),
             standardisation,
             network: Network::new(&architecture, settings.seed)?,
@@ -196,6 +197,15 @@ impl<'a> Run<'a> {
         if self.settings.method.is_evidential() && self.end == TrainingEnd::Finished {
             self.fit_flow(progress)?;
         }
+        Ok(())
+    }
+
+    /// Sets the certainty budget by the validation data, see [`DensityRange::log_budget`].
+    fn calibrate(&mut self) -> Result<(), TrainError> {
+        let Some(mut densities) = self.densities(&self.validation)? else { return Ok(()) };
+        densities.sort_by(f32::total_cmp);
+        let edge = (DensityRange::EDGE_SHARE * densities.len() as f64) as usize;
+        self.terms.log_budget = self.terms.prior_evidence.ln() - f64::from(densities[edge]);
         Ok(())
     }
 
@@ -313,13 +323,19 @@ impl<'a> Run<'a> {
 
     /// Log densities of the training data; `None` without a flow.
     fn density_range(&self) -> Result<Option<DensityRange>, TrainError> {
-        let latents = self.latents(&self.training)?;
-        let latents = Tensor::from_vec(latents, (self.training.n, self.settings.n_latent), &Device::Cpu)?;
-        let Some(densities) = self.network.log_densities(&latents)? else { return Ok(None) };
-        let densities = densities.to_vec1::<f32>()?;
+        let Some(densities) = self.densities(&self.training)? else { return Ok(None) };
         let min = densities.iter().copied().fold(f32::INFINITY, f32::min);
         let max = densities.iter().copied().fold(f32::NEG_INFINITY, f32::max);
-        Ok(Some(DensityRange { min: f64::from(min), max: f64::from(max) }))
+        let log_budget = self.terms.log_budget;
+        Ok(Some(DensityRange { min: f64::from(min), max: f64::from(max), log_budget }))
+    }
+
+    /// Log densities of all samples; `None` without a flow.
+    fn densities(&self, samples: &Samples) -> Result<Option<Vec<f32>>, TrainError> {
+        let shape = (samples.n, self.settings.n_latent);
+        let latents = Tensor::from_vec(self.latents(samples)?, shape, &Device::Cpu)?;
+        let densities = self.network.log_densities(&latents)?;
+        Ok(densities.map(|densities| densities.to_vec1::<f32>()).transpose()?)
     }
 }
 

@@ -135,6 +135,13 @@ fn responses_are_those_of_the_machine() {
 }
 
 #[test]
+fn a_start_that_is_cut_short_is_no_slow_machine() {
+    let log = LAGGING.drive(2.5, sine);
+    let found = estimate_responses(&log, &GEOMETRY, &config()).unwrap();
+    assert!((found.speed.delay_s + found.speed.time_constant_s - 0.5).abs() < 0.2, "{found:?}");
+}
+
+#[test]
 fn ratios_without_alignment_are_wrong_where_those_with_it_are_right() {
     let log = LAGGING.drive(18.0, sine);
     let lax = LabelConfig { unsettled_turn_share_max: 1e9, start_s: 4.0, ..config() };

@@ -128,6 +128,18 @@ pub enum RockFieldError {
 }
 
 impl RockFieldConfig {
+    /// The testbed on which traversability is learned: rocks everywhere, after the one that PIETRA simulates, so that
+    /// even the smoother half of the footprints lean and slip. The default field is for driving: it has ways through.
+    pub fn testbed() -> Self {
+        let default = Self::default();
+        Self {
+            medium: RockPopulation { density_per_m2: 0.6, height_m: [0.07, 0.35], ..default.medium },
+            boulders: RockPopulation { density_per_m2: 0.0, ..default.boulders },
+            rolling_std_m: 0.15,
+            ..default
+        }
+    }
+
     /// Refuses settings that no field can have.
     pub fn validate(&self) -> Result<(), RockFieldError> {
         let positive = "a finite number > 0";

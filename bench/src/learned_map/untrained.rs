@@ -66,6 +66,7 @@ pub fn untrained(
         (name, Tensor { shape, values })
     };
     let tensors = architecture.tensor_shapes().into_iter().map(&mut random).collect();
+    let density = DensityRange { min: -20.0, max: 0.0, log_budget: architecture.log_budget() };
     let sidecar = Sidecar {
         format: Sidecar::FORMAT,
         method: Method::Pietra,
@@ -76,7 +77,7 @@ pub fn untrained(
         traction_bins: Bins::TRACTION.values().to_vec(),
         attitude_bins_rad: Bins::ATTITUDE.values().to_vec(),
         prior: PriorConfig::for_vehicle(geometry),
-        density: Some(DensityRange { min: -20.0, max: 0.0 }),
+        density: Some(density),
         training: Default::default(),
         git_revision: "untrained".to_owned(),
         weights_sha256: String::new(),

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 use scenarios::Split;
 
-use super::values;
+use super::values::{self, Goal};
 
 /// What to gather, and where to put it.
 #[derive(Args, Clone, Debug)]
@@ -58,6 +58,16 @@ pub struct CollectArguments {
     /// The ground of the recorded drive: .npz, GeoTIFF or 16-bit PNG, in the frame of its poses
     #[arg(long, value_name = "FILE", requires = "log", help_heading = "Recorded drives")]
     pub elevation: Option<PathBuf>,
+
+    /// Where the elevation's south-west corner lies in the log's frame: x [m], y [m] [default: 0,0]
+    #[arg(
+        long,
+        value_name = "X,Y",
+        requires = "elevation",
+        allow_hyphen_values = true,
+        help_heading = "Recorded drives"
+    )]
+    pub elevation_origin: Option<Goal>,
 
     /// The machine: a name or a TOML file [default: pietra_full_size; rc_car in the arena]
     #[arg(long, value_name = "NAME|FILE", help_heading = "Run")]
@@ -155,7 +165,7 @@ or while a command is still on its way.";
 const AFTER_HELP: &str = "\
 Examples:
   surefoot collect --out data/train.safetensors
-      20 trials on each of ten rock fields: about 200 000 footprints' worth of driving.
+      20 trials on each of ten rock fields: about 11 000 labelled footprints in half a minute.
   surefoot collect --split validation --out data/validation.safetensors
       The same on ten other fields.
   surefoot collect --split test --harder-than data/train.safetensors --out data/test.safetensors
@@ -169,7 +179,8 @@ Recorded drives:
   needed columns   t, x, y, yaw, vx, wz, cmd_speed, and cmd_steer or cmd_wz (or
                    cmd_left and cmd_right instead of all commands)
   used if there    roll, pitch; run (t restarts per run)
-  the elevation must cover the drive: x, y in its frame (south-west corner = 0, 0)
+  the elevation must lie under at least half of the labels; where its south-west
+  corner is not at x = 0, y = 0 of the log, --elevation-origin says where it is
 
 The dataset (safetensors), for N examples of F features:
   features [N,F] f32   measured [N,4] f32, NaN = means nothing   prior [N,4,12] f32

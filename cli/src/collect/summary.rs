@@ -39,7 +39,8 @@ pub(super) struct ParameterSummary {
     pub name: &'static str,
     /// Share of the examples in which it means something.
     pub valid_share: f64,
-    pub mean: f64,
+    /// Mean of the valid ones; `None` when there is none.
+    pub mean: Option<f64>,
     /// Share of the valid ones in each bin.
     pub bin_shares: [f64; traversability::N_BINS],
 }
@@ -89,7 +90,8 @@ impl ParameterSummary {
         Self {
             name: PARAMETER_NAMES[parameter],
             valid_share: valid.len() as f64 / dataset.examples.len().max(1) as f64,
-            mean: valid.iter().map(|value| f64::from(*value)).sum::<f64>() * per_valid,
+            mean: (!valid.is_empty())
+                .then(|| valid.iter().map(|value| f64::from(*value)).sum::<f64>() * per_valid),
             bin_shares,
         }
     }
@@ -105,13 +107,9 @@ impl fmt::Display for CollectSummary {
             writeln!(out, "  {} labels left out, their ground is not known", self.n_unknown_ground)?;
         }
         for parameter in &self.parameters {
-            writeln!(
-                out,
-                "  {:<17}{:5.1} % valid, mean {:.3}",
-                parameter.name,
-                100.0 * parameter.valid_share,
-                parameter.mean
-            )?;
+            let mean = parameter.mean.map_or(String::new(), |mean| format!(", mean {mean:.3}"));
+            let percent = 100.0 * parameter.valid_share;
+            writeln!(out, "  {:<17}{percent:5.1} % valid{mean}", parameter.name)?;
         }
         let percentiles = self.unevenness_percentiles_m.iter();
         let percentiles: Vec<String> =

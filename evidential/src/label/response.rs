@@ -38,6 +38,9 @@ const STRETCH_S: f64 = 5.0;
 /// The best response must be likelier than the worst by this much, or the log does not tell: a command that never
 /// changes arrives as itself, whatever the response [nats].
 const TELLING_NATS: f64 = 20.0;
+/// Largest gain: the ground takes of a motion and does not add to it, but for a hundredth of error or so in whoever
+/// measures. A larger one would let any slow response explain a start that is cut short.
+const GAIN_MAX: f64 = 1.05;
 /// Added to the mean square of what a response leaves unexplained, so that no log is explained perfectly: 1 mm/s or
 /// 1 mrad/s.
 const FLOOR: f64 = 1e-6;
@@ -135,7 +138,7 @@ fn misfit_nats(time_s: &[f64], measured: &[f64], expected: &[f64]) -> f64 {
 }
 
 /// Negative logarithm of the likelihood of a motion, but for constants: it scatters normally around the expected one
-/// times a gain >= 0, gain and scatter being those that fit best. Pairs of measured and expected motion.
+/// times a gain from 0 to [`GAIN_MAX`], gain and scatter being those that fit best. Pairs of measured and expected motion.
 fn stretch_nats(pairs: impl Iterator<Item = (f64, f64)>) -> f64 {
     let (mut n, mut yy, mut yf, mut ff) = (0.0, 0.0, 0.0, 0.0);
     for (y, f) in pairs.filter(|(y, f)| y.is_finite() && f.is_finite()) {
@@ -147,9 +150,10 @@ fn stretch_nats(pairs: impl Iterator<Item = (f64, f64)>) -> f64 {
     if n == 0.0 {
         return 0.0;
     }
-    let explained = if ff > 0.0 { yf.max(0.0).powi(2) / ff } else { 0.0 };
+    let gain = if ff > 0.0 { (yf / ff).clamp(0.0, GAIN_MAX) } else { 0.0 };
     // Rounding may leave a perfect fit below zero.
-    0.5 * n * ((yy - explained).max(0.0) / n + FLOOR).ln()
+    let left = (yy - 2.0 * gain * yf + gain * gain * ff).max(0.0);
+    0.5 * n * (left / n + FLOOR).ln()
 }
 
 /// The response that fits best; none when the motion does not tell them apart.
@@ -244,6 +248,8 @@ mod tests {
         assert!((of(0.4) - 25.0 * FLOOR.ln()).abs() < 1e-6);
         let left: f64 = f.iter().map(|v| v * v).sum::<f64>() / 50.0;
         assert!((of(-1.0) - 25.0 * (left + FLOOR).ln()).abs() < 1e-9);
+        // Twice as much motion as commanded is 0.95 of it too much.
+        assert!((of(2.0) - 25.0 * (0.95 * 0.95 * left + FLOOR).ln()).abs() < 1e-9);
         assert_eq!(stretch_nats([(f64::NAN, 1.0)].into_iter()), 0.0);
     }
 

@@ -87,12 +87,12 @@ impl Network {
             let (weights, biases) = tensors.layer(&format!("heads.{head}.1"), N_BINS, head_hidden)?;
             heads.push(Dense::new(&weights, &biases, Activation::Linear));
         }
-        let evidence = match sidecar.method.is_evidential() {
-            true => {
+        let evidence = match &sidecar.density {
+            Some(density) => {
                 stack(tensors.layer("evidence.0", architecture.evidence_hidden, n_latent)?);
-                Some(EvidenceHead::new(&tensors, architecture)?)
+                Some(EvidenceHead::new(&tensors, architecture, density.log_budget)?)
             }
-            false => None,
+            None => None,
         };
         Ok(Self { encoder, hidden: Dense::new(&weights, &biases, leaky), heads, head_hidden, evidence })
     }
@@ -151,7 +151,7 @@ impl Network {
 }
 
 impl EvidenceHead {
-    fn new(tensors: &Tensors, architecture: &Architecture) -> Result<Self, CheckpointError> {
+    fn new(tensors: &Tensors, architecture: &Architecture, log_budget: f64) -> Result<Self, CheckpointError> {
         let (n_latent, n_layers) = (architecture.n_latent, architecture.n_flow_layers);
         let (weights, biases) = tensors.layer("evidence.1", N_HEADS, architecture.evidence_hidden)?;
         let centres = tensors.values("flow.centre", &[n_layers, n_latent])?;
@@ -160,7 +160,7 @@ impl EvidenceHead {
         Ok(Self {
             scales: Dense::new(&weights, &biases, Activation::Linear),
             flow: RadialFlow::new(centres, raw_a, raw_b, n_latent),
-            log_budget: architecture.log_budget() as f32,
+            log_budget: log_budget as f32,
         })
     }
 

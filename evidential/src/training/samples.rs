@@ -30,6 +30,18 @@ impl Samples {
         Self { n, inputs, targets }
     }
 
+    /// Every example twice, as it is and seen in a mirror: what lies left and what lies right teach alike.
+    pub(super) fn with_mirrored(dataset: &Dataset, standardisation: &Standardisation) -> Self {
+        let mut samples = Self::new(dataset, standardisation);
+        for example in &dataset.examples {
+            let mirrored = dataset.origin.layout.mirrored(&example.features);
+            standardisation.apply(&mirrored, &mut samples.inputs);
+        }
+        samples.targets.extend_from_within(..);
+        samples.n *= 2;
+        samples
+    }
+
     /// Inputs and targets of the examples named.
     pub(super) fn batch(&self, indices: &[u32]) -> Result<(Tensor, Tensor)> {
         Ok((gather(&self.inputs, self.n, indices)?, gather(&self.targets, self.n, indices)?))

@@ -19,14 +19,17 @@ const GEOMETRY: Geometry = Geometry {
     wheel_radius_m: 0.4,
 };
 
-/// Ground of one number, the first feature: traction falls and angles rise with it. The physics prior says nothing.
+/// A feature in the middle column, which a mirror leaves in its place.
+const MIDDLE: usize = 3;
+
+/// Ground of one number, [`MIDDLE`]: traction falls and angles rise with it. The physics prior says nothing.
 fn dataset(n: usize, seed: u64) -> Dataset {
     let layout = FeatureLayout::for_vehicle(&GEOMETRY);
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
     let examples = (0..n).map(|_| {
         let mut features: Vec<f32> = (0..layout.n_features()).map(|_| rng.random_range(-1.0..1.0)).collect();
         let rough: f32 = rng.random_range(0.0..1.0);
-        features[0] = 4.0 * rough - 2.0;
+        features[MIDDLE] = 4.0 * rough - 2.0;
         let mut noisy = |value: f32| value + rng.random_range(-0.03..0.03);
         let measured = [noisy(1.0 - rough), f32::NAN, noisy(0.8 * rough), noisy(0.5 * rough)];
         Example {

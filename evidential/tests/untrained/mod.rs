@@ -57,6 +57,7 @@ pub fn checkpoint(method: Method, seed: u64) -> Checkpoint {
         mean: (0..n).map(|_| rng.random_range(-0.3..0.3)).collect(),
         deviation: (0..n).map(|_| rng.random_range(0.2..1.5)).collect(),
     };
+    let range = DensityRange { min: -6.0, max: 0.0, log_budget: architecture.log_budget() };
     let sidecar = Sidecar {
         format: Sidecar::FORMAT,
         method,
@@ -67,7 +68,7 @@ pub fn checkpoint(method: Method, seed: u64) -> Checkpoint {
         traction_bins: Bins::TRACTION.values().to_vec(),
         attitude_bins_rad: Bins::ATTITUDE.values().to_vec(),
         prior: PriorConfig::for_vehicle(&CAR),
-        density: method.is_evidential().then_some(DensityRange { min: -6.0, max: 0.0 }),
+        density: method.is_evidential().then_some(range),
         training: serde_json::Value::Null,
         git_revision: "none".to_owned(),
         weights_sha256: String::new(),
