@@ -3,6 +3,7 @@
 mod extraction;
 mod patch_ground;
 mod patch_stencil;
+mod pose_belief;
 mod posterior;
 mod row_task;
 
@@ -15,9 +16,10 @@ use terrain::{CellRegion, GridGeometry, GridMap, SurfaceCell};
 use traversability::{CvarLevel, PartialMoments, Risk, RiskMap};
 
 use crate::predictor::{Predictor, PredictorError};
-use crate::{Checkpoint, Prior, VehicleMismatch};
+use crate::{Checkpoint, FeatureLayout, Prior, VehicleMismatch};
 use patch_ground::PatchGround;
 use patch_stencil::PatchStencil;
+pub use pose_belief::PoseBelief;
 use row_task::{RowTask, Scratch};
 
 /// What becomes of ground that is unlike the training data: its density lies below that of every training footprint.
@@ -92,6 +94,7 @@ struct BeliefLayers {
     n_yaws: usize,
     /// Smallest and largest offset that a stencil reads, each columns, rows.
     reach: [[i64; 2]; 2],
+    layout: FeatureLayout,
     predictor: Predictor,
     fusion: Fusion,
 }
@@ -286,7 +289,7 @@ impl BeliefLayers {
         fusion: Fusion,
         (learned, resolution_m, n_yaws): (&Learned, f64, usize),
     ) -> Self {
-        let layout = &learned.checkpoint.sidecar.layout;
+        let layout = learned.checkpoint.sidecar.layout;
         let ratio = field.ratio();
         let mut stencils = Vec::new();
         for row in 0..ratio.n_phases() as i64 {
@@ -294,7 +297,7 @@ impl BeliefLayers {
                 for yaw in 0..n_yaws {
                     let yaw_rad = (yaw as f64 + 0.5) * std::f64::consts::TAU / n_yaws as f64;
                     let phase = [ratio.phase(col), ratio.phase(row)];
-                    stencils.push(PatchStencil::new(layout, resolution_m, phase, yaw_rad));
+                    stencils.push(PatchStencil::new(&layout, resolution_m, phase, yaw_rad));
                 }
             }
         }
@@ -307,7 +310,7 @@ impl BeliefLayers {
         }
         let window = GridGeometry { resolution_m, ..*field.window() };
         let ground = PatchGround::unknown(window, ratio, layout.height_scale_m);
-        let mut layers = Self { field, ground, stencils, n_yaws, reach, predictor, fusion };
+        let mut layers = Self { field, ground, stencils, n_yaws, reach, layout, predictor, fusion };
         layers.place_ground();
         layers
     }

@@ -132,6 +132,31 @@ fn known_ground_is_judged_by_networks_and_unknown_ground_by_the_prior() {
 }
 
 #[test]
+fn the_belief_of_a_pose_is_what_its_risk_is_made_of() {
+    let surface = rough(SURFACE, 4);
+    for method in Method::ALL {
+        let checkpoint = checkpoint(method, 2);
+        let map = map_of(&checkpoint, Unfamiliar::Fuse, &surface, RISK);
+        let view = map.risk_map().view();
+        let (mut n_learned, mut n_unknown) = (0, 0);
+        for (cell, yaw, [x_m, y_m, yaw_rad]) in poses(&view).into_iter().step_by(7) {
+            let belief = map.belief(x_m, y_m, yaw_rad).unwrap();
+            let [linear, angular, roll, pitch] = &belief.posterior;
+            let expected = PmfQuad::new(linear, angular, roll, pitch).risk(level());
+            let found = view.risk(cell, yaw);
+            let expected = if found.is_blocked() { expected.blocked() } else { expected };
+            assert!(is_close(found, expected), "{method:?} {cell:?} {yaw}: {found:?} {expected:?}");
+            match belief.prediction {
+                Some(_) => n_learned += usize::from(belief.learned_share.iter().all(|share| *share > 0.0)),
+                None => n_unknown += usize::from(belief.learned_share == [0.0; 4]),
+            }
+        }
+        assert!(n_learned > 500 && n_unknown > 5, "{method:?}: {n_learned} {n_unknown}");
+        assert!(map.belief(-30.0, 2.0, 0.0).is_none());
+    }
+}
+
+#[test]
 fn obstacles_block_what_they_block_for_the_prior() {
     let surface = rough(SURFACE, 2);
     let checkpoint = checkpoint(Method::Pietra, 6);

@@ -16,12 +16,14 @@ pub struct PriorBelief {
     pub pitch: Pmf,
     /// Pseudo-count of observations that the prior stands for.
     pub evidence: f32,
+    /// Whether so little of the footprint is known that it is judged as unknown ground.
+    pub is_unknown: bool,
 }
 
 impl PriorBelief {
-    pub(crate) fn new(distribution: &PmfQuad, evidence: f32) -> Self {
+    pub(crate) fn new(distribution: &PmfQuad, evidence: f32, is_unknown: bool) -> Self {
         let [linear, angular, roll, pitch] = distribution.pmfs();
-        Self { linear, angular, roll, pitch, evidence }
+        Self { linear, angular, roll, pitch, evidence, is_unknown }
     }
 
     /// CVaR of every parameter from its bad end; obstacles play no part.

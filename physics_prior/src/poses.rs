@@ -1,8 +1,9 @@
 //! All poses of a risk map over the ground below.
 
 use terrain::{Cell, GridGeometry, GridMap, SurfaceCell, TerrainClass};
-use traversability::{Ground, GroundFlags, PmfQuad, Risk};
+use traversability::{Ground, GroundFlags, Risk};
 
+use crate::PriorBelief;
 use crate::ground::{Contact, ContactGround};
 use crate::lattice::Ratio;
 use crate::lengths::Lengths;
@@ -120,8 +121,8 @@ impl Poses {
         if counts.obstacles > 0 { free.blocked() } else { free }
     }
 
-    /// Distribution at any pose; `None` outside the ground's window and for the nominal judgement.
-    pub fn distribution(&self, x_m: f64, y_m: f64, yaw_rad: f64) -> Option<(PmfQuad, f32)> {
+    /// Belief of any pose; `None` outside the ground's window and for the nominal judgement.
+    pub fn belief(&self, x_m: f64, y_m: f64, yaw_rad: f64) -> Option<PriorBelief> {
         let Judgement::Physics(physics) = &self.judgement else { return None };
         let resolution_m = self.ground.window().resolution_m;
         let place = [x_m, y_m].map(|v| v / resolution_m);
@@ -130,8 +131,9 @@ impl Poses {
         let stencil = Stencil::new(&self.lengths, resolution_m, phase, yaw_rad);
         self.contains(base, stencil.reach()).then(|| {
             let placed = Placed { ground: &self.ground, stencil: &stencil, base };
-            let outcomes = physics.equations.outcomes(&placed.pose_ground(placed.counts(), &self.lengths));
-            (distribution(&physics.equations, &outcomes), physics.evidence)
+            let pose = placed.pose_ground(placed.counts(), &self.lengths);
+            let distribution = distribution(&physics.equations, &physics.equations.outcomes(&pose));
+            PriorBelief::new(&distribution, physics.evidence, physics.equations.is_unknown(&pose))
         })
     }
 

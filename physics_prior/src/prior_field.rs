@@ -154,8 +154,7 @@ impl PriorField {
 
     /// What the prior believes of any pose of the body frame, see [`crate::PriorMap::belief`].
     pub fn belief(&self, x_m: f64, y_m: f64, yaw_rad: f64) -> Option<PriorBelief> {
-        let (distribution, evidence) = self.poses.distribution(x_m, y_m, yaw_rad)?;
-        Some(PriorBelief::new(&distribution, evidence))
+        self.poses.belief(x_m, y_m, yaw_rad)
     }
 
     /// Bytes of the ground that it keeps.

@@ -4,11 +4,13 @@ mod surfaces;
 
 use std::f64::consts::PI;
 
-use physics_prior::{Assumption, PriorConfig, PriorConfigError, PriorMap, PriorMapError};
+use physics_prior::{
+    Assumption, PosePrior, PriorConfig, PriorConfigError, PriorField, PriorMap, PriorMapError,
+};
 use proptest::prelude::*;
 use surfaces::*;
 use terrain::{Cell, CellRegion, GridGeometry, GridMap, SurfaceCell, TerrainClass};
-use traversability::{Bins, GroundFlags, Risk};
+use traversability::{Bins, GroundFlags, PartialMoments, Risk};
 
 const NOMINAL: Assumption = Assumption::Nominal { obstacle_margin_m: 0.0 };
 
@@ -346,4 +348,30 @@ proptest! {
         full.update_all(&before).unwrap();
         prop_assert_eq!(partial.risk_map(), full.risk_map());
     }
+}
+
+/// What others mix with the prior is what the prior's own map is made of.
+#[test]
+fn a_pose_prior_has_the_risk_of_the_map() {
+    let geometry = window(0.1, 30, 34);
+    let ground = rough(geometry, 21);
+    let assumption = physics(0.3);
+    let map = prior_map(&CAR, &assumption, &ground, 5);
+    let mut field = PriorField::new(&CAR, &assumption, 0.1, geometry, 5).unwrap();
+    assert_eq!(field.read_all(&ground).unwrap(), CellRegion::whole(&geometry));
+    let nothing = PosePrior { moments: PartialMoments::uniform(), is_blocked: false, is_unknown: false };
+    let mut n_unknown = 0;
+    for (row, col) in (1..29).flat_map(|row| (1..33).map(move |col| (row, col))) {
+        let mut priors = [nothing; 5];
+        field.pose_priors([col as i64, row as i64], &mut priors);
+        for (yaw, prior) in priors.iter().enumerate() {
+            let found = map.risk_map().view().risk(Cell { row, col }, yaw);
+            let free = prior.moments.risk(level(0.3));
+            assert_eq!(prior.is_blocked, found.is_blocked());
+            let expected = if prior.is_blocked { free.blocked() } else { free };
+            assert!(close(found, expected, 1e-5), "{row} {col} {yaw} {found:?} {expected:?}");
+            n_unknown += usize::from(prior.is_unknown);
+        }
+    }
+    assert!(n_unknown < 28 * 32 * 5 / 2, "{n_unknown}");
 }

@@ -77,15 +77,13 @@ impl PatchStencil {
     pub fn reach(&self) -> [[i64; 2]; 2] {
         let taps =
             self.wheels.iter().chain(&self.heights).chain(self.cover.iter().map(|cover| &cover.height));
-        let mut reach = [[0; 2]; 2];
+        let [mut least, mut most] = [[0; 2]; 2];
         for tap in taps {
-            for axis in 0..2 {
-                reach[0][axis] = reach[0][axis].min(tap.offset[axis]);
-                reach[1][axis] = reach[1][axis].max(tap.offset[axis] + 1);
-            }
+            least = [0, 1].map(|axis| tap.offset[axis].min(least[axis]));
+            most = [0, 1].map(|axis| (tap.offset[axis] + 1).max(most[axis]));
         }
         // The cell that holds a point of the cover is one of the four around it.
-        reach
+        [least, most]
     }
 }
 

@@ -3,6 +3,7 @@
 //! The networks are so small that a block of footprints stays in the first-level cache from the features to the
 //! result; the weights, packed once in the order in which they are read, stream past it. That leaves no work for a
 //! general matrix product, whose packing would cost as much as these products do.
+#![allow(clippy::needless_range_loop, reason = "arithmetic in registers: one index over several arrays")]
 
 use pulp::Simd;
 

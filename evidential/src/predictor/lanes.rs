@@ -38,6 +38,9 @@ pub(crate) fn register_of<S: Simd>(lanes: &[f32; N_LANES], register: usize) -> S
     bytemuck::cast_slice::<f32, S::f32s>(lanes)[register]
 }
 
+/// ln 2 in two parts, the first exact in few bits.
+const LN_2: [f32; 2] = [355.0 / 512.0, -2.121_944_4e-4];
+
 /// Largest argument of [`exp`] and, negated, the smallest: e^87 and e^-87 are normal numbers in f32.
 const EXP_MAX: f32 = 87.0;
 
@@ -46,8 +49,6 @@ const EXP_MAX: f32 = 87.0;
 pub(crate) fn exp<S: Simd>(simd: S, x: S::f32s) -> S::f32s {
     // 1.5 * 2^23: adding it rounds to an integer, which stands in the low bits.
     const ROUND: f32 = 12_582_912.0;
-    // ln 2 in two parts, the first exact in few bits.
-    const LN_2: [f32; 2] = [0.693_359_375, -2.121_944_4e-4];
     // Minimax of (e^r - 1 - r) / r^2 on |r| <= ln 2 / 2 (Cephes).
     const COEFFICIENTS: [f32; 6] =
         [1.987_569_1e-4, 1.398_199_9e-3, 8.333_452e-3, 4.166_579_5e-2, 1.666_666_5e-1, 0.5];
@@ -96,8 +97,8 @@ pub(crate) fn ln<S: Simd>(simd: S, x: S::f32s) -> S::f32s {
     let squared = simd.mul_f32s(m, m);
     let small =
         simd.sub_f32s(simd.mul_f32s(simd.mul_f32s(series, m), squared), simd.mul_f32s(squared, real(0.5)));
-    let small = simd.add_f32s(small, simd.mul_f32s(exponent, real(-2.121_944_4e-4)));
-    simd.add_f32s(simd.add_f32s(m, small), simd.mul_f32s(exponent, real(0.693_359_375)))
+    let small = simd.add_f32s(small, simd.mul_f32s(exponent, real(LN_2[1])));
+    simd.add_f32s(simd.add_f32s(m, small), simd.mul_f32s(exponent, real(LN_2[0])))
 }
 
 /// A polynomial by its coefficients, highest power first.

@@ -1,0 +1,94 @@
+//! What is believed of one pose.
+
+use physics_prior::PriorBelief;
+use traversability::Pmf;
+
+use super::extraction::{Extract, Features, Line};
+use super::patch_stencil::PatchStencil;
+use super::{BeliefLayers, BeliefMap};
+use crate::predictor::{Prediction, PredictorError};
+use crate::{FeatureLayout, Prior};
+
+/// Prior, prediction and posterior of one pose, before any CVaR; obstacles play no part.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PoseBelief {
+    /// What physics says.
+    pub prior: PriorBelief,
+    /// What the networks say; `None` on unknown ground, which they cannot judge.
+    pub prediction: Option<Prediction>,
+    /// Share of the networks in the posterior of linear traction, angular traction, |roll| and |pitch|, in [0, 1].
+    pub learned_share: [f32; 4],
+    /// Mean of the posterior in the same order (PIETRA, equation 11).
+    pub posterior: [Pmf; 4],
+}
+
+impl BeliefMap {
+    /// What is believed of any pose of the body frame, whose footprint must lie over the ground of the risk map; `None`
+    /// elsewhere.
+    pub fn belief(&self, x_m: f64, y_m: f64, yaw_rad: f64) -> Option<PoseBelief> {
+        let layers = &self.layers;
+        let prior = layers.field.belief(x_m, y_m, yaw_rad)?;
+        let features = layers.features([x_m, y_m, yaw_rad])?.filter(|_| !prior.is_unknown);
+        let prediction = match features {
+            Some(features) => Some(layers.predict(features).ok()?),
+            None => None,
+        };
+        let physics = [prior.linear, prior.angular, prior.roll, prior.pitch];
+        let learned_share = prediction.map_or([0.0; 4], |prediction| layers.learned_share(&prediction));
+        let against = match (layers.fusion.prior, prediction) {
+            (Prior::Uniform, Some(_)) => [Pmf::UNIFORM; 4],
+            _ => physics,
+        };
+        let posterior = std::array::from_fn(|parameter| match &prediction {
+            Some(learned) => {
+                against[parameter].mixed_with(&learned.pmfs[parameter], learned_share[parameter])
+            }
+            None => physics[parameter],
+        });
+        Some(PoseBelief { prior, prediction, learned_share, posterior })
+    }
+}
+
+impl BeliefLayers {
+    /// Features of a pose; the outer `None` beyond the ground, the inner one where nothing stands on known ground.
+    fn features(&self, [x_m, y_m, yaw_rad]: [f64; 3]) -> Option<Option<Vec<f32>>> {
+        let window = *self.ground.window();
+        let place = [x_m, y_m].map(|v| v / window.resolution_m);
+        let base = place.map(|v| v.floor() as i64);
+        let phase = place.map(|v| v - v.floor());
+        let layout: &FeatureLayout = &self.layout;
+        let mut stencil = PatchStencil::new(layout, window.resolution_m, phase, yaw_rad);
+        let [least, most] = stencil.reach();
+        let n = [window.n_cols, window.n_rows];
+        let is_inside = (0..2).all(|axis| {
+            let start = base[axis] - window.origin[axis];
+            start + least[axis] >= 0 && start + most[axis] < n[axis] as i64
+        });
+        is_inside.then_some(())?;
+        stencil.lay_on(&self.ground, base);
+        let mut features = Features::default();
+        features.reserve(layout.n_features(), 1);
+        pulp::Arch::new().dispatch(Extract {
+            ground: &self.ground,
+            line: Line { stencil: &stencil, base, n_lanes: 1 },
+            first_lane: 0,
+            features: &mut features,
+        });
+        let is_grounded = features.ungrounded[0] == 0.0;
+        let values = (0..layout.n_features()).filter_map(|feature| features.lanes::<1>(feature, 0));
+        let values: Vec<f32> = values.map(|lane| lane[0]).collect();
+        Some(is_grounded.then_some(values))
+    }
+
+    fn predict(&self, features: Vec<f32>) -> Result<Prediction, PredictorError> {
+        Ok(self.predictor.predict(&[features])?.remove(0))
+    }
+
+    fn learned_share(&self, prediction: &Prediction) -> [f32; 4] {
+        let n_prior = self.fusion.prior_evidence;
+        match (&prediction.evidence, self.fusion.prior) {
+            (Some(evidence), Prior::Physics | Prior::Uniform) => evidence.counts.map(|n| n / (n_prior + n)),
+            _ => [1.0; 4],
+        }
+    }
+}
