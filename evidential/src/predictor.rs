@@ -9,6 +9,8 @@ mod lanes;
 mod network;
 mod radial_flow;
 mod tensors;
+#[cfg(test)]
+mod tests;
 
 use pulp::Simd;
 use traversability::{N_BINS, Pmf};

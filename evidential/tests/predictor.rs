@@ -51,7 +51,8 @@ fn plain(checkpoint: &Checkpoint, features: &[f32]) -> Plain {
         return Plain { probabilities, log_density: 0.0, evidence: Vec::new() };
     }
     let log_density = log_density(checkpoint, z.clone());
-    let n = (log_density + sidecar.architecture.log_budget()).clamp(-30.0, 30.0).exp();
+    let log_budget = sidecar.density.unwrap().log_budget;
+    let n = (log_density + log_budget).clamp(-30.0, 30.0).exp();
     let evidence = branch("evidence").into_iter().map(|logit| n / (1.0 + (-logit).exp())).collect();
     Plain { probabilities, log_density, evidence }
 }

@@ -57,7 +57,7 @@ pub fn checkpoint(method: Method, seed: u64) -> Checkpoint {
         mean: (0..n).map(|_| rng.random_range(-0.3..0.3)).collect(),
         deviation: (0..n).map(|_| rng.random_range(0.2..1.5)).collect(),
     };
-    let range = DensityRange { min: -6.0, max: 0.0, log_budget: architecture.log_budget() };
+    let range = DensityRange { min: -6.0, max: 0.0, log_budget: architecture.log_budget() + 1.3 };
     let sidecar = Sidecar {
         format: Sidecar::FORMAT,
         method,
