@@ -73,12 +73,12 @@ impl Responses {
 
 impl Response {
     /// A command as far as it has arrived, exactly for a command that is held from row to row. Before the first row
-    /// it is taken to have been held too; `start` had arrived then. A command that is not finite changes nothing.
+    /// `start` was commanded and had arrived. A command that is not finite changes nothing.
     pub(super) fn follow(&self, time_s: &[f64], commanded: &[f64], start: f64) -> Vec<f64> {
         let mut arrived = Vec::with_capacity(time_s.len());
         // The command whose effect begins next.
         let mut next = 0;
-        let mut held = commanded.first().copied().filter(|command| command.is_finite()).unwrap_or(start);
+        let mut held = start;
         let mut state = Arrival { aim: start, value: start };
         let Some(mut then_s) = time_s.first().copied() else { return arrived };
         for &now_s in time_s {
