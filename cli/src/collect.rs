@@ -75,11 +75,8 @@ fn drive(
 fn request(arguments: &CollectArguments, vehicle: &Vehicle) -> Result<Request, UsageError> {
     let split = Split::from(arguments.split);
     let place = match arguments.world {
-        CollectWorld::Rocks => {
-            let usual = RockFieldConfig::default();
-            let test_height_scale = arguments.test_height_scale.unwrap_or(usual.test_height_scale);
-            Place::Rocks { field: RockFieldConfig { test_height_scale, ..usual }, split }
-        }
+        CollectWorld::Testbed => rocks(RockFieldConfig::testbed(), arguments, split),
+        CollectWorld::Rocks => rocks(RockFieldConfig::default(), arguments, split),
         CollectWorld::Arena => Place::Arena { split },
     };
     let is_scaled = matches!(place, Place::Rocks { split: Split::Test, .. });
@@ -89,7 +86,7 @@ fn request(arguments: &CollectArguments, vehicle: &Vehicle) -> Result<Request, U
     ];
     if let Some((option, _)) = asked.iter().find(|(_, is_given)| *is_given && !is_scaled) {
         return Err(UsageError(format!(
-            "{option}: expected together with --world rocks --split test, found without it"
+            "{option}: expected together with --split test on a rock field, found without it"
         )));
     }
     Ok(Request {
@@ -103,6 +100,11 @@ fn request(arguments: &CollectArguments, vehicle: &Vehicle) -> Result<Request, U
         n_threads: arguments.n_threads(),
         ..Request::new(vehicle.clone(), place, arguments.seed)
     })
+}
+
+fn rocks(field: RockFieldConfig, arguments: &CollectArguments, split: Split) -> Place {
+    let test_height_scale = arguments.test_height_scale.unwrap_or(field.test_height_scale);
+    Place::Rocks { field: RockFieldConfig { test_height_scale, ..field }, split }
 }
 
 /// The height scale that makes the test split as hard as asked, put into the request.

@@ -203,7 +203,7 @@ fn arguments_that_do_not_fit_together_are_refused() {
     let cases: [(&[&str], &str); 9] = [
         (
             &["--test-height-scale", "2"],
-            "--test-height-scale: expected together with --world rocks --split test",
+            "--test-height-scale: expected together with --split test on a rock field",
         ),
         (&["--harder-than", "x", "--world", "arena", "--split", "test"], "--harder-than: expected together"),
         (

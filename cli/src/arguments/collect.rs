@@ -12,7 +12,7 @@ use super::values::{self, Goal};
 #[command(after_long_help = AFTER_HELP)]
 pub struct CollectArguments {
     /// Worlds to drive in
-    #[arg(long, value_enum, default_value_t = CollectWorld::Rocks, help_heading = "Simulated drives")]
+    #[arg(long, value_enum, default_value_t = CollectWorld::Testbed, help_heading = "Simulated drives")]
     pub world: CollectWorld,
 
     /// Which third of the worlds: to learn from, to choose by, or to report on
@@ -102,7 +102,7 @@ impl CollectArguments {
     pub fn vehicle_name_or_path(&self) -> &str {
         let fitting = match self.world {
             CollectWorld::Arena => "rc_car",
-            CollectWorld::Rocks => "pietra_full_size",
+            CollectWorld::Testbed | CollectWorld::Rocks => "pietra_full_size",
         };
         self.vehicle.as_deref().unwrap_or(fitting)
     }
@@ -116,7 +116,9 @@ impl CollectArguments {
 /// Families of worlds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum CollectWorld {
-    /// Generated rock fields of 50 x 50 m
+    /// Generated maps of 50 x 50 m covered with rocks, to learn on
+    Testbed,
+    /// The rock fields of 50 x 50 m that `drive` and `bench navigation` drive over, with ways through
     Rocks,
     /// Halls of 9.6 x 8 m with a ramp, and bushes of many heights
     Arena,
