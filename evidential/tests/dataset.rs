@@ -32,7 +32,12 @@ fn dataset() -> Dataset {
         let prior = Pmf::interpolated(&Bins::TRACTION, share).unwrap();
         Example {
             features: (0..layout().n_features()).map(|i| i as f32 * 0.1 - share).collect(),
-            measured: [share, if k % 2 == 0 { f32::NAN } else { 1.0 - share }, 0.5 * share, 0.3 * share],
+            measured: [
+                share,
+                if k.is_multiple_of(2) { f32::NAN } else { 1.0 - share },
+                0.5 * share,
+                0.3 * share,
+            ],
             prior: [*prior.probabilities(); 4],
             unevenness_m: 0.01 * f32::from(k + 1),
             drive: u32::from(k) / 4,

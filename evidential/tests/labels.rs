@@ -22,12 +22,12 @@ const GEOMETRY: Geometry = Geometry {
 const LIMITS: Limits = Limits {
     speed_max_mps: 2.0,
     reverse_speed_max_mps: 2.0,
-    steering_max_rad: 0.5236,
+    steering_max_rad: std::f64::consts::FRAC_PI_6,
     steering_rate_max_radps: 0.6,
     acceleration_max_mps2: 1.5,
     lateral_acceleration_max_mps2: 3.0,
-    roll_max_rad: 0.5236,
-    pitch_max_rad: 0.5236,
+    roll_max_rad: std::f64::consts::FRAC_PI_6,
+    pitch_max_rad: std::f64::consts::FRAC_PI_6,
 };
 
 /// What the ground does to the vehicle at a time: linear and angular traction.
@@ -51,7 +51,7 @@ impl Machine {
             let t = step as f64 * 1e-3;
             let [linear, angular] = (self.ground)(t);
             let (v, w) = (linear * speed, angular * speed * f64::tan(steer) / GEOMETRY.wheelbase_m);
-            if step % 50 == 0 {
+            if step.is_multiple_of(50) {
                 let [cmd_speed, cmd_steer] = held(t);
                 log.push("drive", &row(t, pose, [v, w], [cmd_speed, cmd_steer])).unwrap();
             }

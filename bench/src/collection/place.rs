@@ -9,6 +9,7 @@ use scenarios::{
 };
 
 /// A family of worlds.
+#[allow(clippy::large_enum_variant, reason = "there is one of it in a collection")]
 #[derive(Clone, Debug, PartialEq)]
 pub enum Place {
     /// PIETRA's rock testbed; map k is the k-th of its split.

@@ -17,13 +17,11 @@ use super::{DrivePicture, LEFT, MARGIN, PAGE_WIDTH, PictureError, view};
 
 const HEADER: f64 = 110.0;
 const MAP_SIDE: f64 = 880.0;
-const BAR_X: f64 = LEFT + MAP_SIDE + 30.0;
-const HISTOGRAM_X: f64 = 1150.0;
+const BAR_X: f64 = LEFT + MAP_SIDE + 20.0;
+const HISTOGRAM_X: f64 = 1165.0;
 const HISTOGRAM_HEIGHT: f64 = 130.0;
 const HISTOGRAM_STEP: f64 = 235.0;
 const BELOW: f64 = 90.0;
-/// The map that is drawn.
-const MAP: u32 = 0;
 
 const TEXT: TextStyle = TextStyle::new(17, Anchor::Start);
 const SOFT: TextStyle = TextStyle::new(15, Anchor::Middle).coloured(Rgb::INK_SOFT);
@@ -73,7 +71,8 @@ fn draw_keys(canvas: &mut Canvas) {
 }
 
 fn draw_map(collection: &Collection, vehicle: &Vehicle, canvas: &mut Canvas) {
-    let Some(world) = collection.worlds.get(MAP as usize) else { return };
+    // The first map, whatever its number.
+    let Some((world, first)) = collection.worlds.first().zip(collection.trials.first()) else { return };
     let slot = view::Slot {
         left: LEFT,
         top: HEADER,
@@ -100,7 +99,7 @@ fn draw_map(collection: &Collection, vehicle: &Vehicle, canvas: &mut Canvas) {
     canvas.image(axes.frame.x, axes.frame.y, &relief(&ground, &axes));
     canvas.clipped(axes.frame, |canvas| {
         let on_map = |example: &&Example| {
-            collection.trials.get(example.drive as usize).is_some_and(|trial| trial.map == MAP)
+            collection.trials.get(example.drive as usize).is_some_and(|trial| trial.map == first.map)
         };
         let examples: Vec<&Example> = collection.dataset.examples.iter().filter(on_map).collect();
         for drive in examples.chunk_by(|a, b| a.drive == b.drive) {
