@@ -72,11 +72,12 @@ pub enum BeliefMapError {
 /// A risk map from what was learned, fused with a prior by evidence (PIETRA, equations 10 and 11).
 ///
 /// Poses are those of [`RiskMap`]. The prior is that of the checkpoint's method: the physics prior, all bins alike, or
-/// none. Whatever the method, unknown ground and obstacles are those of the physics prior: a footprint that is mostly
-/// unknown has nothing that networks could judge and is the prior's alone, one that touches an obstacle is
-/// [`Risk::blocked`]. A cell whose poses are unlike the training data in most yaws has the flag
-/// [`traversability::GroundFlags::OUT_OF_DISTRIBUTION`]; unknown ground never has. Runs in the rayon pool of the
-/// caller; the result does not depend on the number of threads.
+/// none. Whatever the method, unknown ground and obstacles are those of the physics prior: a footprint that touches an
+/// obstacle is [`Risk::blocked`], one that is mostly unknown has nothing that networks could judge and is the physics
+/// prior's alone, and where it is unknown in part the networks are weighed against that prior. A cell whose poses are
+/// unlike the training data in most yaws has the flag [`traversability::GroundFlags::OUT_OF_DISTRIBUTION`]; a footprint
+/// that is not wholly known never counts as such, or nobody who avoids the unfamiliar could approach the edge of what
+/// was seen. Runs in the rayon pool of the caller; the result does not depend on the number of threads.
 #[derive(Clone, Debug)]
 pub struct BeliefMap {
     layers: BeliefLayers,
@@ -117,8 +118,8 @@ impl Fusion {
     }
 
     /// What the networks are weighed against: physics alone knows of unknown ground.
-    fn weighed<'a>(&'a self, physics: &'a PartialMoments, is_unknown: bool) -> &'a PartialMoments {
-        if is_unknown || self.prior == Prior::Physics { physics } else { &self.uniform }
+    fn weighed<'a>(&'a self, physics: &'a PartialMoments, is_known: bool) -> &'a PartialMoments {
+        if is_known && self.prior != Prior::Physics { &self.uniform } else { physics }
     }
 }
 

@@ -9,7 +9,7 @@ use evidential::{
     BeliefMap, BeliefMapError, Checkpoint, Learned, Method, Prediction, Predictor, Prior, Unfamiliar,
 };
 use physics_prior::{Assumption, PriorMap, PriorMapError};
-use terrain::{Cell, CellRegion, GridGeometry, GridMap, SurfaceCell, TerrainClass};
+use terrain::{Cell, CellRegion, GridGeometry, GridMap, PatchSample, SurfaceCell, TerrainClass};
 use traversability::{CvarLevel, GroundFlags, Pmf, PmfQuad, Risk, RiskMapView};
 use untrained::{CAR, checkpoint, rough};
 
@@ -57,12 +57,26 @@ fn poses(view: &RiskMapView<'_>) -> Vec<(Cell, usize, [f64; 3])> {
     cells.flat_map(|cell| (0..view.n_yaws).map(move |yaw| (cell, yaw))).map(pose).collect()
 }
 
-/// Equation 11 with distributions, and CVaR from these.
-fn expected_risk(checkpoint: &Checkpoint, prior: &[Pmf; 4], prediction: &Prediction) -> Risk {
+/// Whether there is a height under every wheel and sample.
+fn is_wholly_known(checkpoint: &Checkpoint, surface: &GridMap<SurfaceCell>, pose: [f64; 3]) -> bool {
+    let layout = &checkpoint.sidecar.layout;
+    let of_wheels =
+        terrain::wheel_heights_m(surface, &layout.wheels, pose).iter().all(|height| !height.is_nan());
+    let of_samples = [layout.height_patch, layout.cover_patch].iter().all(|patch| {
+        let mut samples = vec![PatchSample::UNKNOWN; patch.n_samples()];
+        patch.sample(surface, &layout.wheels, pose, &mut samples);
+        samples.iter().all(|sample| !sample.relative_height_m.is_nan())
+    });
+    of_wheels && of_samples
+}
+
+/// Equation 11 with distributions, and CVaR from these; on ground that is not wholly known the prior is physics.
+fn expected_risk(checkpoint: &Checkpoint, prior: &[Pmf; 4], prediction: &Prediction, is_known: bool) -> Risk {
     let n_prior = checkpoint.sidecar.prior.evidence as f32;
     let against = match checkpoint.sidecar.method.prior() {
         Prior::Physics => *prior,
-        Prior::Uniform => [Pmf::UNIFORM; 4],
+        Prior::Uniform if is_known => [Pmf::UNIFORM; 4],
+        Prior::Uniform => *prior,
         Prior::None => prediction.pmfs,
     };
     let posterior: [Pmf; 4] = std::array::from_fn(|k| {
@@ -97,7 +111,8 @@ fn every_pose_has_the_risk_of_its_posterior() {
             let prediction = predictor.predict(&[features]).unwrap()[0];
             let pmfs = [belief.linear, belief.angular, belief.roll, belief.pitch];
             let by_prior = prior.risk_map().view().risk(cell, yaw);
-            let expected = expected_risk(&checkpoint, &pmfs, &prediction);
+            let is_known = is_wholly_known(&checkpoint, &surface, [x_m, y_m, yaw_rad]);
+            let expected = expected_risk(&checkpoint, &pmfs, &prediction, is_known);
             let expected = if by_prior.is_blocked() { expected.blocked() } else { expected };
             let found = view.risk(cell, yaw);
             // Mostly unknown ground is the prior's alone.
@@ -181,7 +196,6 @@ fn ground_unlike_the_training_data_is_flagged_and_avoided_on_request() {
     let fused = map_of(&checkpoint, Unfamiliar::Fuse, &surface, RISK);
     let avoiding = map_of(&checkpoint, Unfamiliar::Avoid, &surface, RISK);
     let (fused, avoiding) = (fused.risk_map().view(), avoiding.risk_map().view());
-    let prior = prior_of(&checkpoint, &surface, RISK);
     let min = checkpoint.sidecar.density.unwrap().min as f32;
     let mut n_out = vec![0; RISK.n_cells()];
     let mut n_avoided = 0;
@@ -191,11 +205,7 @@ fn ground_unlike_the_training_data_is_flagged_and_avoided_on_request() {
         if (log_density - min).abs() < 0.02 {
             continue;
         }
-        let is_unknown = is_close(fused.risk(cell, yaw), prior.risk_map().view().risk(cell, yaw));
-        if is_unknown {
-            continue;
-        }
-        let is_out = log_density < min;
+        let is_out = log_density < min && is_wholly_known(&checkpoint, &surface, pose);
         n_out[RISK.index(cell)] += usize::from(is_out);
         n_avoided += usize::from(is_out && !fused.risk(cell, yaw).is_blocked());
         assert_eq!(avoiding.risk(cell, yaw).is_blocked(), is_out || fused.risk(cell, yaw).is_blocked());

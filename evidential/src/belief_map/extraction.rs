@@ -20,6 +20,8 @@ pub(super) struct Features {
     values: Vec<f32>,
     /// Footprints of which no wheel or no sample stands on known ground have no features: 1, else 0.
     pub ungrounded: Vec<f32>,
+    /// Whether any wheel or sample of a footprint stands on unknown ground: 1, else 0.
+    pub partly_unknown: Vec<f32>,
     n_lanes_max: usize,
 }
 
@@ -30,6 +32,7 @@ impl Features {
         self.n_lanes_max = n_lanes.next_multiple_of(2 * SPAN) + SPAN;
         self.values.resize(n_features * self.n_lanes_max, 0.0);
         self.ungrounded.resize(self.n_lanes_max, 0.0);
+        self.partly_unknown.resize(self.n_lanes_max, 0.0);
     }
 
     /// One feature of adjacent footprints.
@@ -40,7 +43,7 @@ impl Features {
 
     /// Bytes of the buffers.
     pub fn n_bytes(&self) -> usize {
-        size_of_val(&*self.values) + size_of_val(&*self.ungrounded)
+        size_of_val(&*self.values) + size_of_val(&*self.ungrounded) + size_of_val(&*self.partly_unknown)
     }
 }
 
@@ -81,10 +84,20 @@ struct Heights {
     known: Span,
 }
 
+/// What the heights of a span's footprints are relative to.
+struct Reference {
+    /// Mean height under the wheels on known ground.
+    height_m: Span,
+    /// Whether there is such a wheel: 1, else 0.
+    grounded: Span,
+    /// Wheels on unknown ground.
+    n_missing: Span,
+}
+
 impl Reader<'_> {
     #[inline(always)]
     fn extract(&self, stencil: &PatchStencil, features: &mut Features, lane: usize) {
-        let (reference_m, grounded) = self.reference_m(&stencil.wheels);
+        let Reference { height_m: reference_m, grounded, mut n_missing } = self.reference(&stencil.wheels);
         let per_height_m = self.ground.per_height_m();
         let stride = features.n_lanes_max;
         let mut n_known = [0.0; SPAN];
@@ -101,6 +114,7 @@ impl Reader<'_> {
                 let scaled = ((height_m[k] - reference_m[k]) * per_height_m).clamp(-FEATURE_MAX, FEATURE_MAX);
                 relative[k] = if known[k] * grounded[k] > 0.0 { scaled } else { 0.0 };
                 n_known[k] += known[k];
+                n_missing[k] += 1.0 - known[k];
             }
             write(&relative);
         }
@@ -113,6 +127,7 @@ impl Reader<'_> {
             for k in 0..SPAN {
                 unknown[k] = 1.0 - known[k] * grounded[k];
                 n_known[k] += known[k];
+                n_missing[k] += 1.0 - known[k];
             }
             write(&unknown);
         }
@@ -120,11 +135,14 @@ impl Reader<'_> {
         for k in 0..SPAN {
             ungrounded[k] = if n_known[k] * grounded[k] > 0.0 { 0.0 } else { 1.0 };
         }
+        let partly_unknown = &mut features.partly_unknown[lane..lane + SPAN];
+        for k in 0..SPAN {
+            partly_unknown[k] = if n_missing[k] > 0.0 { 1.0 } else { 0.0 };
+        }
     }
 
-    /// Mean height under the wheels on known ground, and whether there is one: 1, else 0.
     #[inline(always)]
-    fn reference_m(&self, wheels: &[Tap; 4]) -> (Span, Span) {
+    fn reference(&self, wheels: &[Tap; 4]) -> Reference {
         let (mut sum_m, mut n_known) = ([0.0; SPAN], [0.0; SPAN]);
         for wheel in wheels {
             let Heights { height_m, known } = self.heights(wheel);
@@ -133,12 +151,13 @@ impl Reader<'_> {
                 n_known[k] += known[k];
             }
         }
-        let mut grounded = [0.0; SPAN];
+        let (mut grounded, mut n_missing) = ([0.0; SPAN], [0.0; SPAN]);
         for k in 0..SPAN {
             grounded[k] = if n_known[k] > 0.0 { 1.0 } else { 0.0 };
+            n_missing[k] = 4.0 - n_known[k];
             sum_m[k] /= n_known[k].max(1.0);
         }
-        (sum_m, grounded)
+        Reference { height_m: sum_m, grounded, n_missing }
     }
 
     /// Bilinear heights; unknown corners are left out and the others count more, unless less than half is known.

@@ -28,15 +28,16 @@ impl BeliefMap {
     pub fn belief(&self, x_m: f64, y_m: f64, yaw_rad: f64) -> Option<PoseBelief> {
         let layers = &self.layers;
         let prior = layers.field.belief(x_m, y_m, yaw_rad)?;
-        let features = layers.features([x_m, y_m, yaw_rad])?.filter(|_| !prior.is_unknown);
-        let prediction = match features {
+        let pose = layers.features([x_m, y_m, yaw_rad])?;
+        let is_known = !pose.is_partly_unknown;
+        let prediction = match pose.features.filter(|_| !prior.is_unknown) {
             Some(features) => Some(layers.predict(features).ok()?),
             None => None,
         };
         let physics = [prior.linear, prior.angular, prior.roll, prior.pitch];
         let learned_share = prediction.map_or([0.0; 4], |prediction| layers.learned_share(&prediction));
-        let against = match (layers.fusion.prior, prediction) {
-            (Prior::Uniform, Some(_)) => [Pmf::UNIFORM; 4],
+        let against = match layers.fusion.prior {
+            Prior::Uniform if is_known => [Pmf::UNIFORM; 4],
             _ => physics,
         };
         let posterior = std::array::from_fn(|parameter| match &prediction {
@@ -49,9 +50,16 @@ impl BeliefMap {
     }
 }
 
+/// What the networks see of a pose.
+struct PoseFeatures {
+    /// `None` where nothing stands on known ground.
+    features: Option<Vec<f32>>,
+    is_partly_unknown: bool,
+}
+
 impl BeliefLayers {
-    /// Features of a pose; the outer `None` beyond the ground, the inner one where nothing stands on known ground.
-    fn features(&self, [x_m, y_m, yaw_rad]: [f64; 3]) -> Option<Option<Vec<f32>>> {
+    /// `None` beyond the ground.
+    fn features(&self, [x_m, y_m, yaw_rad]: [f64; 3]) -> Option<PoseFeatures> {
         let window = *self.ground.window();
         let place = [x_m, y_m].map(|v| v / window.resolution_m);
         let base = place.map(|v| v.floor() as i64);
@@ -77,7 +85,8 @@ impl BeliefLayers {
         let is_grounded = features.ungrounded[0] == 0.0;
         let values = (0..layout.n_features()).filter_map(|feature| features.lanes::<1>(feature, 0));
         let values: Vec<f32> = values.map(|lane| lane[0]).collect();
-        Some(is_grounded.then_some(values))
+        let is_partly_unknown = features.partly_unknown[0] > 0.0;
+        Some(PoseFeatures { features: is_grounded.then_some(values), is_partly_unknown })
     }
 
     fn predict(&self, features: Vec<f32>) -> Result<Prediction, PredictorError> {

@@ -35,7 +35,10 @@ pub(super) struct Scratch {
     moments: Vec<f32>,
     n_lanes_max: usize,
     blocked: Vec<bool>,
+    /// Judged as unknown ground.
     unknown: Vec<bool>,
+    /// Known under every wheel and sample.
+    known: Vec<bool>,
     out_of_distribution: Vec<bool>,
     risks: Vec<Risk>,
     priors: Vec<PosePrior>,
@@ -60,6 +63,7 @@ impl Scratch {
             n_lanes_max: 0,
             blocked: Vec::new(),
             unknown: Vec::new(),
+            known: Vec::new(),
             out_of_distribution: Vec::new(),
             risks: Vec::new(),
             priors: vec![nothing; n_yaws],
@@ -68,7 +72,7 @@ impl Scratch {
 
     /// Bytes of the buffers.
     pub fn n_bytes(&self) -> usize {
-        let flags = self.blocked.len() + self.unknown.len() + self.out_of_distribution.len();
+        let flags = 4 * self.blocked.len();
         self.features.n_bytes()
             + size_of_val(&*self.workspace.input)
             + size_of_val(&*self.moments)
@@ -82,7 +86,8 @@ impl Scratch {
         // As for the features, not a multiple of a page.
         self.n_lanes_max = n_lanes.next_multiple_of(N_LANES) + N_LANES / 2;
         self.moments.resize(4 * N_BINS * self.n_lanes_max, 0.0);
-        for flags in [&mut self.blocked, &mut self.unknown, &mut self.out_of_distribution] {
+        let flags = [&mut self.blocked, &mut self.unknown, &mut self.known, &mut self.out_of_distribution];
+        for flags in flags {
             flags.clear();
             flags.resize(self.n_lanes_max, false);
         }
@@ -177,9 +182,11 @@ impl BeliefLayers {
                 let lane = line.first_lane + yaw * line.n_lanes + step;
                 // What nothing is known of has no features either.
                 let is_unknown = prior.is_unknown || scratch.features.ungrounded[lane] > 0.0;
+                let is_known = !is_unknown && scratch.features.partly_unknown[lane] == 0.0;
                 scratch.blocked[lane] = prior.is_blocked;
                 scratch.unknown[lane] = is_unknown;
-                let weighed = self.fusion.weighed(&prior.moments, is_unknown);
+                scratch.known[lane] = is_known;
+                let weighed = self.fusion.weighed(&prior.moments, is_known);
                 for (row, moment) in weighed.moments.as_flattened().iter().enumerate() {
                     scratch.moments[row * scratch.n_lanes_max + lane] = *moment;
                 }
@@ -202,6 +209,7 @@ impl BeliefLayers {
             moments: Moments { values: &scratch.moments, stride, first_lane },
             blocked: &scratch.blocked[first_lane..],
             unknown: &scratch.unknown[first_lane..],
+            known: &scratch.known[first_lane..],
             out_of_distribution: &mut scratch.out_of_distribution[first_lane..],
             risks: &mut scratch.risks[first_lane..],
         });
@@ -237,6 +245,7 @@ struct Fuse<'a> {
     moments: Moments<'a>,
     blocked: &'a [bool],
     unknown: &'a [bool],
+    known: &'a [bool],
     out_of_distribution: &'a mut [bool],
     risks: &'a mut [Risk],
 }
@@ -284,7 +293,7 @@ impl Fuse<'_> {
         let log_density = &self.prediction.log_density;
         let n_lanes = N_LANES.min(self.blocked.len());
         for (lane, risk) in self.risks.iter_mut().enumerate().take(n_lanes) {
-            let is_out = log_density.0[lane] < self.fusion.log_density_min && !self.unknown[lane];
+            let is_out = log_density.0[lane] < self.fusion.log_density_min && self.known[lane];
             self.out_of_distribution[lane] = is_out;
             let free = Risk {
                 linear_traction: cvars[0].0[lane],
