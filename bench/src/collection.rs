@@ -36,6 +36,8 @@ pub struct Request {
     pub vehicle: Vehicle,
     /// The worlds.
     pub place: Place,
+    /// Number of the first world within its family.
+    pub first_map: u32,
     /// Worlds to drive in.
     pub n_maps: u32,
     /// Trials in each.
@@ -71,6 +73,7 @@ impl Request {
             vehicle,
             prior,
             place,
+            first_map: 0,
             n_maps: 10,
             n_trials: 20,
             speed_mps,
@@ -249,8 +252,9 @@ fn gather(request: &Request, after_trial: &(impl Fn() + Sync)) -> Result<Collect
     let driven: Vec<Driven> = (0..request.n_maps * request.n_trials)
         .into_par_iter()
         .map(|index| {
-            let (map, trial) = (index / request.n_trials, index % request.n_trials);
-            let driven = drive(request, &config, &vehicle, &fields[map as usize], [map, trial], &surveyor);
+            let (place, trial) = (index / request.n_trials, index % request.n_trials);
+            let number = [request.first_map + place, trial];
+            let driven = drive(request, &config, &vehicle, &fields[place as usize], number, &surveyor);
             after_trial();
             driven
         })
@@ -263,7 +267,10 @@ fn gather(request: &Request, after_trial: &(impl Fn() + Sync)) -> Result<Collect
         .map(|(index, (driven, run))| {
             let labels = labels(run, &vehicle.geometry, &responses, &labelling)?;
             let examples = match &driven.sensed {
-                None => examples(&surveyor, &labels, &fields[driven.map as usize].surface, index as u32)?,
+                None => {
+                    let surface = &fields[(driven.map - request.first_map) as usize].surface;
+                    examples(&surveyor, &labels, surface, index as u32)?
+                }
                 Some(sensed) => sensed_examples(sensed, run.time_s(), &labels, index as u32),
             };
             let trial = driven.trial(labels.len(), examples.len());
@@ -285,7 +292,7 @@ fn fields(request: &Request, vehicle: &Vehicle, resolution_m: f64) -> Result<Vec
         let surface = true_surface(&world, resolution_m);
         Ok(Field::new(vehicle, world, surface))
     };
-    (0..request.n_maps).into_par_iter().map(field).collect()
+    (request.first_map..request.first_map + request.n_maps).into_par_iter().map(field).collect()
 }
 
 fn dataset_of(
@@ -307,8 +314,10 @@ fn provenance(request: &Request) -> String {
         MapSource::Oracle => "the true surface",
         MapSource::Sensed => "the map fused from scans during the drive",
     };
+    let from =
+        if request.first_map > 0 { format!(" from number {}", request.first_map) } else { String::new() };
     format!(
-        "{}; {} maps, {} trials each, open loop at {} m/s with sinusoidal steering, seed {}; features from {source}",
+        "{}; {} maps{from}, {} trials each, open loop at {} m/s with sinusoidal steering, seed {}; features from {source}",
         request.place, request.n_maps, request.n_trials, request.speed_mps, request.seed
     )
 }

@@ -6,6 +6,7 @@ pub mod collection;
 pub mod control;
 mod error;
 pub mod learned_map;
+pub mod learning;
 pub mod navigation;
 pub mod prior_map;
 mod spread;

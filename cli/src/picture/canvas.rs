@@ -1,6 +1,7 @@
-//! Drawing on a page. The only place that knows the plotting library: shapes go in, PNG bytes come out.
+//! Drawing on a page. The only place that knows the plotting library: shapes go in, PNG bytes or SVG come out.
 
 use kuva::backend::raster::RasterBackend;
+use kuva::backend::svg::SvgBackend;
 use kuva::render::color::Color;
 use kuva::render::render::{PathData, Primitive, Scene, TextAnchor, TextSpan, build_path};
 
@@ -216,6 +217,11 @@ impl Canvas {
         });
         draw(self);
         self.scene.add(Primitive::ClipEnd);
+    }
+
+    /// The page as SVG.
+    pub(super) fn svg(&self) -> String {
+        SvgBackend::new().render_scene(&self.scene)
     }
 
     /// The page as a PNG file's bytes. Errors: what the encoder says.

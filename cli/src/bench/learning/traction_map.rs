@@ -1,4 +1,4 @@
-//! `surefoot bench learning`: what was learned, judged on measured traction.
+//! `surefoot bench learning --traction-map`: what was learned elsewhere, judged on measured traction.
 
 use std::path::Path;
 
@@ -24,13 +24,13 @@ struct Written<'a> {
     report: &'a TractionMapReport,
 }
 
-pub(crate) fn run_learning(arguments: &BenchLearningArguments) -> anyhow::Result<()> {
-    let map = formats::read_traction_map(&arguments.traction_map).map_err(UsageError::from_input)?;
+pub(super) fn run(arguments: &BenchLearningArguments, path: &Path) -> anyhow::Result<()> {
+    let map = formats::read_traction_map(path).map_err(UsageError::from_input)?;
     formats::prepare_out_dir(&arguments.out, ROOM_BYTES)
         .map_err(|error| UsageError(format!("--out: {}", UsageError::from_input(error))))?;
     arguments.json.as_deref().map_or(Ok(()), output::prepare_json)?;
     let judgement = judge(&map, BOOTSTRAP_SEED)?;
-    let name = file_name(&arguments.traction_map);
+    let name = file_name(path);
     print!("{}", told(&name, &judgement.report));
     write(arguments, &name, &judgement)?;
     let title = format!("Traction in a forest that the network never saw: {name}");
