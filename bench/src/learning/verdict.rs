@@ -109,7 +109,7 @@ fn lowest_excess(report: &Report) -> Verdict {
     let told = ["linear", "angular", "roll", "pitch"].into_iter().zip(lowest);
     let told: Vec<_> = told.filter(|(_, is_lowest)| *is_lowest).map(|(name, _)| name).collect();
     Verdict {
-        rule: "OOD: PIETRA's excess lowest on three parameters and both tractions".to_owned(),
+        rule: "OOD: PIETRA's excess lowest on 3 parameters, both tractions".to_owned(),
         found: if told.is_empty() { "on none".to_owned() } else { format!("on {}", told.join(", ")) },
         is_passed: told.len() >= N_LOWEST_MIN && lowest[0] && lowest[1],
     }
@@ -131,7 +131,7 @@ fn most_uneven(report: &Report) -> Vec<Verdict> {
         };
         let (to_physics, found) = ratio(Row::Pietra, Row::PhysicsPrior);
         verdicts.push(Verdict {
-            rule: format!("Fig. 6, {ground}: PIETRA at most 5 % over physics prior"),
+            rule: format!("Fig. 6, {ground}: PIETRA at most 1.05 physics prior"),
             found,
             is_passed: to_physics <= 1.0 + CLOSE,
         });
@@ -152,11 +152,7 @@ fn evidence(report: &Report) -> Vec<Verdict> {
     };
     let familiar = median(Ground::InDistribution);
     let mut verdicts = vec![Verdict {
-        rule: format!(
-            "PIETRA's median n/(n + n_phys) above {}, {}",
-            WEIGHTS[0],
-            Ground::InDistribution.name()
-        ),
+        rule: format!("PIETRA's median n/(n + n_phys) > {}, {}", WEIGHTS[0], Ground::InDistribution.name()),
         found: format!("{familiar:.3}"),
         is_passed: familiar > WEIGHTS[0],
     }];
@@ -165,7 +161,7 @@ fn evidence(report: &Report) -> Vec<Verdict> {
         let name = if ground == last { "most uneven bin".to_owned() } else { ground.name() };
         let found = median(ground);
         verdicts.push(Verdict {
-            rule: format!("PIETRA's median n/(n + n_phys) below {}, {name}", WEIGHTS[1]),
+            rule: format!("PIETRA's median n/(n + n_phys) < {}, {name}", WEIGHTS[1]),
             found: format!("{found:.3}"),
             is_passed: found < WEIGHTS[1],
         });

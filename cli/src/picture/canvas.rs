@@ -208,13 +208,14 @@ impl Canvas {
 
     /// Draws what `draw` draws, but only inside the rectangle.
     pub(super) fn clipped(&mut self, inside: Rect, draw: impl FnOnce(&mut Self)) {
-        self.scene.add(Primitive::ClipStart {
-            x: inside.x,
-            y: inside.y,
-            width: inside.width,
-            height: inside.height,
-            id: "inside".to_owned(),
-        });
+        let Rect { x, y, width, height } = inside;
+        // A name of its own: of several shapes with the same a viewer takes the first.
+        let id = format!("inside{}", self.scene.elements.len());
+        // PNGs are clipped by the numbers, SVG by a shape that it defines before all others.
+        self.scene.defs.push(format!(
+            "<clipPath id=\"{id}\"><rect x=\"{x}\" y=\"{y}\" width=\"{width}\" height=\"{height}\"/></clipPath>"
+        ));
+        self.scene.add(Primitive::ClipStart { x, y, width, height, id });
         draw(self);
         self.scene.add(Primitive::ClipEnd);
     }

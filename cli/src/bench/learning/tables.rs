@@ -21,7 +21,7 @@ fn spread(row: Row, of: MeanDeviation) -> String {
     match (of.mean.is_nan(), row.method()) {
         (true, _) => "-".to_owned(),
         (false, None) => number(of.mean),
-        (false, Some(_)) => format!("{:.3} ± {:.3}", of.mean, of.deviation),
+        (false, Some(_)) => format!("{:.3}±{:.3}", of.mean, of.deviation),
     }
 }
 
