@@ -12,7 +12,28 @@ struct Files {
 }
 
 /// Every checkpoint under `evidential/weights/`; a method may have one for each of several vehicles.
-const FILES: &[Files] = &[];
+const FILES: &[Files] = &[
+    Files {
+        method: Method::Pietra,
+        weights: include_bytes!("../weights/pietra/weights.safetensors"),
+        sidecar: include_bytes!("../weights/pietra/weights.json"),
+    },
+    Files {
+        method: Method::Evora,
+        weights: include_bytes!("../weights/evora/weights.safetensors"),
+        sidecar: include_bytes!("../weights/evora/weights.json"),
+    },
+    Files {
+        method: Method::PhysicsInformed,
+        weights: include_bytes!("../weights/physics-informed/weights.safetensors"),
+        sidecar: include_bytes!("../weights/physics-informed/weights.json"),
+    },
+    Files {
+        method: Method::Vanilla,
+        weights: include_bytes!("../weights/vanilla/weights.safetensors"),
+        sidecar: include_bytes!("../weights/vanilla/weights.json"),
+    },
+];
 
 /// Why no networks that come with the program will do.
 #[derive(Debug, thiserror::Error)]
