@@ -49,7 +49,7 @@ pub enum LearningError {
         /// Which part of the testbed.
         which: &'static str,
         /// Why.
-        source: CollectionError,
+        source: Box<CollectionError>,
     },
     /// A part of the testbed without ground that teaches.
     #[error("{which} drives: {source}")]
@@ -73,7 +73,7 @@ pub enum LearningError {
         /// Method and seed.
         training: String,
         /// Why.
-        source: TrainError,
+        source: Box<TrainError>,
     },
     /// Trained networks cannot be used.
     #[error("{training}: {source}")]
@@ -81,7 +81,7 @@ pub enum LearningError {
         /// Method and seed.
         training: String,
         /// Why.
-        source: PredictorError,
+        source: Box<PredictorError>,
     },
     /// The caller broke it off.
     #[error("interrupted before all trainings were done")]

@@ -118,7 +118,8 @@ impl<'a> Test<'a> {
     }
 
     fn judge(&self, trained: &Trained) -> Result<Judged, LearningError> {
-        let refused = |source| LearningError::Prediction { training: trained.planned.name(), source };
+        let refused =
+            |source| LearningError::Prediction { training: trained.planned.name(), source: Box::new(source) };
         let sidecar = &trained.checkpoint.sidecar;
         let predictor = Predictor::new(&trained.checkpoint).map_err(refused)?;
         let predictions = predictor.predict(&features(&self.testbed.test)).map_err(refused)?;

@@ -143,7 +143,8 @@ impl Planned {
         revision: &str,
         is_interrupted: &(dyn Fn() -> bool + Sync),
     ) -> Result<Trained, LearningError> {
-        let failed = |source: TrainError| LearningError::Training { training: self.name(), source };
+        let failed =
+            |source: TrainError| LearningError::Training { training: self.name(), source: Box::new(source) };
         if is_interrupted() {
             return Err(LearningError::Interrupted);
         }

@@ -103,9 +103,9 @@ pub(super) struct Tally {
 impl Tally {
     pub fn add(&mut self, case: &Case, predicted: &[Probabilities; N_HEADS]) {
         let domain = case.domain as usize;
-        for head in 0..N_HEADS {
+        for (head, probabilities) in predicted.iter().enumerate() {
             let Some(measured) = case.measured[head] else { continue };
-            let cdf = Cdf::of(&predicted[head]);
+            let cdf = Cdf::of(probabilities);
             let error = cdf.emd2(measured);
             self.errors[domain][head].add(error);
             self.by_unevenness[case.unevenness_bin][head].add(error);

@@ -6,7 +6,7 @@ use scenarios::{RockFieldConfig, Split};
 use serde::Serialize;
 
 use super::LearningError;
-use crate::collection::{self, Collection, HeightScale, Place, collect, find_height_scale};
+use crate::collection::{self, Collection, HeightScale, Place, ScaleRound, collect, find_height_scale};
 
 /// Which testbed to drive.
 #[derive(Clone, Debug)]
@@ -72,6 +72,8 @@ pub struct TestbedReport {
     pub n_trials: u32,
     /// What all heights of the test maps are multiplied by.
     pub test_height_scale: f64,
+    /// Height scales that were driven to find it.
+    pub height_scale_rounds: Vec<ScaleRound>,
     /// Share of the test footprints that are out of distribution.
     pub share_out_of_distribution: f64,
     /// Up to here an example is in distribution [m].
@@ -114,8 +116,10 @@ impl Testbed {
         let part = |stage: Stage, asked: collection::Request| -> Result<Dataset, LearningError> {
             on_stage(stage);
             let collected = collect(&asked, on_trial);
-            let collected =
-                collected.map_err(|source| LearningError::Collection { which: stage.name(), source });
+            let collected = collected.map_err(|source| LearningError::Collection {
+                which: stage.name(),
+                source: Box::new(source),
+            });
             collected.map(|Collection { dataset, .. }| dataset)
         };
         let mut training = part(Stage::Training, request.of(Split::Train))?;
@@ -123,7 +127,10 @@ impl Testbed {
         on_stage(Stage::HeightScale);
         let height_scale =
             find_height_scale(&training, &request.of(Split::Test), SHARE_OUT_OF_DISTRIBUTION, SCALES_TRIED)
-                .map_err(|source| LearningError::Collection { which: Stage::HeightScale.name(), source })?;
+                .map_err(|source| LearningError::Collection {
+                which: Stage::HeightScale.name(),
+                source: Box::new(source),
+            })?;
         let mut request = request.clone();
         request.field.test_height_scale = height_scale.scale;
         let test = part(Stage::Test, request.of(Split::Test))?;
@@ -155,6 +162,7 @@ impl Testbed {
             n_maps: self.request.n_maps,
             n_trials: self.request.n_trials,
             test_height_scale: self.height_scale.scale,
+            height_scale_rounds: self.height_scale.rounds.clone(),
             share_out_of_distribution: 1.0 - n_test_in_distribution as f64 / n_test as f64,
             unevenness_max_m: self.unevenness_max_m,
             n_training: self.training.examples.len(),

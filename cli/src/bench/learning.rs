@@ -1,4 +1,5 @@
 //! `surefoot bench learning`: what was learned, judged on ground unlike that of the training.
+#![allow(clippy::disallowed_methods, reason = "people are told how long the benchmark takes")]
 
 mod html;
 mod progress;
@@ -102,12 +103,15 @@ fn train(testbed: &Testbed, plan: &Plan, n_threads: usize) -> Result<(Vec<Traine
 
 /// Too few maps or trials for anything to be learnt are the user's choice, as is an interruption; all else is not.
 fn told_error(error: LearningError) -> anyhow::Error {
-    match error {
-        LearningError::Drives { .. }
-        | LearningError::Data { .. }
-        | LearningError::Training { source: TrainError::Data { .. } | TrainError::OneClass { .. }, .. } => {
-            UsageError::from_input(error).into()
+    let is_too_little = match &error {
+        LearningError::Drives { .. } | LearningError::Data { .. } => true,
+        LearningError::Training { source, .. } => {
+            matches!(source.as_ref(), TrainError::Data { .. } | TrainError::OneClass { .. })
         }
+        _ => false,
+    };
+    match error {
+        little if is_too_little => UsageError::from_input(little).into(),
         LearningError::Interrupted => WorkFailed(error.to_string()).into(),
         other => other.into(),
     }

@@ -1,4 +1,5 @@
 //! How far drives and trainings have come: a bar on a terminal, a line where there is none.
+#![allow(clippy::disallowed_methods, reason = "people are told how long the benchmark takes")]
 
 use std::io::IsTerminal;
 use std::sync::OnceLock;

@@ -15,11 +15,14 @@ const GAPS: [f64; 2] = [48.0, 92.0];
 /// Share of the transforms at the upper edge of a panel; taller steps are cut.
 const SHARE_MAX: f64 = 0.4;
 
+/// A row's report in one domain.
+type OfRow = fn(&Report, Row) -> &DomainReport;
+
 pub(super) fn draw(report: &Report, (x, y): Point, canvas: &mut Canvas) {
     let title =
         "Calibration: share of measurements in each tenth of the predicted distribution (0.1 if calibrated)";
     canvas.text((x - 62.0, y - 100.0), title, TextStyle::new(20, Anchor::Start).bold());
-    let domains: [(&str, fn(&Report, Row) -> &DomainReport); 2] = [
+    let domains: [(&str, OfRow); 2] = [
         ("in distribution", |report, row| &report.row(row).in_distribution),
         ("out of distribution", |report, row| &report.row(row).out_of_distribution),
     ];
