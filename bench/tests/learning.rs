@@ -3,8 +3,11 @@
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
 use bench::collection::HeightScale;
-use bench::learning::{Absurd, Ground, Plan, Report, Request, Row, Testbed, judge};
-use evidential::{Dataset, DatasetOrigin, Example, FeatureLayout, PARAMETER_BINS, Selections};
+use bench::learning::{Absurd, Chosen, Ground, Plan, Report, Request, Row, Testbed, judge};
+use evidential::{
+    Dataset, DatasetOrigin, Example, FeatureLayout, Method, PARAMETER_BINS, Selection, Selections, Settings,
+    fingerprint,
+};
 use scenarios::RockFieldConfig;
 use traversability::N_BINS;
 
@@ -111,4 +114,25 @@ fn interruption_leaves_no_tables() {
     let plan = Plan::new(&Selections::default(), 1, Some(3));
     let refused = plan.train(&testbed(), "here", 2, &|| true, &|_| ()).unwrap_err();
     assert_eq!(refused.to_string(), "interrupted before all trainings were done");
+}
+
+#[test]
+fn parameters_say_what_data_they_were_chosen_on() {
+    let testbed = testbed();
+    let selection = |method: Method| Selection {
+        settings: Settings::new(method, 1),
+        validation_emd2: [0.0; 4],
+        validation_total: 0.0,
+        validation_deviation: 0.0,
+        n_seeds: 1,
+    };
+    let chosen = |data: String| {
+        let selections = Method::ALL.map(selection).to_vec();
+        let plan = Plan::new(&Selections { data, selections, ..Selections::default() }, 1, Some(1));
+        let trained = plan.train(&testbed, "here", 2, &|| false, &|_| ()).unwrap();
+        judge(&testbed, &plan, &trained, 2).unwrap().chosen
+    };
+    assert_eq!(chosen(fingerprint(&testbed.training, &testbed.validation).unwrap()), Chosen::SearchHere);
+    assert_eq!(chosen("other".to_owned()), Chosen::SearchElsewhere);
+    assert_eq!(measured(1).chosen, Chosen::Defaults);
 }

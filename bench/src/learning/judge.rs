@@ -54,7 +54,7 @@ pub fn judge(
     let mut report = Report {
         testbed: testbed.report(),
         n_seeds: plan.n_seeds,
-        chosen: plan.chosen,
+        chosen: plan.chosen(testbed),
         settings: plan.settings_of_the_first_seed(),
         rows: Row::ALL.map(|row| row_report(row, &of_row(row), &reference)).into(),
         achievable: reference.achievable,

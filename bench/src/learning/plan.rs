@@ -2,7 +2,9 @@
 
 use std::ops::ControlFlow;
 
-use evidential::{Checkpoint, Dataset, Method, Selections, Settings, TrainError, TrainingEnd, train};
+use evidential::{
+    Checkpoint, Dataset, Method, Selections, Settings, TrainError, TrainingEnd, fingerprint, train,
+};
 use rayon::prelude::*;
 use serde::Serialize;
 
@@ -41,8 +43,10 @@ pub struct Trained {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Chosen {
-    /// A search on validation data, shipped with the program.
-    Search,
+    /// A search on the validation data of this testbed, shipped with the program.
+    SearchHere,
+    /// A search on other validation data, shipped with the program.
+    SearchElsewhere,
     /// No search has been shipped: the defaults.
     Defaults,
 }
@@ -54,8 +58,8 @@ pub struct Plan {
     pub trainings: Vec<Planned>,
     /// Seeds of each.
     pub n_seeds: u64,
-    /// Where the parameters come from.
-    pub chosen: Chosen,
+    /// [`fingerprint`] of the data that the parameters were searched on; `None` for defaults.
+    searched_on: Option<String>,
 }
 
 impl Plan {
@@ -63,12 +67,9 @@ impl Plan {
     /// best achievable error; `n_epochs` bounds the passes of both phases.
     pub fn new(selections: &Selections, n_seeds: u64, n_epochs: Option<usize>) -> Self {
         let is_selected = |method: &Method| selections.settings(*method, 1).is_some();
-        let chosen = if Method::ALL.iter().all(is_selected) { Chosen::Search } else { Chosen::Defaults };
+        let is_searched = Method::ALL.iter().all(is_selected);
         let settings = |method: Method, seed: u64| {
-            let selected = match chosen {
-                Chosen::Search => selections.settings(method, seed),
-                Chosen::Defaults => None,
-            };
+            let selected = if is_searched { selections.settings(method, seed) } else { None };
             bounded(selected.unwrap_or_else(|| Settings::new(method, seed)), n_epochs)
         };
         let of_seed = |seed: u64| {
@@ -77,7 +78,17 @@ impl Plan {
         };
         let trainings = (1..=n_seeds).flat_map(of_seed);
         let trainings = trainings.map(|(subject, settings)| Planned { subject, settings }).collect();
-        Self { trainings, n_seeds, chosen }
+        Self { trainings, n_seeds, searched_on: is_searched.then(|| selections.data.clone()) }
+    }
+
+    /// Where the parameters come from.
+    pub(super) fn chosen(&self, testbed: &Testbed) -> Chosen {
+        let Some(searched_on) = &self.searched_on else { return Chosen::Defaults };
+        // Data that cannot be written cannot have been searched on.
+        match fingerprint(&testbed.training, &testbed.validation) {
+            Ok(here) if here == *searched_on => Chosen::SearchHere,
+            _ => Chosen::SearchElsewhere,
+        }
     }
 
     /// Parameters of the methods.
@@ -172,7 +183,7 @@ mod tests {
     #[test]
     fn every_method_is_trained_with_every_seed_and_the_best_achievable_too() {
         let plan = Plan::new(&Selections::default(), 3, Some(4));
-        assert_eq!((plan.trainings.len(), plan.chosen), (3 * 7, Chosen::Defaults));
+        assert_eq!((plan.trainings.len(), &plan.searched_on), (3 * 7, &None));
         for planned in &plan.trainings {
             assert!((planned.settings.epochs_max, planned.settings.flow_epochs_max) == (4, 4));
         }
@@ -191,14 +202,17 @@ mod tests {
             validation_deviation: 0.0,
             n_seeds: 1,
         };
-        let mut selections =
-            Selections { selections: vec![selection(Method::Evora)], ..Selections::default() };
+        let mut selections = Selections {
+            selections: vec![selection(Method::Evora)],
+            data: "data".to_owned(),
+            ..Selections::default()
+        };
         let plan = Plan::new(&selections, 1, None);
-        assert_eq!(plan.chosen, Chosen::Defaults);
+        assert_eq!(plan.searched_on, None);
         assert!(plan.trainings.iter().all(|p| p.settings == Settings::new(p.settings.method, 1)));
         selections.selections = Method::ALL.map(selection).to_vec();
         let plan = Plan::new(&selections, 1, None);
-        assert_eq!(plan.chosen, Chosen::Search);
+        assert_eq!(plan.searched_on.as_deref(), Some("data"));
         assert!(plan.trainings.iter().all(|p| (p.settings.learning_rate, p.settings.seed) == (2e-4, 1)));
     }
 }

@@ -189,7 +189,8 @@ pub(super) fn settings(report: &Report) -> Table {
     };
     Table {
         title: match report.chosen {
-            Chosen::Search => "Parameters, chosen on validation data by the shipped search",
+            Chosen::SearchHere => "Parameters, chosen by the shipped search on these validation data",
+            Chosen::SearchElsewhere => "Parameters, chosen by the shipped search on other validation data",
             Chosen::Defaults => "Parameters: defaults, no search for every method was shipped",
         }
         .to_owned(),
