@@ -50,7 +50,7 @@ pub(super) fn draw_over_unevenness(report: &Report, frame: Rect, canvas: &mut Ca
     axes.draw_y_ticks(canvas);
     axes.draw_x_label(canvas, "standard deviation of elevation under the footprint [m]");
     axes.draw_y_label(canvas, "n / (n + n_prior) [-]");
-    draw_legend(&rows, (frame.right() - 300.0, frame.y + 30.0), canvas);
+    draw_legend(&rows, (frame.right() - 180.0, frame.y + 30.0), canvas);
 }
 
 /// Medians and what 90 % of the footprints have, on familiar and on absurd ground.
