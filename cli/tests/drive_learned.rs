@@ -58,7 +58,9 @@ fn ground_unlike_the_training_data_is_counted() {
         (density.min, density.max) = (1e9, 2e9);
     });
     drive(folder.path(), &[]);
-    assert!(summary(folder.path()).unfamiliar_share.unwrap() > 0.9);
+    let share = summary(folder.path()).unfamiliar_share.unwrap();
+    // All but the rim of what was seen, where footprints hang over the unknown: that is the physics prior's.
+    assert!(share > 0.8, "{share}");
 }
 
 /// Exit code 2 and one line that holds every part.
