@@ -1,4 +1,5 @@
 //! `surefoot collect`: what was asked, the drives or a recorded one, and the dataset with its summary and picture.
+#![allow(clippy::disallowed_methods, reason = "a person is told how long it took")]
 
 mod recorded;
 mod summary;
