@@ -123,7 +123,7 @@ fn traction_is_found_although_the_commands_lag() {
 
 #[test]
 fn responses_are_those_of_the_machine() {
-    let square = |t: f64| [if (t / 6.0) as u32 % 2 == 0 { 2.0 } else { 1.0 }, sine(t)[1]];
+    let square = |t: f64| [if ((t / 6.0) as u32).is_multiple_of(2) { 2.0 } else { 1.0 }, sine(t)[1]];
     let log = LAGGING.drive(40.0, square);
     let found = estimate_responses(&log, &GEOMETRY, &config()).unwrap();
     // Delay and lag blur into each other; their sum does not.
