@@ -24,9 +24,10 @@ pub use elevation::{
 };
 pub use overlay::overlay;
 pub use recording::{DriveRecorder, McapDriveLog, McapReadError, RecordError, read_drive_log_mcap};
+pub use refusal::ArrayFileError;
 pub use results::{OutputError, config_hash, prepare_out_dir, write_bytes_atomic, write_json_atomic};
-pub use scan::{ScanError, parse_scan_points, read_scan_points};
-pub use traction_map::{TractionMap, TractionMapError, TractionPmfs, parse_traction_map, read_traction_map};
+pub use scan::{parse_scan_points, read_scan_points};
+pub use traction_map::{TractionMap, TractionPmfs, parse_traction_map, read_traction_map};
 pub use vehicle::{
     parse_model, parse_vehicle, read_model, read_vehicle, shipped_vehicle_names, shipped_vehicle_text,
 };

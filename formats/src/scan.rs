@@ -4,54 +4,23 @@ use std::io::Cursor;
 use std::path::Path;
 
 use crate::numpy::{open, required};
-use crate::refusal::Refusal;
-
-/// A file of points that cannot be used. Every message is one line.
-#[derive(Debug, thiserror::Error)]
-pub enum ScanError {
-    /// The file could not be read.
-    #[error("{file}: expected a readable file, found: {source}")]
-    Unreadable {
-        /// Path as given.
-        file: String,
-        /// What the system said.
-        source: std::io::Error,
-    },
-    /// A part of the file is wrong.
-    #[error("{file}: {field}: expected {expected}, found {found}")]
-    Field {
-        /// Path as given.
-        file: String,
-        /// The array.
-        field: String,
-        /// What would do.
-        expected: String,
-        /// What was there.
-        found: String,
-    },
-}
+use crate::refusal::{ArrayFileError, Refusal};
 
 /// Reads the points of a file [m]. Some may be no numbers, as sensors give them; whoever maps them drops these.
 ///
 /// # Errors
 /// Unreadable file, and all that [`parse_scan_points`] refuses.
-pub fn read_scan_points(path: &Path) -> Result<Vec<[f32; 3]>, ScanError> {
-    let file = path.display().to_string();
-    let bytes = std::fs::read(path).map_err(|source| ScanError::Unreadable { file: file.clone(), source })?;
-    parse_scan_points(&file, &bytes)
+pub fn read_scan_points(path: &Path) -> Result<Vec<[f32; 3]>, ArrayFileError> {
+    let (name, bytes) = ArrayFileError::read(path)?;
+    parse_scan_points(&name, &bytes)
 }
 
 /// Reads points from a file's bytes; `name` is how errors call it.
 ///
 /// # Errors
 /// Truncated archive, no array `xyz` or one of another shape or type, no point.
-pub fn parse_scan_points(name: &str, bytes: &[u8]) -> Result<Vec<[f32; 3]>, ScanError> {
-    parse(bytes).map_err(|Refusal { field, expected, found }| ScanError::Field {
-        file: name.to_owned(),
-        field,
-        expected,
-        found,
-    })
+pub fn parse_scan_points(name: &str, bytes: &[u8]) -> Result<Vec<[f32; 3]>, ArrayFileError> {
+    parse(bytes).map_err(|refusal| ArrayFileError::refused(name, refusal))
 }
 
 fn parse(bytes: &[u8]) -> Result<Vec<[f32; 3]>, Refusal> {

@@ -13,7 +13,7 @@ use traversability::{Bins, N_BINS, Pmf};
 use zip::ZipArchive;
 
 use crate::numpy::{open, read_cell_m, required};
-use crate::refusal::Refusal;
+use crate::refusal::{ArrayFileError, Refusal};
 
 /// How far the sum of twelve probabilities kept in half precision may lie from one; it is normalised away.
 const SUM_TOLERANCE: f32 = 0.01;
@@ -63,39 +63,12 @@ pub struct TractionPmfs {
     pub angular: GridMap<Pmf>,
 }
 
-/// A traction map that cannot be used. Every message is one line.
-#[derive(Debug, thiserror::Error)]
-pub enum TractionMapError {
-    /// The file could not be read.
-    #[error("{file}: expected a readable file, found: {source}")]
-    Unreadable {
-        /// Path as given.
-        file: String,
-        /// What the system said.
-        source: std::io::Error,
-    },
-    /// A part of the file is wrong.
-    #[error("{file}: {field}: expected {expected}, found {found}")]
-    Field {
-        /// Path as given.
-        file: String,
-        /// The array.
-        field: String,
-        /// What would do.
-        expected: String,
-        /// What was there.
-        found: String,
-    },
-}
-
 /// Reads a traction map from a file.
 ///
 /// # Errors
 /// Unreadable file, and all that [`parse_traction_map`] refuses.
-pub fn read_traction_map(path: &Path) -> Result<TractionMap, TractionMapError> {
-    let name = path.display().to_string();
-    let bytes =
-        std::fs::read(path).map_err(|source| TractionMapError::Unreadable { file: name.clone(), source })?;
+pub fn read_traction_map(path: &Path) -> Result<TractionMap, ArrayFileError> {
+    let (name, bytes) = ArrayFileError::read(path)?;
     parse_traction_map(&name, &bytes)
 }
 
@@ -104,13 +77,8 @@ pub fn read_traction_map(path: &Path) -> Result<TractionMap, TractionMapError> {
 /// # Errors
 /// Truncated archive, missing array, wrong shape or type, other bins than [`Bins::TRACTION`], cell size that is not
 /// > 0, no known cell, and in known cells: a height or density that is not finite, a distribution that is none.
-pub fn parse_traction_map(name: &str, bytes: &[u8]) -> Result<TractionMap, TractionMapError> {
-    parse(bytes).map_err(|Refusal { field, expected, found }| TractionMapError::Field {
-        file: name.to_owned(),
-        field,
-        expected,
-        found,
-    })
+pub fn parse_traction_map(name: &str, bytes: &[u8]) -> Result<TractionMap, ArrayFileError> {
+    parse(bytes).map_err(|refusal| ArrayFileError::refused(name, refusal))
 }
 
 fn parse(bytes: &[u8]) -> Result<TractionMap, Refusal> {

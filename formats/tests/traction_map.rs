@@ -5,7 +5,7 @@
 use std::io::Cursor;
 use std::path::Path;
 
-use formats::{TractionMap, TractionMapError, parse_traction_map, read_traction_map};
+use formats::{ArrayFileError, TractionMap, parse_traction_map, read_traction_map};
 use ndarray::{Array2, Array3, ShapeBuilder, arr0, arr1, arr2};
 use ndarray_npy::NpzWriter;
 use proptest::prelude::*;
@@ -156,7 +156,7 @@ fn a_truncated_file_is_refused_at_every_length() {
     let bytes = Draft::new().bytes();
     for length in (0..bytes.len()).step_by(7) {
         let told = parse_traction_map("m.npz", &bytes[..length]).unwrap_err();
-        assert!(matches!(told, TractionMapError::Field { .. }), "{length}: {told}");
+        assert!(matches!(told, ArrayFileError::Field { .. }), "{length}: {told}");
     }
 }
 

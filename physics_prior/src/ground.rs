@@ -4,7 +4,7 @@
 use std::ops::Range;
 
 use rayon::prelude::*;
-use terrain::{Cell, GridGeometry, GridMap, SurfaceCell, TerrainClass};
+use terrain::{GridGeometry, GridMap, SurfaceCell, TerrainClass};
 
 use crate::ball::Ball;
 use crate::lengths::Lengths;
@@ -283,10 +283,7 @@ fn baseline(lengths: &Lengths, resolution_m: f64) -> i64 {
 
 /// The surface by lattice indices, unknown beyond its window.
 fn cell_at(surface: &GridMap<SurfaceCell>, lattice: [i64; 2]) -> &SurfaceCell {
-    let geometry = surface.geometry();
-    let [col, row] = [0, 1].map(|axis| lattice[axis] - geometry.origin[axis]);
-    let inside = (0..geometry.n_cols as i64).contains(&col) && (0..geometry.n_rows as i64).contains(&row);
-    if inside { &surface[Cell { row: row as usize, col: col as usize }] } else { &SurfaceCell::UNKNOWN }
+    surface.at_lattice(lattice).unwrap_or(&SurfaceCell::UNKNOWN)
 }
 
 /// The surface on which wheels stand.

@@ -1,6 +1,6 @@
 //! All poses of a risk map over the ground below.
 
-use terrain::{Cell, GridGeometry, GridMap, SurfaceCell, TerrainClass};
+use terrain::{GridGeometry, GridMap, SurfaceCell, TerrainClass};
 use traversability::{Ground, GroundFlags, Risk};
 
 use crate::PriorBelief;
@@ -154,7 +154,7 @@ impl Poses {
         for row in rows {
             for col in cols.clone() {
                 let contact = &self.ground.contacts()[self.ground.index([col, row])];
-                tally.add(contact, cell_at(surface, [col, row]));
+                tally.add(contact, surface.at_lattice([col, row]));
             }
         }
         tally.ground()
@@ -201,13 +201,6 @@ impl pulp::WithSimd for YawPriors<'_> {
             *prior = poses.pose_prior(self.physics, &Placed { ground: &poses.ground, stencil, base });
         }
     }
-}
-
-fn cell_at(surface: &GridMap<SurfaceCell>, lattice: [i64; 2]) -> Option<&SurfaceCell> {
-    let geometry = surface.geometry();
-    let col = usize::try_from(lattice[0] - geometry.origin[0]).ok().filter(|&col| col < geometry.n_cols)?;
-    let row = usize::try_from(lattice[1] - geometry.origin[1]).ok().filter(|&row| row < geometry.n_rows)?;
-    Some(&surface[Cell { row, col }])
 }
 
 /// Surface cells of one risk cell, added up.
@@ -280,6 +273,7 @@ fn window(risk: &GridGeometry, ratio: Ratio, reach: Reach, resolution_m: f64) ->
 mod tests {
     use bicycle::Geometry;
     use pulp::WithSimd;
+    use terrain::Cell;
 
     use super::*;
     use crate::PriorConfig;

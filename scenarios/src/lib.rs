@@ -29,6 +29,7 @@ pub use layers::{LayerConfig, LayersError, WorldLayers, world_from_layers};
 pub use motion::Motion;
 pub use pair::{End, Pair, PairError, PairWish, check_pair, feasible_pair};
 pub use plant::{CommandError, Plant, PlantError, WheelState};
+pub use random::stream;
 pub use rock_field::{
     MAPS_PER_SPLIT, RockFieldConfig, RockFieldError, RockMap, RockPopulation, Split, rock_field,
 };

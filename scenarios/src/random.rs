@@ -4,8 +4,8 @@ use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-/// The generator that belongs to `seed` and `key`.
-pub(crate) fn stream(seed: u64, key: &[u64]) -> Xoshiro256PlusPlus {
+/// The generator that belongs to `seed` and `key`, whatever else was drawn.
+pub fn stream(seed: u64, key: &[u64]) -> Xoshiro256PlusPlus {
     Xoshiro256PlusPlus::seed_from_u64(key.iter().fold(mixed(seed), |state, word| mixed(state ^ mixed(*word))))
 }
 

@@ -129,6 +129,14 @@ impl<T> GridMap<T> {
         &mut self.values
     }
 
+    /// The value of a cell of the global lattice, given as column and row; `None` outside the window.
+    pub fn at_lattice(&self, lattice: [i64; 2]) -> Option<&T> {
+        let [col, row] = [0, 1].map(|axis| usize::try_from(lattice[axis] - self.geometry.origin[axis]).ok());
+        let col = col.filter(|&col| col < self.geometry.n_cols)?;
+        let row = row.filter(|&row| row < self.geometry.n_rows)?;
+        Some(&self[Cell { row, col }])
+    }
+
     /// The value under a point of the map frame.
     pub fn at(&self, x_m: f64, y_m: f64) -> Option<&T> {
         self.geometry.cell_at(x_m, y_m).map(|cell| &self[cell])
@@ -165,6 +173,18 @@ mod tests {
             [geometry.origin[0] + cell.col as i64, geometry.origin[1] + cell.row as i64]
         };
         GridMap::from_values(geometry, (0..geometry.n_cells()).map(label).collect()).unwrap()
+    }
+
+    #[test]
+    fn lattice_cells_are_found_inside_the_window_and_nowhere_else() {
+        let geometry = GridGeometry { resolution_m: 0.5, origin: [-3, 7], n_rows: 2, n_cols: 4 };
+        let map = GridMap::from_values(geometry, (0..8).collect()).unwrap();
+        // Column -3 + 2, row 7 + 1: the third of the second row.
+        assert_eq!(map.at_lattice([-1, 8]), Some(&6));
+        assert_eq!((map.at_lattice([-3, 7]), map.at_lattice([0, 8])), (Some(&0), Some(&7)));
+        for outside in [[-4, 7], [1, 7], [-3, 6], [-3, 9]] {
+            assert_eq!(map.at_lattice(outside), None, "{outside:?}");
+        }
     }
 
     #[test]

@@ -2,10 +2,10 @@
 
 use std::fmt;
 
-use rand::{RngExt, SeedableRng};
-use rand_xoshiro::Xoshiro256PlusPlus;
+use rand::RngExt;
 use scenarios::{
     ArenaConfig, ArenaError, RockFieldConfig, RockFieldError, RockMap, Split, World, arena, rock_field,
+    stream,
 };
 
 /// A family of worlds.
@@ -66,17 +66,4 @@ impl fmt::Display for Place {
             Self::Arena { split } => write!(formatter, "arena, {split:?}"),
         }
     }
-}
-
-/// The generator that belongs to a seed and a key, whatever else was drawn.
-pub(super) fn stream(seed: u64, key: &[u64]) -> Xoshiro256PlusPlus {
-    // The finaliser of SplitMix64: every input bit flips half of the output bits.
-    let mixed = |word: u64| {
-        let word = word.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let word = (word ^ (word >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        let word = (word ^ (word >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        word ^ (word >> 31)
-    };
-    let seed = key.iter().fold(mixed(seed), |state, word| mixed(state ^ mixed(*word)));
-    Xoshiro256PlusPlus::seed_from_u64(seed)
 }

@@ -7,10 +7,11 @@ use bicycle::{Column, Command, Decision, DriveRow, Odometry, Vehicle};
 use evidential::{Example, Label, Surveyor};
 use navigator::Config;
 use rand::{Rng, RngExt};
-use scenarios::{Bounds, Episode, EpisodeConfig, Outcome, RangeSensorConfig, Split, Task, Truth, World};
+use scenarios::{
+    Bounds, Episode, EpisodeConfig, Outcome, RangeSensorConfig, Split, Task, Truth, World, stream,
+};
 use terrain::{AssumedGround, ElevationMap, Footprint, GridMap, Pose, SurfaceCell};
 
-use super::place::stream;
 use super::{CollectionError, Place, Request, Trial};
 use crate::closed_loop::MapSource;
 

@@ -1,7 +1,7 @@
 //! The surface as networks read it: layers of plain numbers, padded so that no patch needs a bounds check.
 
 use physics_prior::Ratio;
-use terrain::{Cell, GridGeometry, GridMap, SurfaceCell, TerrainClass};
+use terrain::{GridGeometry, GridMap, SurfaceCell, TerrainClass};
 
 /// Lanes that are read at a time: a read may go so far beyond the last cell of a row.
 pub(super) const SPAN: usize = 16;
@@ -112,8 +112,5 @@ impl PatchGround {
 }
 
 fn cell_at(surface: &GridMap<SurfaceCell>, lattice: [i64; 2]) -> &SurfaceCell {
-    let geometry = surface.geometry();
-    let [col, row] = [0, 1].map(|axis| lattice[axis] - geometry.origin[axis]);
-    let inside = (0..geometry.n_cols as i64).contains(&col) && (0..geometry.n_rows as i64).contains(&row);
-    if inside { &surface[Cell { row: row as usize, col: col as usize }] } else { &SurfaceCell::UNKNOWN }
+    surface.at_lattice(lattice).unwrap_or(&SurfaceCell::UNKNOWN)
 }
