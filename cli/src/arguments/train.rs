@@ -81,6 +81,11 @@ pub struct TrainArguments {
     #[arg(long, value_name = "N", value_parser = batch, allow_hyphen_values = true, help_heading = "Parameters")]
     pub batch: Option<usize>,
 
+    /// Widths of the encoder's hidden layers, separated by commas [default: what the shipped sweep was run with]
+    #[arg(long, value_name = "W,..", value_parser = width, value_delimiter = ',', allow_hyphen_values = true,
+          help_heading = "Parameters")]
+    pub hidden: Vec<usize>,
+
     /// Width of the latent
     #[arg(long, value_name = "N", value_parser = width, allow_hyphen_values = true, help_heading = "Parameters")]
     pub latent: Option<usize>,
@@ -125,6 +130,7 @@ impl TrainArguments {
             epochs_max: self.epochs.unwrap_or(usual.epochs_max),
             patience: self.patience.unwrap_or(usual.patience),
             batch: self.batch.unwrap_or(usual.batch),
+            encoder_hidden: if self.hidden.is_empty() { usual.encoder_hidden } else { self.hidden.clone() },
             n_latent: self.latent.unwrap_or(usual.n_latent),
             ..usual
         }
@@ -257,6 +263,7 @@ mod tests {
             ("--unevenness-percentile", "0"),
             ("--unevenness-max", "-0.1"),
             ("--latent", "5000"),
+            ("--hidden", "32,0"),
         ] {
             assert!(parse(&[option, value]).unwrap_err().contains("expected"), "{option}");
         }
