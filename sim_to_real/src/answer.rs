@@ -1,0 +1,139 @@
+//! The answer of a diagnosis, as it stands in files.
+
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// What a diagnosis concludes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Verdict {
+    /// Nothing beyond what separates one nominal drive from another.
+    None,
+    /// The announced effects explain the gap.
+    Effects,
+    /// The announced effects explain a part; the rest is none of the catalogue.
+    EffectsAndUnknown,
+    /// There is a gap and nothing of the catalogue explains it.
+    Unknown,
+}
+
+/// A value with its 90 % interval.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Estimate {
+    /// Best value, in the unit that the parameter's name ends in.
+    pub value: f64,
+    /// Lower end.
+    pub low: f64,
+    /// Upper end.
+    pub high: f64,
+}
+
+/// An announced effect.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct NamedEffect {
+    /// Id of the catalogue.
+    pub id: String,
+    /// Parameters by name.
+    pub parameters: BTreeMap<String, Estimate>,
+}
+
+/// An effect with the probability that it is the cause.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Ranked {
+    /// Id of the catalogue.
+    pub id: String,
+    /// Probability in [0, 1].
+    pub score: f64,
+}
+
+/// A condition under which a residual may stand out.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Condition {
+    /// Forward speed.
+    Speed,
+    /// Commanded steering angle.
+    Steering,
+    /// How fast the commanded steering changed of late.
+    SteeringChange,
+    /// How fast the commanded speed changed of late.
+    SpeedChange,
+    /// Speed times yaw rate.
+    LateralAcceleration,
+    /// Pitch of the ground.
+    Pitch,
+    /// Roll of the ground.
+    Roll,
+    /// Class of the terrain.
+    TerrainClass,
+    /// Yaw.
+    Heading,
+    /// The same everywhere.
+    Constant,
+}
+
+/// How much of the residual a condition explains.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Place {
+    /// Condition.
+    pub condition: Condition,
+    /// Share of the squared normalised residual's variance that bins of this condition explain, less what they
+    /// explain in the null [-].
+    pub share: f64,
+}
+
+/// Before and after.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct BeforeAfter {
+    /// Under the calibrated nominal model.
+    pub before: f64,
+    /// With the announced effects.
+    pub after: f64,
+}
+
+/// How far the gap shrinks.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Shrink {
+    /// What is measured.
+    pub metric: String,
+    /// Calibrated nominal model on the held-out drives; absent until they are opened.
+    pub before: Option<f64>,
+    /// With the announced effects on the held-out drives.
+    pub after: Option<f64>,
+    /// Calibrated nominal model on nominal drives it was not calibrated on.
+    pub floor: f64,
+    /// (before - after) / (before - floor); absent where before < 1.2 floor.
+    pub closed: Option<f64>,
+    /// Lower end of the 90 % interval of `closed`.
+    pub closed_low: Option<f64>,
+    /// Upper end of the 90 % interval of `closed`.
+    pub closed_high: Option<f64>,
+    /// `closed` as cross-validation on the real drives predicts it, before the held-out drives are opened.
+    pub predicted_closed: Option<f64>,
+    /// What a flexible learned residual would close; the most that any model could.
+    pub learned_bound_closed: Option<f64>,
+    /// Position error after 2 s [m].
+    pub position_error_2s_m: Option<BeforeAfter>,
+}
+
+/// The whole answer; the JSON file of a diagnosis.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Answer {
+    /// Name of the case.
+    pub case: String,
+    /// Conclusion.
+    pub verdict: Verdict,
+    /// Announced effects, strongest first.
+    pub effects: Vec<NamedEffect>,
+    /// Every effect with its probability, best first.
+    pub ranking: Vec<Ranked>,
+    /// Single explanations that the data cannot tell apart.
+    pub credible_set: Vec<String>,
+    /// Where the residual lies, strongest first.
+    #[serde(rename = "where")]
+    pub places: Vec<Place>,
+    /// How far the gap shrinks.
+    pub shrink: Shrink,
+    /// What to do next, in sentences.
+    pub advice: Vec<String>,
+}

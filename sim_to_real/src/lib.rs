@@ -1,0 +1,7 @@
+//! Why simulator and robot disagree: where the gap lies, which unmodelled effect causes it, how far it shrinks.
+
+mod answer;
+mod machine;
+
+pub use answer::{Answer, BeforeAfter, Condition, Estimate, NamedEffect, Place, Ranked, Shrink, Verdict};
+pub use machine::{GroundMap, Machine, SensorNoise};
