@@ -6,6 +6,7 @@
 mod config;
 mod drive_log_csv;
 mod elevation;
+mod gap_case;
 mod numpy;
 mod overlay;
 mod recording;
@@ -21,6 +22,10 @@ pub use drive_log_csv::{
 };
 pub use elevation::{
     ElevationError, ElevationFile, ElevationLayers, PngScale, read_elevation, read_elevation_png,
+};
+pub use gap_case::{
+    DriveFileError, GapCase, GapGround, GapKind, GapLabel, GapNoise, GapVehicle, GapVehicleError, ReadDrive,
+    parse_gap_labels, read_drive, read_gap_case, read_gap_labels, read_gap_vehicle,
 };
 pub use overlay::overlay;
 pub use recording::{DriveRecorder, McapDriveLog, McapReadError, RecordError, read_drive_log_mcap};

@@ -65,10 +65,6 @@ pub fn parse_model(text: &ConfigText) -> Result<Model, ConfigError> {
             let field = format!("effects[{}].{parameter}", place(id));
             Err(text.refuse(&field, format_args!("{low} to {high} {unit}"), found))
         }
-        Err(ModelError::Repeated { id }) => {
-            let field = format!("effects[{}].id", place(id));
-            Err(text.refuse(&field, "each effect once", format_args!("{id} twice")))
-        }
     }
 }
 
@@ -245,10 +241,6 @@ mod tests {
         assert_eq!(
             refuse(&format!("{lag}-0.5")),
             "3: effects[0].time_constant_s: expected 0 to 2 s, found -0.5"
-        );
-        assert_eq!(
-            refuse(&format!("{lag}0.5\n{lag}0.25")),
-            "5: effects[1].id: expected each effect once, found speed_lag twice"
         );
         assert_eq!(
             refuse("[[effects]]\nid = \"warp\"").split(", ").next(),

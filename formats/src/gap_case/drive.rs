@@ -1,0 +1,80 @@
+//! A drive by the ending of its file: CSV, or a recording of our own.
+
+use std::path::Path;
+
+use bicycle::DriveLog;
+
+use crate::{DriveLogFileError, McapReadError, read_drive_log_csv, read_drive_log_mcap};
+
+/// A drive and what is to be said of its file.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ReadDrive {
+    /// The drive.
+    pub log: DriveLog,
+    /// Where and why a recording breaks off; `None` when it is complete.
+    pub ended_early: Option<String>,
+}
+
+/// A drive that cannot be read. Every message is one line.
+#[derive(Debug, thiserror::Error)]
+pub enum DriveFileError {
+    /// Not a file of a known kind.
+    #[error("{file}: expected a drive in a file ending in .csv or .mcap, found another ending")]
+    Ending {
+        /// Path as given.
+        file: String,
+    },
+    /// The CSV is wrong.
+    #[error(transparent)]
+    Csv(#[from] DriveLogFileError),
+    /// The recording is wrong.
+    #[error(transparent)]
+    Mcap(#[from] McapReadError),
+}
+
+/// Reads a drive from a CSV file or from a recording, whichever the file's ending says.
+///
+/// Errors: another ending; as [`read_drive_log_csv`] and [`read_drive_log_mcap`].
+pub fn read_drive(path: &Path) -> Result<ReadDrive, DriveFileError> {
+    let ending = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
+    match ending.as_str() {
+        "csv" => Ok(ReadDrive { log: read_drive_log_csv(path)?.log, ended_early: None }),
+        "mcap" => {
+            let read = read_drive_log_mcap(path)?;
+            Ok(ReadDrive { log: read.log, ended_early: read.ended_early })
+        }
+        _ => Err(DriveFileError::Ending { file: path.display().to_string() }),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_ending_decides_and_others_are_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("drive.CSV");
+        std::fs::write(&path, "t,vx\n0,1\n0.1,2\n").unwrap();
+        assert_eq!(read_drive(&path).unwrap().log.n_rows(), 2);
+        let told = read_drive(Path::new("drive.txt")).unwrap_err().to_string();
+        assert_eq!(
+            told,
+            "drive.txt: expected a drive in a file ending in .csv or .mcap, found another ending"
+        );
+        std::fs::rename(&path, folder.path().join("drive.mcap")).unwrap();
+        assert!(matches!(read_drive(&folder.path().join("drive.mcap")), Err(DriveFileError::Mcap(_))));
+    }
+
+    #[test]
+    fn a_clock_that_runs_backwards_is_refused_with_its_line() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("d.csv");
+        std::fs::write(&path, "t,vx\n0,1\n0.1,2\n0.05,2\n").unwrap();
+        let told = read_drive(&path).unwrap_err().to_string();
+        assert!(
+            told.ends_with("d.csv:4: t: expected a time > 0.1 s, the row before it in run '', found 0.05"),
+            "{told}"
+        );
+    }
+}
