@@ -11,7 +11,7 @@ mod vehicle;
 
 pub use decision::{Decision, HoldReason, StopReason};
 pub use drive_log::{Column, DriveLog, DriveLogError, DriveRow, Run};
-pub use effect::Effect;
+pub use effect::{Effect, SensorModel};
 pub use model::{GroundSample, LaneState, Model, ModelError, Rates, Stepper};
 pub use motion::{Command, ImuSample, Odometry, State};
 pub use vehicle::{

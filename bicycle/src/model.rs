@@ -1,6 +1,6 @@
 //! The kinematic bicycle on ground that takes a share of every motion (PIETRA, equation 2).
 
-use crate::effect::{CommandStep, Effect, EffectError, MotionStep, PreparedEffects};
+use crate::effect::{CommandStep, Driving, Effect, EffectError, Moving, PreparedEffects};
 use crate::lanes::{Constant, Lanes, Real, STEERING_DOMAIN_RAD, Scalar};
 use crate::{Command, Limits, State, Vehicle};
 use serde::{Deserialize, Serialize};
@@ -33,7 +33,7 @@ pub struct Model {
     pub wheelbase_m: f64,
     /// What the vehicle can or may do.
     pub limits: Limits,
-    /// What the kinematic bicycle leaves out; at most one of each id.
+    /// What the kinematic bicycle leaves out, in order of action.
     #[serde(default)]
     pub effects: Vec<Effect>,
 }
@@ -54,12 +54,6 @@ pub enum ModelError {
     /// A parameter of an effect is out of range.
     #[error(transparent)]
     Effect(#[from] EffectError),
-    /// An effect is listed twice.
-    #[error("effects: expected each effect once, found {id} twice")]
-    Repeated {
-        /// Which effect.
-        id: &'static str,
-    },
 }
 
 impl Model {
@@ -86,10 +80,7 @@ impl Model {
         check(&reverse, "a finite number >= 0", |value| value >= 0.0)?;
         let steering = [("limits.steering_max_rad", limits.steering_max_rad)];
         check(&steering, "an angle of at most 0.8 rad", |value| value <= STEERING_DOMAIN_RAD)?;
-        self.effects.iter().try_for_each(Effect::validate)?;
-        let id = |i: usize| self.effects[i].description().id;
-        let repeated = (0..self.effects.len()).find(|&i| (0..i).any(|j| id(j) == id(i)));
-        repeated.map_or(Ok(()), |i| Err(ModelError::Repeated { id: id(i) }))
+        Ok(self.effects.iter().try_for_each(Effect::validate)?)
     }
 }
 
@@ -137,7 +128,8 @@ pub struct Stepper {
     speed_change: Constant,
     steering_change: Constant,
     steering_domain: Constant,
-    step_s: f64,
+    step: Constant,
+    per_step: Constant,
     effects: PreparedEffects,
 }
 
@@ -151,14 +143,15 @@ impl Stepper {
             speed_change: Constant::new(model.limits.acceleration_max_mps2 * step_s),
             steering_change: Constant::new(model.limits.steering_rate_max_radps * step_s),
             steering_domain: Constant::new(STEERING_DOMAIN_RAD),
-            step_s,
+            step: Constant::new(step_s),
+            per_step: Constant::new(1.0 / step_s),
             effects: PreparedEffects::new(&model.effects, step_s),
         }
     }
 
     /// Changes the unit of length.
     pub fn rescale(&mut self, unit_m: f64) {
-        self.advance = Constant::new(self.step_s / unit_m);
+        self.advance = Constant::new(self.step.value() / unit_m);
     }
 
     /// Without the limits on acceleration and steering rate.
@@ -183,10 +176,16 @@ impl Stepper {
         self.effects.n_slots()
     }
 
-    /// What the effects remember at the start, given the command in force `age_s` before;
-    /// `hold` takes slot and value.
-    pub fn recall(&self, past: &dyn Fn(f64) -> Command, hold: impl FnMut(usize, f64)) {
-        self.effects.recall(past, hold);
+    /// Fills the memory, [`Stepper::n_slots`] values, as the past leaves it: `past` gives the command that was in
+    /// force an age [s] before the start, up to three seconds.
+    pub fn recall(&self, past: &dyn Fn(f64) -> Command, memory: &mut [f64]) {
+        self.effects.recall(past, memory);
+    }
+
+    /// Fills the memory as a command leaves it that was in force for long.
+    pub fn settle(&self, command: Command, memory: &mut [f64]) {
+        let command = [f64::from(command.speed_mps), f64::from(command.steering_rad)];
+        self.effects.settle(command, memory);
     }
 
     /// One step with actuators that follow at once; exact when the model has no effects and the commands keep
@@ -211,8 +210,9 @@ impl Stepper {
         Rates { speed, yaw_rate }
     }
 
-    /// One step of the whole model: effects on the command, limits of acceleration and steering rate, effects
-    /// on the motion, traction. `memory` holds [`Stepper::n_slots`] values, `step` counts from the start.
+    /// One step of the whole model: effects on the command, limits of acceleration and steering rate, effects on
+    /// the acceleration and on the motion, traction. `memory` holds [`Stepper::n_slots`] values, `step` counts
+    /// from the start.
     #[inline(always)]
     pub fn step<L: Lanes>(
         &self,
@@ -222,18 +222,60 @@ impl Stepper {
         memory: &mut [L::Value],
         step: usize,
     ) -> Rates<L> {
-        self.actuate(state, command, memory, step);
+        let asked = self.asked(command, memory, step);
+        self.follow(state, asked, ground)
+    }
+
+    /// The first half of a step: what the command asks of the actuators once the effects on it have acted.
+    #[inline(always)]
+    pub fn asked<L: Lanes>(
+        &self,
+        command: [Real<L>; 2],
+        memory: &mut [L::Value],
+        step: usize,
+    ) -> [Real<L>; 2] {
+        let [speed, steering] = command;
+        let mut asked = CommandStep { speed, steering, step };
+        self.effects.on_command(memory, &mut asked);
+        [asked.speed, asked.steering]
+    }
+
+    /// The second half of a step: the actuators follow what is asked of them, and the body moves.
+    #[inline(always)]
+    pub fn follow<L: Lanes>(
+        &self,
+        state: &mut LaneState<L>,
+        asked: [Real<L>; 2],
+        ground: &GroundSample<Real<L>>,
+    ) -> Rates<L> {
         let lanes = state.x.0;
+        let reached_speed = state.speed;
+        self.actuate(state, asked);
         let (sine, cosine) = state.turns.sin_cos_turns();
-        let yaw_rate = state.speed * Real::constant(lanes, self.per_wheelbase) * state.steering.tan();
-        let mut motion = MotionStep {
-            rates: [state.speed, lanes.real(0.0), yaw_rate],
-            steering: state.steering,
-            heading: [sine, cosine],
-            ground: *ground,
-        };
-        self.effects.on_motion(memory, &mut motion);
-        let [forward, lateral, yaw_rate] = motion.rates;
+        let tangent = state.steering.tan();
+        let per_wheelbase = Real::constant(lanes, self.per_wheelbase);
+        let mut side_acceleration = lanes.real(0.0);
+        if self.effects.drive() {
+            let mut driving = Driving {
+                acceleration: (state.speed - reached_speed) * Real::constant(lanes, self.per_step),
+                side_acceleration,
+                asked_speed: asked[0],
+                speed: reached_speed,
+                steering_tangent: tangent,
+                yaw_rate: reached_speed * per_wheelbase * tangent,
+                heading: [sine, cosine],
+                ground: *ground,
+            };
+            self.effects.on_drive(&mut driving);
+            let step = Real::constant(lanes, self.step);
+            state.speed = driving.acceleration.mul_add(step, reached_speed);
+            side_acceleration = driving.side_acceleration;
+        }
+        let yaw_rate = state.speed * per_wheelbase * tangent;
+        let mut moving =
+            Moving { forward: state.speed, lateral: lanes.real(0.0), yaw_rate, side_acceleration };
+        self.effects.on_motion(&mut moving);
+        let Moving { forward, lateral, yaw_rate, .. } = moving;
         let share = ground.linear_traction * Real::constant(lanes, self.advance);
         let (forward_step, lateral_step) = (forward * share, lateral * share);
         state.x = forward_step.mul_add(cosine, state.x) - lateral_step * sine;
@@ -244,29 +286,15 @@ impl Stepper {
     }
 
     #[inline(always)]
-    fn actuate<L: Lanes>(
-        &self,
-        state: &mut LaneState<L>,
-        command: [Real<L>; 2],
-        memory: &mut [L::Value],
-        step: usize,
-    ) {
+    fn actuate<L: Lanes>(&self, state: &mut LaneState<L>, asked: [Real<L>; 2]) {
         let lanes = state.x.0;
-        let mut asked = CommandStep {
-            speed: command[0],
-            steering: command[1],
-            reached_speed: state.speed,
-            reached_steering: state.steering,
-            step,
-        };
-        self.effects.on_command(memory, &mut asked);
         let towards = |asked: Real<L>, reached: Real<L>, change: Constant| {
             let change = Real::constant(lanes, change);
             asked.clamp(reached - change, reached + change)
         };
-        state.speed = towards(asked.speed, state.speed, self.speed_change);
+        state.speed = towards(asked[0], state.speed, self.speed_change);
         let domain = Real::constant(lanes, self.steering_domain);
-        let steering = towards(asked.steering, state.steering, self.steering_change);
+        let steering = towards(asked[1], state.steering, self.steering_change);
         state.steering = steering.clamp(-domain, domain);
     }
 

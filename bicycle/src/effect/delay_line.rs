@@ -17,11 +17,6 @@ pub(super) fn constants(delay_s: f64, step_s: f64) -> [f64; 4] {
     [steps.floor(), steps.fract(), n_slots(delay_s, step_s) as f64, 0.0]
 }
 
-/// How long before the start the command was in force that a slot holds at the start [s].
-pub(super) fn age_s(slot: usize, n_slots: usize, step_s: f64) -> f64 {
-    ((n_slots - slot) as f64 - 0.5) * step_s
-}
-
 /// Takes the command of this step in, gives the delayed one out.
 #[inline(always)]
 pub(super) fn pass<L: Lanes>(

@@ -1,41 +1,36 @@
-//! First-order speed: the actuator closes the share 1 - exp(-dt / T) of its distance to the command per step.
+//! First-order lag of the speed command.
 
-use super::{Acts, Commanding, Constants, Definition, Description, Parameter};
+use super::definition::{Commanding, Constants, Definition, Stage, parameters};
+use super::lag;
 use crate::lanes::Lanes;
-use crate::lanes::Real;
 
-/// First-order speed: the actuator closes the share 1 - exp(-dt / T) of its distance to the command per step.
-#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct SpeedLag {
-    /// Time constant T [s].
-    pub time_constant_s: f64,
+parameters! {
+    /// First-order lag of the speed command.
+    SpeedLag {
+        /// Time constant T [s].
+        time_constant_s in "s": 0.0 to 3.0, neutral 0.0, tried [0.15, 0.4, 0.8, 1.6];
+    }
 }
 
 impl Definition for SpeedLag {
-    const DESCRIPTION: Description = Description {
-        id: "speed_lag",
-        meaning: "first-order speed: x += (command - x) (1 - exp(-dt / T))",
-        parameters: &[Parameter { name: "time_constant_s", unit: "s", low: 0.0, high: 2.0, neutral: 0.0 }],
-    };
-    const ACTS: Acts = Acts::OnCommand;
-
-    fn from_values([time_constant_s, ..]: [f64; 4]) -> Self {
-        Self { time_constant_s }
-    }
-
-    fn values(&self) -> [f64; 4] {
-        [self.time_constant_s, 0.0, 0.0, 0.0]
-    }
+    const ID: &'static str = "speed_lag";
+    const MEANING: &'static str = "first-order speed: T dx/dt = command - x";
+    const STAGES: &'static [Stage] = &[Stage::Command];
 
     fn constants(&self, step_s: f64) -> [f64; 4] {
-        let kept = if self.time_constant_s > 0.0 { (-step_s / self.time_constant_s).exp() } else { 0.0 };
-        [1.0 - kept, 0.0, 0.0, 0.0]
+        lag::constants(self.time_constant_s, step_s)
+    }
+
+    fn n_slots(&self, _step_s: f64) -> usize {
+        1
+    }
+
+    fn settled(&self, command: [f64; 2]) -> f64 {
+        command[0]
     }
 
     #[inline(always)]
     fn on_command<L: Lanes>(constants: &Constants, state: &mut Commanding<'_, L>) {
-        let share = Real::constant(state.speed.0, constants[0]);
-        state.speed = (state.speed - state.reached_speed).mul_add(share, state.reached_speed);
+        state.speed = lag::pass(constants, state.memory, state.speed);
     }
 }

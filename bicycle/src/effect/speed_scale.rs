@@ -1,41 +1,23 @@
-//! Wheel radius: the vehicle rolls a multiple of what its drive believes.
+//! Speed out of proportion with the command.
 
-use super::{Acts, Constants, Definition, Description, Moving, Parameter};
-use crate::lanes::Lanes;
-use crate::lanes::Real;
+use super::definition::{Commanding, Constants, Definition, Stage, parameters};
+use crate::lanes::{Lanes, Real};
 
-/// Wheel radius: the vehicle rolls a multiple of what its drive believes.
-#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct SpeedScale {
-    /// Ratio S [-].
-    pub ratio: f64,
+parameters! {
+    /// Speed out of proportion with the command.
+    SpeedScale {
+        /// Achieved over commanded speed S [-].
+        ratio in "-": 0.2 to 2.0, neutral 1.0, tried [0.8, 0.92, 1.08, 1.2];
+    }
 }
 
 impl Definition for SpeedScale {
-    const DESCRIPTION: Description = Description {
-        id: "speed_scale",
-        meaning: "wheel radius: v = S v, and the yaw rate with it",
-        parameters: &[Parameter { name: "ratio", unit: "-", low: 0.3, high: 2.0, neutral: 1.0 }],
-    };
-    const ACTS: Acts = Acts::OnMotion;
-
-    fn from_values([ratio, ..]: [f64; 4]) -> Self {
-        Self { ratio }
-    }
-
-    fn values(&self) -> [f64; 4] {
-        [self.ratio, 0.0, 0.0, 0.0]
-    }
-
-    fn constants(&self, _step_s: f64) -> [f64; 4] {
-        [self.ratio, 0.0, 0.0, 0.0]
-    }
+    const ID: &'static str = "speed_scale";
+    const MEANING: &'static str = "speed scale: x = S command (wheel radius, linear drag)";
+    const STAGES: &'static [Stage] = &[Stage::Command];
 
     #[inline(always)]
-    fn on_motion<L: Lanes>(constants: &Constants, state: &mut Moving<'_, L>) {
-        let ratio = Real::constant(state.forward.0, constants[0]);
-        state.forward = state.forward * ratio;
-        state.yaw_rate = state.yaw_rate * ratio;
+    fn on_command<L: Lanes>(constants: &Constants, state: &mut Commanding<'_, L>) {
+        state.speed = state.speed * Real::constant(state.speed.0, constants[0]);
     }
 }

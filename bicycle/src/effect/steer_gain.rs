@@ -1,36 +1,20 @@
-//! Steering ratio: the wheels turn by a multiple of the commanded angle.
+//! Steering angle out of proportion with the command.
 
-use super::{Acts, Commanding, Constants, Definition, Description, Parameter};
-use crate::lanes::Lanes;
-use crate::lanes::Real;
+use super::definition::{Commanding, Constants, Definition, Stage, parameters};
+use crate::lanes::{Lanes, Real};
 
-/// Steering ratio: the wheels turn by a multiple of the commanded angle.
-#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct SteerGain {
-    /// Ratio G [-].
-    pub ratio: f64,
+parameters! {
+    /// Steering angle out of proportion with the command.
+    SteerGain {
+        /// Achieved over commanded angle G [-].
+        ratio in "-": 0.2 to 2.0, neutral 1.0, tried [0.75, 0.9, 1.1, 1.25];
+    }
 }
 
 impl Definition for SteerGain {
-    const DESCRIPTION: Description = Description {
-        id: "steer_gain",
-        meaning: "steering ratio: x = G command",
-        parameters: &[Parameter { name: "ratio", unit: "-", low: 0.3, high: 2.0, neutral: 1.0 }],
-    };
-    const ACTS: Acts = Acts::OnCommand;
-
-    fn from_values([ratio, ..]: [f64; 4]) -> Self {
-        Self { ratio }
-    }
-
-    fn values(&self) -> [f64; 4] {
-        [self.ratio, 0.0, 0.0, 0.0]
-    }
-
-    fn constants(&self, _step_s: f64) -> [f64; 4] {
-        [self.ratio, 0.0, 0.0, 0.0]
-    }
+    const ID: &'static str = "steer_gain";
+    const MEANING: &'static str = "steering gain: x = G command (steering ratio, wheelbase)";
+    const STAGES: &'static [Stage] = &[Stage::Command];
 
     #[inline(always)]
     fn on_command<L: Lanes>(constants: &Constants, state: &mut Commanding<'_, L>) {

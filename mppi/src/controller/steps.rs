@@ -5,7 +5,7 @@ use crate::config::{Actuation, Temperature};
 use crate::judgement::Judge;
 use crate::objective::{Input, Objective, ReferencePath, ReferenceStep, Terminal, TerminalField};
 use crate::recovery::Mode;
-use crate::rollout::{GoalTask, Grid, Prices, RollOut, Scene, Start, Task};
+use crate::rollout::{GoalTask, Grid, MAX_SLOTS, Prices, RollOut, Scene, Start, Task};
 use crate::sampling::{Control, Sample, Sampler};
 use crate::summary::Accumulate;
 use crate::weights::{Weigh, WeightSummary};
@@ -46,7 +46,9 @@ impl Controller {
     pub(super) fn recall_slots(&mut self, state: State, delay_s: f64) {
         let (history, slots) = (&self.history, &mut self.slots);
         let past = |age_s: f64| history.at(age_s + delay_s).unwrap_or(as_command(&state));
-        self.stepper.recall(&past, |slot, value| slots[slot] = value as f32);
+        let mut memory = [0.0; MAX_SLOTS];
+        self.stepper.recall(&past, &mut memory[..self.stepper.n_slots()]);
+        *slots = memory.map(|value| value as f32);
     }
 
     /// Where the commands of the plan start from: the last command, held near the measured state.

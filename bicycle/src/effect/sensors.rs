@@ -1,0 +1,50 @@
+//! What the sensors say of a motion, and the motion that a measurement stands for.
+
+use super::Effect;
+use crate::Odometry;
+
+/// How sensors misstate the motion; the neutral one states it as it is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SensorModel {
+    /// Age of the pose when it is stamped [s].
+    pub pose_latency_s: f64,
+    /// Measured over true velocity [-].
+    pub velocity_ratio: f64,
+    /// Measured less true yaw rate [rad/s].
+    pub yaw_rate_bias_radps: f64,
+    /// Measured less true yaw [rad].
+    pub yaw_offset_rad: f64,
+}
+
+impl SensorModel {
+    /// Sensors that state the motion as it is.
+    pub const NEUTRAL: Self =
+        Self { pose_latency_s: 0.0, velocity_ratio: 1.0, yaw_rate_bias_radps: 0.0, yaw_offset_rad: 0.0 };
+
+    /// What the effects on the sensors amount to together.
+    pub fn of(effects: &[Effect]) -> Self {
+        let mut sensors = Self::NEUTRAL;
+        effects.iter().for_each(|effect| effect.on_sensors(&mut sensors));
+        sensors
+    }
+
+    /// The motion behind a measurement: velocity and yaw rate without ratio and bias, the pose without offset and
+    /// carried forward by its age at that velocity and yaw rate.
+    pub fn corrected(&self, measured: &Odometry) -> Odometry {
+        let velocity_mps = measured.velocity_mps.map(|value| value / self.velocity_ratio);
+        let yaw_rate_radps = measured.yaw_rate_radps - self.yaw_rate_bias_radps;
+        let turned_rad = yaw_rate_radps * self.pose_latency_s;
+        let yaw_rad = measured.attitude_rad[2] - self.yaw_offset_rad;
+        let (sine, cosine) = (yaw_rad + turned_rad / 2.0).sin_cos();
+        let [ahead_m, left_m] = velocity_mps.map(|value| value * self.pose_latency_s);
+        let [x_m, y_m, z_m] = measured.position_m;
+        let [roll_rad, pitch_rad, _] = measured.attitude_rad;
+        Odometry {
+            position_m: [x_m + ahead_m * cosine - left_m * sine, y_m + ahead_m * sine + left_m * cosine, z_m],
+            attitude_rad: [roll_rad, pitch_rad, yaw_rad + turned_rad],
+            velocity_mps,
+            yaw_rate_radps,
+            ..*measured
+        }
+    }
+}
