@@ -3,6 +3,7 @@
 mod bench;
 mod collect;
 mod drive;
+mod gap;
 mod learned_map;
 mod train;
 mod values;
@@ -15,6 +16,7 @@ pub use bench::{
 };
 pub use collect::{CollectArguments, CollectMap, CollectSplit, CollectWorld};
 pub use drive::{DriveArguments, InstructionSet, MapSource, Method, Pace};
+pub use gap::{GapApplyArguments, GapCommand, GapDiagnoseArguments};
 pub use learned_map::{BenchLearnedMapArguments, NetworkSizes};
 pub use train::{TrainArguments, TrainCommand};
 pub use values::{Goal, StartPose, WorldSource};
@@ -57,6 +59,12 @@ pub enum Command {
         #[command(subcommand)]
         command: BenchCommand,
     },
+    /// Find out why the simulator and the robot disagree, and repair the controller's model
+    Gap {
+        /// What to ask.
+        #[command(subcommand)]
+        command: GapCommand,
+    },
 }
 
 const LONG_ABOUT: &str = "\
@@ -75,6 +83,7 @@ Examples:
   surefoot train traversability --train train.safetensors --validation validation.safetensors
                                         networks that know what the drives have taught
   surefoot bench control --threads 2    milliseconds of one control update
+  surefoot gap diagnose CASE            why simulator and robot disagree, and how far that can be mended
 
 Units are SI: metres, seconds, radians. x points east, y north; yaw is counter-clockwise from east.
 

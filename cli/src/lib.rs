@@ -8,6 +8,7 @@ mod bench;
 mod collect;
 mod drive;
 mod failure;
+mod gap;
 pub mod interrupt;
 pub mod output;
 pub mod picture;
@@ -42,6 +43,7 @@ pub fn run() -> ExitCode {
 fn dispatch(command: Command) -> anyhow::Result<()> {
     match command {
         Command::Drive(drive) => drive::run(&drive),
+        Command::Gap { command } => gap::run(&command),
         Command::Collect(collect) => collect::run(&collect),
         Command::Train { command: TrainCommand::Traversability(traversability) } => {
             train::run(&traversability)

@@ -88,6 +88,11 @@ impl ConfigText {
         })
     }
 
+    /// Whether the text is TOML with this key at its top level, to tell kinds of files apart.
+    pub fn has_key(&self, key: &str) -> bool {
+        DeTable::parse(&self.text).is_ok_and(|document| document.get_ref().contains_key(key))
+    }
+
     /// The error for a value that parsed but cannot be, at the line of `field` (a dotted path).
     pub fn refuse(&self, field: &str, expected: impl Display, found: impl Display) -> ConfigError {
         let document = DeTable::parse(&self.text).ok();

@@ -7,6 +7,7 @@ mod config;
 mod drive_log_csv;
 mod elevation;
 mod gap_case;
+mod model_text;
 mod numpy;
 mod overlay;
 mod recording;
@@ -27,6 +28,7 @@ pub use gap_case::{
     DriveFileError, GapCase, GapGround, GapKind, GapLabel, GapNoise, GapVehicle, GapVehicleError, ReadDrive,
     parse_gap_labels, read_drive, read_gap_case, read_gap_labels, read_gap_vehicle,
 };
+pub use model_text::model_text;
 pub use overlay::overlay;
 pub use recording::{DriveRecorder, McapDriveLog, McapReadError, RecordError, read_drive_log_mcap};
 pub use refusal::ArrayFileError;

@@ -1,0 +1,156 @@
+//! `surefoot gap diagnose` and `apply`.
+
+use std::path::PathBuf;
+
+use clap::{Args, Subcommand};
+
+/// What can be asked about the gap between simulator and robot.
+#[derive(Clone, Debug, Subcommand)]
+pub enum GapCommand {
+    /// Put the effects of a diagnosis into the controller's model
+    #[command(long_about = APPLY_ABOUT)]
+    Apply(GapApplyArguments),
+}
+
+/// Which drives to diagnose, and where the answer goes.
+#[derive(Args, Clone, Debug)]
+#[command(after_long_help = DIAGNOSE_AFTER_HELP)]
+pub struct GapDiagnoseArguments {
+    /// Folder with a case.toml, or such a file
+    #[arg(required_unless_present = "vehicle", conflicts_with_all = ["vehicle", "sim", "real", "heldout"])]
+    pub case: Option<PathBuf>,
+
+    /// Vehicle: a file of a case's kind, one of --vehicle of `surefoot drive`, or the name of a shipped one
+    #[arg(long, value_name = "VEHICLE", requires = "real", help_heading = "Drives without a case file")]
+    pub vehicle: Option<String>,
+
+    /// Nominal drives: what the simulator did, .csv or .mcap
+    ///
+    /// Without any, the gap to the bare kinematic bicycle is diagnosed: the physics that every vehicle has can then
+    /// not be told from what this one adds.
+    #[arg(long, value_name = "FILE", num_args = 1.., value_delimiter = ',',
+          help_heading = "Drives without a case file")]
+    pub sim: Vec<PathBuf>,
+
+    /// Drives of the robot to find the cause in, .csv or .mcap
+    #[arg(long, value_name = "FILE", num_args = 1.., value_delimiter = ',', requires = "vehicle",
+          help_heading = "Drives without a case file")]
+    pub real: Vec<PathBuf>,
+
+    /// Drives of the robot to verify the answer on; opened after the prediction stands
+    #[arg(long, value_name = "FILE", num_args = 1.., value_delimiter = ',',
+          help_heading = "Drives without a case file")]
+    pub heldout: Vec<PathBuf>,
+
+    /// Write the answer to this file
+    #[arg(long, value_name = "FILE")]
+    pub json: Option<PathBuf>,
+
+    /// Folder for the report, its pictures and the answer; made if missing, earlier files are replaced
+    /// [default: surefoot-out, unless --json or --predictions is given]
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+
+    /// Write every prediction of a held-out measurement to this file (CSV)
+    #[arg(long, value_name = "FILE")]
+    pub predictions: Option<PathBuf>,
+
+    /// Folder that keeps what was calibrated on nominal drives, for the next case of the same vehicle
+    /// [default: surefoot/baselines in the user's cache folder]
+    #[arg(long, value_name = "DIR")]
+    pub baseline_cache: Option<PathBuf>,
+}
+
+impl GapDiagnoseArguments {
+    /// Folder of the report: as asked, else `surefoot-out` unless the answer goes elsewhere.
+    pub fn report_folder(&self) -> Option<PathBuf> {
+        let goes_elsewhere = self.json.is_some() || self.predictions.is_some();
+        self.out.clone().or_else(|| (!goes_elsewhere).then(|| PathBuf::from("surefoot-out")))
+    }
+}
+
+/// Which model to repair.
+#[derive(Args, Clone, Debug)]
+#[command(after_long_help = APPLY_AFTER_HELP)]
+pub struct GapApplyArguments {
+    /// The answer that `surefoot gap diagnose` has written (JSON)
+    pub diagnosis: PathBuf,
+
+    /// What the controller believes so far (TOML): wheelbase, limits, effects
+    #[arg(long, value_name = "IN.toml")]
+    pub model: PathBuf,
+
+    /// Where the repaired model goes
+    #[arg(long, value_name = "OUT.toml")]
+    pub out: PathBuf,
+}
+
+const DIAGNOSE_ABOUT: &str = "\
+Says where simulator and robot disagree, which unmodelled effect causes it, and how far the gap shrinks once that \
+effect is added.
+
+The simulator's own drives come first: they calibrate what the kinematic bicycle cannot do although nothing is wrong, \
+and show how much two nominal drives differ anyway. Against that the robot's drives are held: effects of the \
+catalogue are added one at a time as long as they explain more than chance. Last, the held-out drives are opened and \
+the shrinkage that was predicted is verified on them. 'none' and 'unknown' are answers too, and where the drives \
+cannot tell explanations apart, all of them are named.";
+
+const DIAGNOSE_AFTER_HELP: &str = "\
+Examples:
+  surefoot gap diagnose cases/steering
+      The case described by cases/steering/case.toml; report in surefoot-out.
+  surefoot gap diagnose cases/steering --json answer.json --predictions rollouts.csv
+      Only the answer and the predictions, for a script.
+  surefoot gap diagnose --vehicle car.toml --sim sim_1.csv sim_2.csv sim_3.csv \\
+      --real monday.csv tuesday.mcap --heldout friday.csv --out report
+      Drives without a case file. At least three nominal and two real drives of 40 s, with
+      turns and changes of speed in them, tell the most.
+  surefoot gap apply report/answer.json --model model.toml --out repaired.toml
+  surefoot drive --model repaired.toml
+      The controller plans with what was found.
+
+case.toml:
+  name, vehicle (path), sim, real, heldout (lists of paths); from the case's folder
+
+Vehicle file:
+  name, wheelbase [m]             needed
+  max_steer [rad], max_speed [m/s]
+                                  else the largest command of the drives
+  [noise] x, y [m], yaw [rad], vx [m/s], wz [rad/s]
+                                  standard deviations; else estimated
+  [map] heightmap, terrain_class (CSV: row = x, column = y), resolution,
+        origin_x, origin_y [m]    the ground; else level
+
+Drives:
+  needed columns   t, and a command: cmd_speed, cmd_steer or steer_meas
+                   (cmd_wz for a skid-steered machine)
+  used if there    x, y, yaw, vx, wz, roll, pitch; run (t restarts per run)
+  Gaps and leaps split a drive, which is told. Degrees, km/h, a mirrored sign,
+  standstill and their like are refused with what gave them away.
+
+Files in --out:
+  report.html      everything below on one page, without network
+  answer.json      the answer, as --json
+  prediction.json  the answer before the held-out drives were opened
+  *.png            places, residuals, map, ranking, a held-out drive
+
+Exit codes:
+  0  the diagnosis stands, whatever it says
+  1  it failed; one line on standard error says why
+  2  bad usage or input; one line says what was expected and what was found";
+
+const APPLY_ABOUT: &str = "\
+Puts the effects that a diagnosis announced into the controller's model and never into the plant.
+
+An effect with the same id that the model already holds stays, and the new one acts after it: the diagnosis was made \
+with the old model in place. Effects of the sensors correct the state estimate.";
+
+const APPLY_AFTER_HELP: &str = "\
+Examples:
+  surefoot gap apply surefoot-out/answer.json --model model.toml --out repaired.toml
+  surefoot drive --model repaired.toml --seed 3
+
+Exit codes:
+  0  the model was written; 'none' writes the model as it was
+  1  it was not; one line on standard error says why
+  2  bad usage or input, or a diagnosis that names no effect ('unknown')";

@@ -1,0 +1,121 @@
+//! What a diagnosis has seen besides its answer: the numbers behind a report.
+
+use serde::{Deserialize, Serialize};
+
+use crate::Condition;
+
+/// What the real drives alone have shown, before any held-out drive is opened.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Findings {
+    /// Every condition that could be judged.
+    pub conditions: Vec<ConditionTable>,
+    /// Residuals by state and horizon on the real drives.
+    pub residuals: Vec<ResidualCell>,
+    /// Residuals over the ground, one per rollout.
+    pub map: Vec<GroundResidual>,
+}
+
+/// How the residual depends on one condition.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ConditionTable {
+    /// Condition.
+    pub condition: Condition,
+    /// Share of the squared normalised residual's variance that its bins explain, less the null's [-].
+    pub share: f64,
+    /// The same between nominal drives, 95 % quantile [-].
+    pub null_share: f64,
+    /// The condition from low to high; empty bins are left out.
+    pub bins: Vec<ConditionBin>,
+}
+
+/// One bin of a condition.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ConditionBin {
+    /// Lower end, in the condition's unit.
+    pub low: f64,
+    /// Upper end, in the condition's unit.
+    pub high: f64,
+    /// Number of rollouts.
+    pub n: usize,
+    /// Mean squared normalised residual of the real drives [-].
+    pub mean_square: f64,
+    /// The same of the nominal drives, NaN where they never were [-].
+    pub null_mean_square: f64,
+}
+
+/// A predicted quantity.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ResidualState {
+    /// Displacement along the heading at the rollout's start [m].
+    Along,
+    /// Displacement across it [m].
+    Across,
+    /// Yaw [rad].
+    Yaw,
+    /// Forward velocity [m/s].
+    ForwardSpeed,
+    /// Yaw rate [rad/s].
+    YawRate,
+}
+
+/// Size of the residual of one quantity at one horizon, each divided by its standard deviation on the nominal drives.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ResidualCell {
+    /// Quantity.
+    pub state: ResidualState,
+    /// Time since the rollout's start [s].
+    pub horizon_s: f64,
+    /// Root mean square under the calibrated nominal model [-].
+    pub before: f64,
+    /// Root mean square with the announced effects [-].
+    pub after: f64,
+    /// Root mean square of nominal drives that the model was not calibrated on [-].
+    pub floor: f64,
+}
+
+/// The residual of one rollout, where it began.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct GroundResidual {
+    /// East [m].
+    pub x_m: f64,
+    /// North [m].
+    pub y_m: f64,
+    /// Root mean square over quantities and horizons under the calibrated nominal model [-].
+    pub before: f64,
+    /// The same with the announced effects [-].
+    pub after: f64,
+}
+
+/// Which model made a prediction.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum PredictionModel {
+    /// Calibrated nominal model.
+    Nominal,
+    /// The same with the announced effects.
+    Repaired,
+}
+
+/// Measurements that a model foretells on a held-out drive.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Prediction {
+    /// Index of the held-out drive.
+    pub log: usize,
+    /// When the rollout starts, on the drive's own time axis [s].
+    pub start_s: f64,
+    /// How much later the measurement is [s].
+    pub horizon_s: f64,
+    /// Model.
+    pub model: PredictionModel,
+    /// East [m].
+    pub x_m: f64,
+    /// North [m].
+    pub y_m: f64,
+    /// Yaw [rad].
+    pub yaw_rad: f64,
+    /// Forward velocity [m/s].
+    pub speed_mps: f64,
+    /// Yaw rate [rad/s].
+    pub yaw_rate_radps: f64,
+}
