@@ -27,9 +27,16 @@ use row_task::{RowTask, Scratch};
 pub enum Unfamiliar {
     /// It is driven on as the posterior says, in which the prior outweighs the networks.
     Fuse,
-    /// It is blocked like an obstacle, as EVORA avoids it.
+    /// The same, and every metre of it costs the time of [`AVOIDED_METRES`] metres: EVORA and PIETRA avoid it by a cost,
+    /// so that a goal behind it can still be reached.
     Avoid,
 }
+
+/// Familiar metres for which unfamiliar ground that is to be avoided is worth one detour of. The map carries this as a
+/// linear traction that is smaller by as much: whoever plans by time to the goal goes around.
+pub const AVOIDED_METRES: f32 = 3.0;
+/// Traction that being avoided leaves, unless there was less to begin with: slower than this is stuck.
+const AVOIDED_TRACTION_MIN: f32 = 0.1;
 
 /// What a [`BeliefMap`] believes.
 #[derive(Clone, Debug)]
@@ -113,8 +120,16 @@ struct Fusion {
 }
 
 impl Fusion {
-    fn avoids(&self) -> bool {
-        self.unfamiliar == Unfamiliar::Avoid
+    /// Risk of a footprint unlike the training data.
+    fn unfamiliar(&self, risk: Risk) -> Risk {
+        match self.unfamiliar {
+            Unfamiliar::Fuse => risk,
+            Unfamiliar::Avoid => {
+                let traction = risk.linear_traction;
+                let left = (traction / AVOIDED_METRES).max(AVOIDED_TRACTION_MIN.min(traction));
+                Risk { linear_traction: left, ..risk }
+            }
+        }
     }
 
     /// What the networks are weighed against: physics alone knows of unknown ground.

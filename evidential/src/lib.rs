@@ -31,7 +31,7 @@ mod training;
 mod vehicle;
 
 pub use architecture::Architecture;
-pub use belief_map::{BeliefMap, BeliefMapError, Learned, PoseBelief, Unfamiliar};
+pub use belief_map::{AVOIDED_METRES, BeliefMap, BeliefMapError, Learned, PoseBelief, Unfamiliar};
 pub use checkpoint::{Checkpoint, CheckpointError, DensityRange, Sidecar, Tensor};
 pub use dataset::{
     Dataset, DatasetError, DatasetFileError, DatasetOrigin, Example, PARAMETER_BINS, PARAMETER_NAMES,

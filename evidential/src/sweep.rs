@@ -115,7 +115,10 @@ pub fn fingerprint(training: &Dataset, validation: &Dataset) -> Result<String, D
 }
 
 impl Selection {
-    /// The candidate with the least mean validation EMD2 over the seeds 1 to `n_seeds`; of equals the first.
+    /// The candidate with the least mean validation EMD2 over the seeds 1 to `n_seeds`, by the rule of one standard
+    /// error (Breiman and others, 1984): whatever lies within the standard error of that least mean is as good, and of
+    /// these the one that holds most to physics is taken, the largest kappa. Validation data are like the training data
+    /// and do not ask for it; ground beyond them does. Of equal kappas the least mean counts, of equals the first.
     ///
     /// # Errors
     /// No candidate has a finite result for all seeds.
@@ -126,9 +129,16 @@ impl Selection {
         trials: &[Trial],
     ) -> Result<Self, SelectionError> {
         let judged = candidates.iter().filter_map(|candidate| Self::judged(candidate, n_seeds, trials));
-        judged
-            .min_by(|left, right| left.validation_total.total_cmp(&right.validation_total))
-            .ok_or(SelectionError { method: method.name(), n_seeds })
+        let judged: Vec<Self> = judged.collect();
+        let by_total = |left: &&Self, right: &&Self| left.validation_total.total_cmp(&right.validation_total);
+        let best = judged.iter().min_by(by_total);
+        let best = best.ok_or(SelectionError { method: method.name(), n_seeds })?;
+        let limit = best.validation_total + best.validation_deviation / (n_seeds as f64).sqrt();
+        let as_good = || judged.iter().filter(|selection| selection.validation_total <= limit);
+        let kappa = as_good().map(|selection| selection.settings.physics_weight).fold(0.0, f64::max);
+        let chosen =
+            as_good().filter(|selection| selection.settings.physics_weight >= kappa).min_by(by_total);
+        Ok(chosen.unwrap_or(best).clone())
     }
 
     /// Mean and deviation of a candidate; `None` unless all seeds ended well.
@@ -220,6 +230,27 @@ mod tests {
         );
         let told = Selection::of(Method::Vanilla, &candidates, 3, &trials).unwrap_err().to_string();
         assert_eq!(told, "vanilla: expected parameters with a finite loss for all of 3 seeds, found none");
+    }
+
+    #[test]
+    fn within_one_standard_error_the_largest_kappa_is_selected() {
+        let trial = |physics_weight: f64, seed: u64, error: f64| Trial {
+            settings: Settings { physics_weight, ..Settings::new(Method::Pietra, seed) },
+            ..trial(1e-3, seed, Some(error))
+        };
+        // Mean 0.5 with a deviation of sqrt(0.02) = 0.1414, a standard error of 0.1.
+        let least = [trial(0.1, 1, 0.4), trial(0.1, 2, 0.6)];
+        let selected = |errors: [f64; 2]| {
+            let others = [0.5, 1.0].into_iter().zip(errors);
+            let others = others.flat_map(|(kappa, error)| [trial(kappa, 1, error), trial(kappa, 2, error)]);
+            let trials: Vec<Trial> = least.iter().cloned().chain(others).collect();
+            let candidates: Vec<Settings> = trials.iter().step_by(2).map(|t| t.settings.clone()).collect();
+            Selection::of(Method::Pietra, &candidates, 2, &trials).unwrap().settings.physics_weight
+        };
+        assert_eq!(selected([0.55, 0.61]), 0.5);
+        assert_eq!(selected([0.55, 0.59]), 1.0);
+        assert_eq!(selected([0.61, 0.59]), 1.0);
+        assert_eq!(selected([0.61, 0.61]), 0.1);
     }
 
     #[test]

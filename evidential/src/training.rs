@@ -1,8 +1,8 @@
 //! Fits the networks of a [`Method`](crate::Method) to a dataset.
 //!
-//! Predictor and flow are trained together on the method's loss until the validation error no longer falls; the best
-//! weights are kept. Then the predictor is frozen and the flow alone is fitted to the latents of the training data by
-//! maximum likelihood, as NatPN and EVORA do.
+//! Predictor and flow are trained together on the method's loss until the validation error of their running mean over
+//! the passes no longer falls; the best mean is kept. Then the predictor is frozen and the flow alone is fitted to the
+//! latents of the training data by maximum likelihood, as NatPN and EVORA do.
 
 mod error;
 mod evaluation;
@@ -26,7 +26,7 @@ use evaluation::Evaluation;
 pub use evaluation::Percentiles;
 use samples::{Samples, gather};
 pub use settings::{Settings, SettingsError};
-use steps::{Best, Place, adam, order, pass};
+use steps::{Best, Place, RunningMean, adam, order, pass};
 
 /// Keys of the random streams that order the examples.
 const JOINT_KEY: u64 = 2;
@@ -242,10 +242,11 @@ impl<'a> Run<'a> {
         })
     }
 
-    /// Trains everything on the method's loss and leaves the best weights in the network.
+    /// Trains everything on the method's loss and leaves the best running mean of the weights in the network.
     fn fit_jointly(&mut self, progress: Progress<'_>) -> Result<(), TrainError> {
         let variables = self.network.variables();
         let mut optimiser = adam(variables.clone(), self.settings.learning_rate)?;
+        let mut mean = RunningMean::new(variables.clone())?;
         let mut best = Best::new(variables);
         for epoch in 1..=self.settings.epochs_max {
             let place = Place { phase: Phase::Joint, epoch };
@@ -255,10 +256,13 @@ impl<'a> Run<'a> {
                 let (inputs, targets) = training.batch(indices)?;
                 network.outputs(&inputs)?.apply_op2(&targets, BatchLoss::new(terms))
             })?;
+            mean.take_in(epoch)?;
+            mean.exchange()?;
             let error = Evaluation::new(&self.network, &self.validation, &self.terms)?.total();
             if let Next::Stop = self.conclude(place, training_loss, error, &mut best, progress)? {
                 break;
             }
+            mean.exchange()?;
         }
         Ok(best.restore()?)
     }

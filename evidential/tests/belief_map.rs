@@ -6,7 +6,8 @@ mod untrained;
 use std::sync::Arc;
 
 use evidential::{
-    BeliefMap, BeliefMapError, Checkpoint, Learned, Method, Prediction, Predictor, Prior, Unfamiliar,
+    AVOIDED_METRES, BeliefMap, BeliefMapError, Checkpoint, Learned, Method, Prediction, Predictor, Prior,
+    Unfamiliar,
 };
 use physics_prior::{Assumption, PriorMap, PriorMapError};
 use terrain::{Cell, CellRegion, GridGeometry, GridMap, PatchSample, SurfaceCell, TerrainClass};
@@ -207,8 +208,13 @@ fn ground_unlike_the_training_data_is_flagged_and_avoided_on_request() {
         }
         let is_out = log_density < min && is_wholly_known(&checkpoint, &surface, pose);
         n_out[RISK.index(cell)] += usize::from(is_out);
-        n_avoided += usize::from(is_out && !fused.risk(cell, yaw).is_blocked());
-        assert_eq!(avoiding.risk(cell, yaw).is_blocked(), is_out || fused.risk(cell, yaw).is_blocked());
+        let mut expected = fused.risk(cell, yaw);
+        if is_out {
+            n_avoided += usize::from(expected.linear_traction > 0.1 && !expected.is_blocked());
+            let traction = expected.linear_traction;
+            expected.linear_traction = (traction / AVOIDED_METRES).max(traction.min(0.1));
+        }
+        assert_eq!(avoiding.risk(cell, yaw), expected);
     }
     assert!(n_avoided > 100, "{n_avoided}");
     let flagged = |index: usize| fused.ground[index].flags.contains(GroundFlags::OUT_OF_DISTRIBUTION);

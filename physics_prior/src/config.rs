@@ -11,7 +11,7 @@ pub struct PriorConfig {
     pub uniform_weight: f64,
     /// Slope along the heading at which linear traction is gone (equation 15) [rad].
     pub linear_slope_max_rad: f64,
-    /// Slope along the heading at which angular traction is gone (equation 15) [rad].
+    /// Slope along the heading at which a bump that works against the turn takes all of it (equation 15) [rad].
     pub angular_slope_max_rad: f64,
     /// Height of vegetation at which traction is gone (equation 16) [m]. The paper takes 0.2 m for wheels of
     /// 0.15 m diameter; see [`PriorConfig::for_vehicle`].

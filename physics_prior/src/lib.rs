@@ -4,6 +4,9 @@
 //! Readings of the paper, and what goes beyond it:
 //! - The slope of equation 15 is the absolute gradient along the heading under each wheel of a level vehicle;
 //!   "corresponds to 30 degrees" means the tangent. Loose ground counts as dirt.
+//! - A slope works against a turn as often as for it, and a yaw rate is a speed times a curvature: angular traction is
+//!   the linear one times `1 - s / s_max` or `1 + s / s_max`, each with probability one half. The paper's `1 - s / s_max`
+//!   alone says that nobody can turn on ground on which vehicles do turn.
 //! - Equation 17 takes the absolute angle; roll from the wheel pairs of each axle, pitch from those of each side.
 //! - A wheel stands on the first ground that a ball of its radius touches, not on the height under its centre;
 //!   contact heights and gradients are taken there.

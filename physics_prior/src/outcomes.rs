@@ -1,4 +1,10 @@
 //! PIETRA's equations 15 to 17: what may happen at a pose, as weighted outcomes.
+//!
+//! The yaw rate is the speed times the curvature, so what a slope takes of the speed it takes of the turn. What it does
+//! to the curvature has no sign that the heights would tell: a bump under a wheel pushes the nose out of the turn as
+//! often as into it, and load that leaves the steered axle uphill returns downhill. Equation 15 for angular traction,
+//! `1 - s / s_max`, is the first half of that alone; here both halves are outcomes of equal probability,
+//! `linear (1 - s / s_max)` and `linear (1 + s / s_max)`, which ends at 1.
 
 use traversability::{Bins, N_BINS};
 
@@ -12,8 +18,11 @@ use crate::triangle::Triangles;
 /// the weights of equation 18; per parameter they sum to one less the uniform share of traction.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Outcomes {
-    /// Linear and angular traction of each wheel on dirt.
-    pub dirt: [[f32; 4]; 2],
+    /// Linear traction of each wheel on dirt.
+    pub linear_dirt: [[f32; 4]; 1],
+    /// Angular traction of each wheel on dirt where the slope works against the turn, and where it works for it.
+    pub angular_dirt: [[f32; 4]; 2],
+    /// Of a wheel's dirt; its outcomes share it evenly.
     pub dirt_probability: [f32; 4],
     /// Traction, linear and angular, of each wheel on vegetation.
     pub vegetation: [f32; 4],
@@ -29,7 +38,8 @@ pub(crate) struct Outcomes {
 
 impl Outcomes {
     const NONE: Self = Self {
-        dirt: [[0.0; 4]; 2],
+        linear_dirt: [[0.0; 4]; 1],
+        angular_dirt: [[0.0; 4]; 2],
         dirt_probability: [0.0; 4],
         vegetation: [0.0; 4],
         vegetation_probability: [0.0; 4],
@@ -99,10 +109,11 @@ impl Equations {
         for wheel in 0..4 {
             let contact = &pose.wheels[wheel].values;
             known[wheel] = if all_unknown { 0.0 } else { 1.0 - contact[Contact::UNKNOWN] };
-            for lane in 0..2 {
-                let on_dirt = 1.0 - pose.slopes[wheel] * self.per_slope[lane];
-                outcomes.dirt[lane][wheel] = on_dirt.max(0.0) * freedom;
-            }
+            let [linear, angular] = self.per_slope.map(|per_slope| pose.slopes[wheel] * per_slope);
+            let speed = (1.0 - linear).max(0.0) * freedom;
+            outcomes.linear_dirt[0][wheel] = speed;
+            outcomes.angular_dirt[0][wheel] = speed * (1.0 - angular).max(0.0);
+            outcomes.angular_dirt[1][wheel] = (speed * (1.0 + angular)).min(1.0);
             let on_vegetation = 1.0 - contact[Contact::VEGETATION] * self.per_vegetation_m;
             outcomes.vegetation[wheel] = on_vegetation.clamp(0.0, 1.0) * freedom;
             outcomes.dirt_probability[wheel] = per_wheel * known[wheel] * (1.0 - pose.vegetation_share);

@@ -41,8 +41,8 @@ impl Tails {
     #[inline(always)]
     pub fn risk(&self, outcomes: &Outcomes) -> Risk {
         Risk {
-            linear_traction: self.traction(outcomes, &outcomes.dirt[0]),
-            angular_traction: self.traction(outcomes, &outcomes.dirt[1]),
+            linear_traction: self.traction(outcomes, &outcomes.linear_dirt),
+            angular_traction: self.traction(outcomes, &outcomes.angular_dirt),
             roll_rad: self.angle_rad(outcomes, 0),
             pitch_rad: self.angle_rad(outcomes, 1),
         }
@@ -51,7 +51,7 @@ impl Tails {
     /// Partial moments of every parameter, which do not depend on the level.
     #[inline(always)]
     pub fn moments(&self, outcomes: &Outcomes) -> PartialMoments {
-        let shortfalls = |dirt: &[f32; 4]| {
+        let shortfalls = |dirt: &[[f32; 4]]| {
             let mut shortfalls = self.uniform_shortfall;
             add_shortfalls(&mut shortfalls, outcomes, dirt, 1.0);
             shortfalls
@@ -60,12 +60,12 @@ impl Tails {
             let excess = excess(outcomes, axis, &self.unknown_excess);
             excess.map(|above| (above - excess[N_BINS - 1]) * Bins::ATTITUDE_WIDTH_RAD)
         };
-        let [linear, angular] = [shortfalls(&outcomes.dirt[0]), shortfalls(&outcomes.dirt[1])];
+        let [linear, angular] = [shortfalls(&outcomes.linear_dirt), shortfalls(&outcomes.angular_dirt)];
         PartialMoments { moments: [linear, angular, excesses_rad(0), excesses_rad(1)] }
     }
 
     #[inline(always)]
-    fn traction(&self, outcomes: &Outcomes, dirt: &[f32; 4]) -> f32 {
+    fn traction(&self, outcomes: &Outcomes, dirt: &[[f32; 4]]) -> f32 {
         let mut tails = self.traction;
         add_shortfalls(&mut tails, outcomes, dirt, -self.per_level);
         let mut best = f32::NEG_INFINITY;
@@ -89,11 +89,15 @@ impl Tails {
     }
 }
 
-/// Adds the expected shortfall of all outcomes of traction at every bin value, times `weight`.
+/// Adds the expected shortfall of all outcomes of traction at every bin value, times `weight`; `dirt` holds outcomes
+/// of each wheel that are equally likely.
 #[inline(always)]
-fn add_shortfalls(sums: &mut [f32; N_BINS], outcomes: &Outcomes, dirt: &[f32; 4], weight: f32) {
-    for wheel in 0..4 {
-        add_shortfall(sums, dirt[wheel], weight * outcomes.dirt_probability[wheel]);
+fn add_shortfalls(sums: &mut [f32; N_BINS], outcomes: &Outcomes, dirt: &[[f32; 4]], weight: f32) {
+    let per_outcome = weight / dirt.len() as f32;
+    for wheels in dirt {
+        for wheel in 0..4 {
+            add_shortfall(sums, wheels[wheel], per_outcome * outcomes.dirt_probability[wheel]);
+        }
     }
     let vegetation_shares = &outcomes.vegetation_probability;
     if vegetation_shares.iter().any(|&share| share > 0.0) {
@@ -138,12 +142,16 @@ fn unknown_excess(equations: &Equations) -> Excess {
 /// The distributions of a pose (equation 18), with the uniform share of traction spread over all bins.
 pub(crate) fn distribution(equations: &Equations, outcomes: &Outcomes) -> PmfQuad {
     let mut quad = PmfQuad { rows: [[0.0; 4]; N_BINS] };
-    for (lane, dirt) in outcomes.dirt.iter().enumerate() {
+    let dirt: [&[[f32; 4]]; 2] = [&outcomes.linear_dirt, &outcomes.angular_dirt];
+    for (lane, dirt) in dirt.into_iter().enumerate() {
         for row in &mut quad.rows {
             row[lane] = equations.uniform_weight / N_BINS as f32;
         }
         for wheel in 0..4 {
-            add_atom(&mut quad, lane, dirt[wheel], outcomes.dirt_probability[wheel]);
+            let probability = outcomes.dirt_probability[wheel] / dirt.len() as f32;
+            for traction in dirt {
+                add_atom(&mut quad, lane, traction[wheel], probability);
+            }
             add_atom(&mut quad, lane, outcomes.vegetation[wheel], outcomes.vegetation_probability[wheel]);
         }
         add_atom(&mut quad, lane, outcomes.unknown, outcomes.unknown_probability);

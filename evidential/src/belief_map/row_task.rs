@@ -301,8 +301,8 @@ impl Fuse<'_> {
                 roll_rad: cvars[2].0[lane],
                 pitch_rad: cvars[3].0[lane],
             };
-            let is_blocked = self.blocked[lane] || is_out && self.fusion.avoids();
-            *risk = if is_blocked { free.blocked() } else { free };
+            let free = if is_out { self.fusion.unfamiliar(free) } else { free };
+            *risk = if self.blocked[lane] { free.blocked() } else { free };
         }
     }
 }
