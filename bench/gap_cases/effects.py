@@ -83,7 +83,7 @@ def _value(effect: Effect, size: float, vehicle, route: str, generator: np.rando
     compliance_m = vehicle.wheelbase_m if route == "parts" else 1.0
     values = {
         "absolute": lambda: size,
-        "below_servo": lambda: size * min(1.0, 0.86 * vehicle.parts.servo_rate_radps),
+        "below_servo": lambda: size * min(1.0, 6.0 / 7.0 * vehicle.parts.servo_rate_radps),
         "signed": lambda: sign * size,
         "ratio": lambda: 1.0 + sign * size,
         "shrinking": lambda: 1.0 - size,
