@@ -3,9 +3,11 @@
 mod answer;
 mod findings;
 mod machine;
+mod screening;
 
 pub use answer::{Answer, BeforeAfter, Condition, Estimate, NamedEffect, Place, Ranked, Shrink, Verdict};
 pub use findings::{
     ConditionBin, ConditionTable, Findings, GroundResidual, Prediction, PredictionModel, ResidualCell, ResidualState,
 };
 pub use machine::{GroundMap, Machine, SensorNoise};
+pub use screening::{Gravity, Place as RowPlace, Suspicion, screen, screen_sets, split_at_breaks};

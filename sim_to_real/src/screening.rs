@@ -1,0 +1,44 @@
+//! What is wrong with a drive before any model is asked: gaps, leaps, units, signs, too little of everything.
+//!
+//! Every check is arithmetic between measurements of the same drive (path against speed, yaw against yaw rate, yaw rate
+//! against speed times tan(steering) / wheelbase) and needs no model and no other drive. A log that fails one would
+//! still be diagnosed, confidently and wrongly.
+
+mod continuity;
+mod excitation;
+mod sets;
+mod signals;
+mod signs;
+mod statistics;
+mod suspicion;
+mod units;
+
+use bicycle::DriveLog;
+
+use crate::Machine;
+pub use continuity::split_at_breaks;
+pub use sets::screen_sets;
+use signals::Signals;
+pub use suspicion::{Gravity, Place, Suspicion};
+
+/// What is suspicious in one drive, gravest first; empty when nothing is.
+pub fn screen(machine: &Machine, log: &DriveLog) -> Vec<Suspicion> {
+    let runs: Vec<Signals<'_>> = Signals::of(log);
+    let mut found = continuity::lacking(&runs, log);
+    if found.is_empty() {
+        found.extend(units::check(&runs, machine));
+        found.extend(signs::check(&runs, machine));
+        found.extend(excitation::standstill(&runs, machine));
+    }
+    // Wrong units look like leaps: they are named first, and alone.
+    if found.is_empty() {
+        found.extend(continuity::breaks(&runs, machine));
+        found.extend(excitation::frozen(&runs));
+        found.extend(excitation::beyond(&runs, machine));
+    }
+    found.sort_by_key(Suspicion::gravity);
+    found
+}
+
+#[cfg(test)]
+mod tests;
