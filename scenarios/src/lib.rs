@@ -3,6 +3,7 @@
 //! Of `bicycle` this crate uses descriptions and the drive log, never the dynamics: the model never grades itself.
 
 mod arena;
+mod deviation;
 mod episode;
 mod friction;
 mod layers;
@@ -20,6 +21,7 @@ mod truth;
 mod world;
 
 pub use arena::{ARENA_GOAL_M, ARENA_START, ArenaConfig, ArenaError, arena};
+pub use deviation::{Deviation, DeviationError};
 pub use episode::{
     Episode, EpisodeConfig, EpisodeError, Fault, Observation, Outcome, Rules, SensorFault, TraceRow,
     drive_log,

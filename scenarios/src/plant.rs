@@ -13,8 +13,12 @@ mod chassis;
 mod drivetrain;
 mod envelope;
 mod ground;
+mod linkage;
+mod load;
+mod receiver;
 mod rest;
 mod servo;
+mod trailer;
 mod tyre;
 mod vegetation;
 mod wheel;
@@ -25,13 +29,17 @@ use bicycle::{Command, Vehicle, VehicleError};
 use nalgebra::{Isometry3, Rotation3, Translation3, UnitQuaternion, Vector3};
 use terrain::Pose;
 
-use crate::{Motion, World};
+use crate::deviation::{altered_actuators, altered_body, altered_wheel};
+use crate::{Deviation, DeviationError, Motion, World};
 use chassis::{BodyMotion, Chassis, Wrench};
 use drivetrain::Drivetrain;
 use envelope::Disc;
 use ground::Ground;
+use linkage::Linkage;
+use load::Load;
+use receiver::Receiver;
 use rest::{Rest, Stance};
-use servo::{DelayQueue, SteeringServo};
+use servo::SteeringServo;
 use wheel::{RunningGear, Strut, Wheel, WheelInput};
 
 /// Acceleration of gravity [m/s2].
@@ -48,6 +56,9 @@ pub enum PlantError {
     /// No vehicle can be like this.
     #[error("vehicle: {0}")]
     Vehicle(#[from] VehicleError),
+    /// No machine departs from it like this.
+    #[error(transparent)]
+    Deviation(#[from] DeviationError),
     /// A tyre that its own vehicle squeezes flat.
     #[error(
         "tyre.radial_stiffness_n_per_m: expected a static deflection below {most_m:.3} m (a third of the \
@@ -106,14 +117,15 @@ pub struct WheelState {
 pub struct Plant {
     ground: Ground,
     chassis: Chassis,
-    gear: RunningGear,
+    gear: [RunningGear; 4],
     wheels: [Wheel; 4],
     struts: [Strut; 4],
     /// Force on each wheel of an axle per difference of travel [N/m], front and rear.
     anti_roll_n_per_m: [f64; 2],
     drivetrain: Drivetrain,
     servo: SteeringServo,
-    queue: DelayQueue,
+    receiver: Receiver,
+    loads: Vec<Load>,
     limits: bicycle::Limits,
     rolling_radius_m: f64,
     command: Command,
@@ -132,31 +144,57 @@ impl Plant {
     /// Puts the vehicle on the ground with its rear axle's centre at `start` = (x [m], y [m], yaw [rad]),
     /// parked, and lets it sink into its springs.
     pub fn new(vehicle: &Vehicle, world: Arc<World>, start: [f64; 3]) -> Result<Self, PlantError> {
-        Self::with_step(vehicle, world, start, Self::STEP_S)
+        Self::with_step(vehicle, &[], world, start, Self::STEP_S)
+    }
+
+    /// The same with a machine that departs from its description.
+    pub fn deviating(
+        vehicle: &Vehicle,
+        deviations: &[Deviation],
+        world: Arc<World>,
+        start: [f64; 3],
+    ) -> Result<Self, PlantError> {
+        Self::with_step(vehicle, deviations, world, start, Self::STEP_S)
     }
 
     /// The same with another step length [s], to see what the step does.
     pub fn with_step(
         vehicle: &Vehicle,
+        deviations: &[Deviation],
         world: Arc<World>,
         start: [f64; 3],
         step_s: f64,
     ) -> Result<Self, PlantError> {
         vehicle.validate()?;
+        deviations.iter().try_for_each(Deviation::validate)?;
         if start.iter().any(|value| !value.is_finite()) {
             return Err(PlantError::NonFiniteStart(start));
         }
+        let machine = Machine::new(vehicle, deviations);
         let ground = Ground::new(world);
-        let rest = Rest::new(vehicle);
-        let gear = RunningGear::new(vehicle, &rest, ground.resolution_m(), step_s);
-        let stance = rest.stance(vehicle, &gear.envelope);
-        check_tyre(vehicle, &rest, &gear)?;
-        check_start(&stance, &ground, start)?;
-        let pose = standing(&stance, &gear, &ground, start);
-        let chassis = Chassis::new(vehicle, &rest, &stance, &ground, &pose, step_s);
+        let gear = machine.gear(ground.resolution_m(), step_s);
+        let stance = machine.rest.stance(&machine.body, &gear[0].envelope);
+        let mut plant = Self::parked(&machine, gear, &stance, ground, (start, step_s))?;
+        plant.advance(SETTLING_S);
+        plant.n_steps = 0;
+        Ok(plant)
+    }
+
+    fn parked(
+        machine: &Machine<'_>,
+        gear: [RunningGear; 4],
+        stance: &Stance,
+        ground: Ground,
+        (start, step_s): ([f64; 3], f64),
+    ) -> Result<Self, PlantError> {
+        let Machine { vehicle, body, rest, deviations, .. } = machine;
+        check_tyre(vehicle, rest, &gear)?;
+        check_start(stance, &ground, start)?;
+        let pose = standing(stance, &gear, &ground, start);
+        let chassis = Chassis::new(body, rest, stance, &ground, &pose, step_s);
         let track_m = vehicle.geometry.track_m;
         let axles = [vehicle.front, vehicle.rear];
-        let mut plant = Self {
+        Ok(Self {
             motion: chassis.motion(),
             chassis,
             wheels: stance.hub_m.map(Wheel::at),
@@ -164,9 +202,10 @@ impl Plant {
                 Strut::new(axles[i / 2].suspension, rest.load_n[i], vehicle.wheel.mass_kg)
             }),
             anti_roll_n_per_m: axles.map(|axle| axle.anti_roll_nm_per_rad / (track_m * track_m)),
-            drivetrain: Drivetrain::new(vehicle, &rest, &stance),
-            servo: SteeringServo::new(vehicle),
-            queue: DelayQueue::new(vehicle.servo.delay_s, step_s),
+            drivetrain: machine.drivetrain(&ground),
+            servo: SteeringServo::new(&machine.actuators, Linkage::new(deviations)),
+            receiver: Receiver::new(&vehicle.servo, deviations, step_s),
+            loads: deviations.iter().filter_map(|deviation| Load::of(deviation, rest.mass_kg)).collect(),
             limits: vehicle.limits,
             rolling_radius_m: stance.rolling_radius_m,
             command: Command::default(),
@@ -176,10 +215,7 @@ impl Plant {
             left_world: false,
             ground,
             gear,
-        };
-        plant.advance(SETTLING_S);
-        plant.n_steps = 0;
-        Ok(plant)
+        })
     }
 
     /// Takes a command; it is held until the next one and limited to what the vehicle may do.
@@ -203,8 +239,8 @@ impl Plant {
 
     /// Runs for one step.
     pub fn step(&mut self) {
-        let command = self.queue.pass(self.command);
-        self.servo.step(f64::from(command.steering_rad), self.step_s);
+        let command = self.receiver.pass(self.command);
+        self.servo.step(f64::from(command.steering_rad), self.front_lateral_n(), self.step_s);
         let spin_radps = self.wheels.map(|wheel| wheel.spin_radps);
         let torques = self.drivetrain.step(f64::from(command.speed_mps), spin_radps, self.step_s);
         let [left_rad, right_rad] = self.servo.wheel_angles_rad();
@@ -215,9 +251,17 @@ impl Plant {
             let input =
                 WheelInput { steering_rad: steering_rad[i], torque: torques[i], anti_roll_n: anti_roll_n[i] };
             let wheel = (&mut self.wheels[i], &self.struts[i]);
-            self.gear.step(wheel, &input, &self.motion, &self.ground, &mut wrench);
+            self.gear[i].step(wheel, &input, &self.motion, &self.ground, &mut wrench);
+        }
+        for load in &mut self.loads {
+            load.push(&self.motion, &self.ground, self.step_s, &mut wrench);
         }
         self.move_body(&wrench);
+    }
+
+    /// Friction of the ground on the front axle in the last step, left positive [N].
+    fn front_lateral_n(&self) -> f64 {
+        self.wheels[..2].iter().map(|wheel| wheel.friction_n().dot(&self.motion.axes[1])).sum()
     }
 
     fn anti_roll_n(&self) -> [f64; 4] {
@@ -311,9 +355,45 @@ impl Plant {
     }
 }
 
-fn check_tyre(vehicle: &Vehicle, rest: &Rest, gear: &RunningGear) -> Result<(), PlantError> {
+/// The machine as described, and as it is.
+struct Machine<'a> {
+    vehicle: &'a Vehicle,
+    deviations: &'a [Deviation],
+    body: Vehicle,
+    actuators: Vehicle,
+    rest: Rest,
+}
+
+impl<'a> Machine<'a> {
+    fn new(vehicle: &'a Vehicle, deviations: &'a [Deviation]) -> Self {
+        let body = altered_body(vehicle, deviations);
+        let rest = Rest::new(&body);
+        Self { vehicle, deviations, body, actuators: altered_actuators(vehicle, deviations), rest }
+    }
+
+    /// Tyres are made for the vehicle as described, and keep their stiffness under another load.
+    fn gear(&self, cell_m: f64, step_s: f64) -> [RunningGear; 4] {
+        let described = Rest::new(self.vehicle);
+        std::array::from_fn(|i| {
+            let wheel = altered_wheel(&self.body, self.deviations, i);
+            RunningGear::new(&wheel, &described, cell_m, step_s).deviating(self.deviations, i)
+        })
+    }
+
+    /// The motor controller knows mass and wheels from the description.
+    fn drivetrain(&self, ground: &Ground) -> Drivetrain {
+        let rest = Rest::new(self.vehicle);
+        let gear = RunningGear::new(self.vehicle, &rest, ground.resolution_m(), Plant::STEP_S);
+        let stance = rest.stance(self.vehicle, &gear.envelope);
+        Drivetrain::new(&self.actuators, &rest, &stance).deviating(self.deviations)
+    }
+}
+
+/// A tyre without air may go flat; the machine on four sound ones may not.
+fn check_tyre(vehicle: &Vehicle, rest: &Rest, gear: &[RunningGear; 4]) -> Result<(), PlantError> {
     let most_m = vehicle.geometry.wheel_radius_m / 3.0;
-    let found_m = gear.envelope.deflection_m(0.25 * rest.mass_kg * GRAVITY_MPS2);
+    let load_n = 0.25 * rest.mass_kg * GRAVITY_MPS2;
+    let found_m = gear.iter().map(|gear| gear.envelope.deflection_m(load_n)).fold(f64::INFINITY, f64::min);
     if found_m < most_m { Ok(()) } else { Err(PlantError::FlatTyre { most_m, found_m }) }
 }
 
@@ -330,7 +410,7 @@ fn check_start(stance: &Stance, ground: &Ground, start: [f64; 3]) -> Result<(), 
 }
 
 /// A pose in which the deepest wheel stands as deep as at rest and the body follows the ground under the wheels.
-fn standing(stance: &Stance, gear: &RunningGear, ground: &Ground, start: [f64; 3]) -> Isometry3<f64> {
+fn standing(stance: &Stance, gear: &[RunningGear; 4], ground: &Ground, start: [f64; 3]) -> Isometry3<f64> {
     let [x_m, y_m, yaw_rad] = start;
     let level = UnitQuaternion::from_euler_angles(0.0, 0.0, yaw_rad);
     let heights_m = stance.hub_m.map(|hub_m| {
@@ -345,12 +425,11 @@ fn standing(stance: &Stance, gear: &RunningGear, ground: &Ground, start: [f64; 3
     let rotation = UnitQuaternion::from_euler_angles(roll_rad, pitch_rad, yaw_rad);
     let left = rotation * Vector3::y();
     let lowest_m = 0.5 * (rear_left + rear_right);
-    let depth_m = stance.hub_m.map(|hub_m| {
+    let height_m = stance.hub_m.iter().zip(gear).map(|(hub_m, gear)| {
         let hub_m = Vector3::new(x_m, y_m, lowest_m) + rotation * hub_m;
-        Disc::new(hub_m, left).map_or(0.0, |disc| gear.envelope.depth_m(ground, &disc))
+        let depth_m = Disc::new(hub_m, left).map_or(0.0, |disc| gear.envelope.depth_m(ground, &disc));
+        lowest_m + depth_m - (gear.envelope.radius_m() - stance.axle_height_m)
     });
-    let deepest_m = depth_m.into_iter().fold(f64::NEG_INFINITY, f64::max);
-    let rest_depth_m = gear.envelope.radius_m() - stance.axle_height_m;
-    let z_m = lowest_m + deepest_m - rest_depth_m;
+    let z_m = height_m.fold(f64::NEG_INFINITY, f64::max);
     Isometry3::from_parts(Translation3::new(x_m, y_m, z_m), rotation)
 }

@@ -91,7 +91,7 @@ fn parked_on_rough_ground_nothing_stirs() {
 /// Where the vehicle is after 4 s of driving over hills.
 fn end_of_drive(vehicle: &Vehicle, step_s: f64) -> Vector3<f64> {
     let world = hills(0.1, Stribeck::DIRT);
-    let mut plant = Plant::with_step(vehicle, world, [0.0, 0.0, 0.3], step_s).unwrap();
+    let mut plant = Plant::with_step(vehicle, &[], world, [0.0, 0.0, 0.3], step_s).unwrap();
     drive(&mut plant, 1.5, 0.2, 2.0);
     drive(&mut plant, 1.5, -0.3, 2.0);
     plant.pose().isometry().translation.vector

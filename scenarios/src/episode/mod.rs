@@ -11,8 +11,8 @@ use bicycle::{Command, Decision, ImuSample, Odometry, Vehicle};
 use terrain::Scan;
 
 use crate::{
-    CommandError, IMU_PERIOD_NS, Imu, ImuConfig, Motion, OdometryConfig, OdometrySensor, Plant, PlantError,
-    RangeSensor, RangeSensorConfig, RangeSensorError, Task,
+    CommandError, Deviation, IMU_PERIOD_NS, Imu, ImuConfig, Motion, OdometryConfig, OdometrySensor, Plant,
+    PlantError, RangeSensor, RangeSensorConfig, RangeSensorError, Task,
 };
 pub use fault::{Fault, SensorFault};
 pub use referee::{Outcome, Rules};
@@ -50,6 +50,8 @@ pub struct EpisodeConfig {
     pub rules: Rules,
     /// What goes wrong with the sensors.
     pub faults: Vec<Fault>,
+    /// How the machine departs from its description all along.
+    pub deviations: Vec<Deviation>,
 }
 
 impl EpisodeConfig {
@@ -63,6 +65,7 @@ impl EpisodeConfig {
             imu: ImuConfig::for_length(vehicle.geometry.length_m),
             rules: Rules::default(),
             faults: Vec::new(),
+            deviations: Vec::new(),
         }
     }
 }
@@ -123,14 +126,14 @@ impl Episode {
         seed: u64,
     ) -> Result<Self, EpisodeError> {
         let samples_per_cycle = samples_per_cycle(&config)?;
-        let plant = Plant::new(vehicle, Arc::clone(&task.world), task.start)?;
+        let plant = Plant::deviating(vehicle, &config.deviations, Arc::clone(&task.world), task.start)?;
         let range_sensor = match config.range_sensor {
             Some(sensor) => Some(RangeSensor::new(sensor, Arc::clone(&task.world), seed)?),
             None => None,
         };
         let mut episode = Self {
             range_sensor,
-            odometry: OdometrySensor::new(config.odometry, seed),
+            odometry: OdometrySensor::deviating(config.odometry, &config.deviations, seed),
             imu: Imu::new(config.imu, seed),
             referee: Referee::new(config.rules, vehicle.limits),
             observation: Observation::default(),

@@ -3,6 +3,7 @@
 use bicycle::Vehicle;
 
 use super::rest::{Rest, Stance};
+use crate::Deviation;
 
 /// Torque between a wheel and the mean of the driven wheels, per difference of circumferential speed, over the
 /// wheel's load: how tight the limited-slip differentials are [s/m].
@@ -15,6 +16,8 @@ const INTEGRAL_RATIO: f64 = 4.0;
 const PARKING_SPEED_MPS: f64 = 1e-3;
 /// Wheel speed below which the parking brake is set [m/s].
 const STANDSTILL_MPS: f64 = 0.05;
+/// A battery gives at least this share of its voltage [-].
+const VOLTAGE_MIN: f64 = 0.2;
 
 /// Torques on one wheel.
 #[derive(Clone, Copy, Debug, Default)]
@@ -46,9 +49,16 @@ pub(crate) struct Drivetrain {
     integral_n: f64,
     drive_nm: f64,
     brake_nm: f64,
+    /// Growth of the integral over what the servo is tuned to [-].
+    integral_share: f64,
+    dead_band_mps: f64,
+    sag_per_s: f64,
+    /// Voltage of the battery over that at the start [-].
+    voltage: f64,
 }
 
 impl Drivetrain {
+    /// For a vehicle at rest as its description has it: that is what the servo is tuned to.
     pub(crate) fn new(vehicle: &Vehicle, rest: &Rest, stance: &Stance) -> Self {
         let rear = vehicle.drivetrain.rear_share;
         let brake_rear = rest.load_n[2] / (rest.load_n[0] + rest.load_n[2]);
@@ -71,13 +81,31 @@ impl Drivetrain {
             integral_n: 0.0,
             drive_nm: 0.0,
             brake_nm: 0.0,
+            integral_share: 1.0,
+            dead_band_mps: 0.0,
+            sag_per_s: 0.0,
+            voltage: 1.0,
         }
+    }
+
+    /// The same with a controller and a battery that depart from it.
+    pub(crate) fn deviating(mut self, deviations: &[Deviation]) -> Self {
+        for deviation in deviations {
+            match *deviation {
+                Deviation::MotorDroop => self.integral_share = 0.0,
+                Deviation::MotorDeadBand { speed_mps } => self.dead_band_mps += speed_mps,
+                Deviation::BatterySag { per_s } => self.sag_per_s += per_s,
+                _ => {}
+            }
+        }
+        self
     }
 
     /// Torques for wheels that turn at `spin_radps` relative to the body.
     pub(crate) fn step(&mut self, commanded_mps: f64, spin_radps: [f64; 4], step_s: f64) -> [WheelTorque; 4] {
         let mean_radps = self.mean_spin_radps(&spin_radps);
-        let (drive_nm, brake_nm) = self.servo(commanded_mps, mean_radps, step_s);
+        let understood_mps = self.understood_mps(commanded_mps, step_s);
+        let (drive_nm, brake_nm) = self.servo(understood_mps, mean_radps, step_s);
         let share = step_s / (self.response_s + step_s);
         self.drive_nm += share * (drive_nm - self.drive_nm);
         // Brakes let go at once: else the motor starts against them.
@@ -90,6 +118,15 @@ impl Drivetrain {
                 brake_nm: self.brake_nm * self.brake_share[i],
             }
         })
+    }
+
+    /// What is left of a command behind the dead band and under the battery's voltage, which falls while driving.
+    fn understood_mps(&mut self, commanded_mps: f64, step_s: f64) -> f64 {
+        if commanded_mps.abs() < self.dead_band_mps.max(PARKING_SPEED_MPS) {
+            return 0.0;
+        }
+        self.voltage = (self.voltage - self.sag_per_s * step_s).max(VOLTAGE_MIN);
+        commanded_mps * self.voltage
     }
 
     /// Mean circumferential speed of the driven wheels, as the vehicle's own calibration has it [m/s].
@@ -126,7 +163,7 @@ impl Drivetrain {
         let limited_nm = along_nm.clamp(-self.brake_max_nm, drive_max_nm);
         // Integrates only while the actuators follow, or when that leads back to where they do.
         if limited_nm == along_nm || (wanted_n > 0.0) != (error_mps > 0.0) {
-            self.integral_n += gain * error_mps * step_s / (INTEGRAL_RATIO * servo_s);
+            self.integral_n += self.integral_share * gain * error_mps * step_s / (INTEGRAL_RATIO * servo_s);
         }
         if limited_nm > 0.0 { (forward * limited_nm, 0.0) } else { (0.0, -limited_nm) }
     }

@@ -1,30 +1,14 @@
-//! From commanded to actual steering: transport delay, response, rate limit, Ackermann linkage.
+//! The steering servo: response, rate limit, and the Ackermann geometry of the wheels behind it.
 
-use bicycle::{Command, Vehicle};
+use bicycle::Vehicle;
 
-/// Commands on their way to the actuators.
-pub(crate) struct DelayQueue {
-    waiting: Vec<Command>,
-    next: usize,
-}
-
-impl DelayQueue {
-    pub(crate) fn new(delay_s: f64, step_s: f64) -> Self {
-        let n_steps = (delay_s / step_s).round() as usize;
-        Self { waiting: vec![Command::default(); n_steps + 1], next: 0 }
-    }
-
-    /// Puts in this step's command and takes out the one that arrives.
-    pub(crate) fn pass(&mut self, command: Command) -> Command {
-        self.waiting[self.next] = command;
-        self.next = (self.next + 1) % self.waiting.len();
-        self.waiting[self.next]
-    }
-}
+use super::linkage::Linkage;
 
 /// Turns the front wheels.
 pub(crate) struct SteeringServo {
+    servo_rad: f64,
     steering_rad: f64,
+    linkage: Linkage,
     response_s: f64,
     rate_max_radps: f64,
     steering_max_rad: f64,
@@ -33,9 +17,11 @@ pub(crate) struct SteeringServo {
 }
 
 impl SteeringServo {
-    pub(crate) fn new(vehicle: &Vehicle) -> Self {
+    pub(crate) fn new(vehicle: &Vehicle, linkage: Linkage) -> Self {
         Self {
+            servo_rad: 0.0,
             steering_rad: 0.0,
+            linkage,
             response_s: vehicle.servo.response_s,
             rate_max_radps: vehicle.limits.steering_rate_max_radps,
             steering_max_rad: vehicle.limits.steering_max_rad,
@@ -44,12 +30,14 @@ impl SteeringServo {
         }
     }
 
-    pub(crate) fn step(&mut self, commanded_rad: f64, step_s: f64) {
+    /// Turns for a step under the ground's lateral force on the front axle, left positive [N].
+    pub(crate) fn step(&mut self, commanded_rad: f64, lateral_n: f64, step_s: f64) {
         let target_rad = commanded_rad.clamp(-self.steering_max_rad, self.steering_max_rad);
         // Implicit in the response, so that a response faster than the step is no trouble.
-        let wanted_rad = (target_rad - self.steering_rad) * step_s / (self.response_s + step_s);
+        let wanted_rad = (target_rad - self.servo_rad) * step_s / (self.response_s + step_s);
         let most_rad = self.rate_max_radps * step_s;
-        self.steering_rad += wanted_rad.clamp(-most_rad, most_rad);
+        self.servo_rad += wanted_rad.clamp(-most_rad, most_rad);
+        self.steering_rad = self.linkage.turn(self.servo_rad, lateral_n, step_s);
     }
 
     /// Angle of the bicycle's one front wheel [rad].

@@ -9,7 +9,7 @@ use std::f64::consts::{E, SQRT_2};
 use bicycle::Vehicle;
 use nalgebra::Vector2;
 
-use crate::Stribeck;
+use crate::{Deviation, Stribeck};
 
 /// Rolling speed at which shear and sliding have equal say [m/s].
 const ROLLING_SPEED_MPS: f64 = 0.03;
@@ -28,6 +28,10 @@ pub(crate) struct Tyre {
     shear_per_m: f64,
     /// Shear damping over load [s/m].
     damping_s_per_m: f64,
+    /// Friction over that of the ground's curve [-].
+    grip: f64,
+    /// Steepness of the curve at small slip over that of the ground's [-].
+    stiffness: f64,
 }
 
 /// Shear of one tyre's tread: friction over load, forward and left, positive along the slip [-].
@@ -67,7 +71,32 @@ impl Tyre {
             reference_load_n,
             shear_per_m: shear_n_per_m / reference_load_n,
             damping_s_per_m: damping / reference_load_n,
+            grip: 1.0,
+            stiffness: 1.0,
         }
+    }
+
+    /// The same with the rubber and the carcass of wheel `index`.
+    pub(crate) fn deviating(mut self, deviations: &[Deviation], index: usize) -> Self {
+        for deviation in deviations {
+            match *deviation {
+                Deviation::TyreGrip { factor } => self.grip *= factor,
+                Deviation::TyreStiffness { front, rear } => {
+                    self.stiffness *= if index < 2 { front } else { rear };
+                }
+                Deviation::FlatTyre { wheel, stiffness, .. } if wheel == index => self.stiffness *= stiffness,
+                _ => {}
+            }
+        }
+        self
+    }
+
+    /// The ground's curve under this tyre. Friction over Stribeck speed is the steepness at small slip: both change
+    /// together where only the rubber differs.
+    fn curve(&self, ground: &Stribeck) -> Stribeck {
+        let scaled = ground.scaled(self.grip as f32);
+        let stretch = (self.grip / self.stiffness) as f32;
+        Stribeck { stribeck_speed_mps: stretch * ground.stribeck_speed_mps, ..scaled }
     }
 
     /// Advances the shear by a step and gives the force.
@@ -77,8 +106,9 @@ impl Tyre {
         let rolling_mps = footing.rolling_mps.abs();
         let rolling = rolling_mps / (rolling_mps + ROLLING_SPEED_MPS);
         let load_factor = self.load_factor(footing.load_n);
-        let curve_s_per_m = load_factor * friction_per_speed(&footing.friction, speed_mps);
-        let limit = load_factor * adhesion(&footing.friction, speed_mps);
+        let curve = self.curve(&footing.friction);
+        let curve_s_per_m = load_factor * friction_per_speed(&curve, speed_mps);
+        let limit = load_factor * adhesion(&curve, speed_mps);
 
         let decay_per_s = rolling * rolling_mps / self.relaxation_length_m;
         let shear_per_m = (1.0 - rolling) * self.shear_per_m;
@@ -142,6 +172,8 @@ mod tests {
             reference_load_n: LOAD_N,
             shear_per_m: 40.0,
             damping_s_per_m: 0.5,
+            grip: 1.0,
+            stiffness: 1.0,
         }
     }
 
@@ -215,5 +247,26 @@ mod tests {
         let slip_mps = Vector2::new(0.0, 3.0);
         let ratio = friction(slip_mps, 20.0, 2.0 * LOAD_N, 1.0).y / friction(slip_mps, 20.0, LOAD_N, 1.0).y;
         assert!((ratio - 0.8).abs() < 1e-3, "{ratio}");
+    }
+
+    #[test]
+    fn harder_rubber_slides_sooner_and_answers_small_slip_as_before() {
+        let hard = tyre().deviating(&[Deviation::TyreGrip { factor: 0.5 }], 0).curve(&Stribeck::ASPHALT);
+        let small = friction_per_speed(&hard, 1e-4) / friction_per_speed(&Stribeck::ASPHALT, 1e-4);
+        assert!((small - 1.0).abs() < 1e-4, "{small}");
+        // The peak of 0.98 at 3.18 m/s is one of 0.49 at half of that.
+        let peak_mps = 0.5 * 4.5 / SQRT_2;
+        assert!((friction_per_speed(&hard, peak_mps) * peak_mps - 0.49).abs() < 1e-6);
+    }
+
+    #[test]
+    fn softer_front_tyres_answer_small_slip_less_and_slide_with_the_same_friction() {
+        let soft = Deviation::TyreStiffness { front: 0.5, rear: 1.0 };
+        let [front, rear] = [0, 2].map(|index| tyre().deviating(&[soft], index).curve(&Stribeck::ASPHALT));
+        assert_eq!(rear, Stribeck::ASPHALT);
+        let small = friction_per_speed(&front, 1e-4) / friction_per_speed(&rear, 1e-4);
+        assert!((small - 0.5).abs() < 1e-4, "{small}");
+        let sliding = friction_per_speed(&front, 60.0) * 60.0;
+        assert!((sliding - 0.70).abs() < 1e-6, "{sliding}");
     }
 }

@@ -23,6 +23,8 @@ pub(crate) struct Immersion {
     pub diameter_m: f64,
     /// From the ground to the belly [m].
     pub clearance_m: f64,
+    /// Stems over those of plants of that height [-].
+    pub density: f64,
 }
 
 impl Immersion {
@@ -30,7 +32,7 @@ impl Immersion {
     pub(crate) fn resistance(&self) -> f64 {
         let ratio = self.height_m / self.diameter_m;
         let above_belly = (self.height_m - self.clearance_m).max(0.0) / self.diameter_m;
-        WHEEL_RESISTANCE * ratio * ratio + BUMPER_RESISTANCE * above_belly
+        self.density * (WHEEL_RESISTANCE * ratio * ratio + BUMPER_RESISTANCE * above_belly)
     }
 }
 

@@ -10,6 +10,7 @@ use super::ground::Ground;
 use super::rest::Rest;
 use super::tyre::{Footing, Shear, Tyre};
 use super::vegetation::{Immersion, Stems};
+use crate::Deviation;
 
 /// Stiffness of the travel stops over that of the spring [-].
 const STOP_RATIO: f64 = 10.0;
@@ -71,7 +72,7 @@ pub(crate) struct WheelInput {
     pub anti_roll_n: f64,
 }
 
-/// What all wheels have in common.
+/// What a wheel is made of.
 pub(crate) struct RunningGear {
     pub envelope: Envelope,
     tyre: Tyre,
@@ -83,6 +84,7 @@ pub(crate) struct RunningGear {
     reference_load_n: f64,
     radial_n_per_m: f64,
     radial_ns_per_m: f64,
+    vegetation_density: f64,
     step_s: f64,
 }
 
@@ -123,6 +125,12 @@ impl Wheel {
         }
     }
 
+    /// What of the ground's force lies in the ground, in map coordinates [N].
+    pub(crate) fn friction_n(&self) -> Vector3<f64> {
+        let normal = self.contact.map_or_else(Vector3::zeros, |contact| contact.normal);
+        self.force_n - normal * self.force_n.dot(&normal)
+    }
+
     /// Where the wheel is on a body that moves so.
     pub(crate) fn frame(&self, body: &BodyMotion, steering_rad: f64) -> WheelFrame {
         let [ahead, left, up] = body.axes;
@@ -159,6 +167,7 @@ impl Strut {
 }
 
 impl RunningGear {
+    /// Of a vehicle that stands like `rest` as its description has it.
     pub(crate) fn new(vehicle: &Vehicle, rest: &Rest, cell_m: f64, step_s: f64) -> Self {
         let radial_n_per_m = vehicle.tyre.radial_stiffness_n_per_m;
         let reference_load_n = 0.25 * rest.mass_kg * super::GRAVITY_MPS2;
@@ -175,8 +184,20 @@ impl RunningGear {
             reference_load_n,
             radial_n_per_m,
             radial_ns_per_m: 2.0 * TYRE_DAMPING * (radial_n_per_m * vehicle.wheel.mass_kg).sqrt(),
+            vegetation_density: 1.0,
             step_s,
         }
+    }
+
+    /// The same under wheel `index` of a machine that departs from it.
+    pub(crate) fn deviating(mut self, deviations: &[Deviation], index: usize) -> Self {
+        self.tyre = self.tyre.deviating(deviations, index);
+        for deviation in deviations {
+            if let Deviation::DenseVegetation { factor } = deviation {
+                self.vegetation_density *= factor;
+            }
+        }
+        self
     }
 
     /// Advances a wheel by a step and adds its forces on the body to `wrench`.
@@ -297,8 +318,12 @@ impl RunningGear {
         let ahead_m = self.radius_m.copysign(hub_mps.dot(&frame.forward));
         let edge_m = frame.hub_m + frame.forward * ahead_m;
         let plants_m = f64::from(ground.patch(edge_m.x, edge_m.y).vegetation_height_m);
-        let mut immersion =
-            Immersion { height_m: plants_m, diameter_m: 2.0 * self.radius_m, clearance_m: self.clearance_m };
+        let mut immersion = Immersion {
+            height_m: plants_m,
+            diameter_m: 2.0 * self.radius_m,
+            clearance_m: self.clearance_m,
+            density: self.vegetation_density,
+        };
         if plants_m > 0.0 {
             let foot_m = frame.hub_m.z - self.radius_m;
             let above_m = ground.height_m(edge_m.x, edge_m.y) + plants_m - foot_m;
