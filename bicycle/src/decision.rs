@@ -39,4 +39,6 @@ pub enum StopReason {
     NonFiniteResult,
     /// The pose lies outside the map.
     OutsideMap,
+    /// Whoever carries commands out has heard none for longer than their age limit.
+    StaleCommand,
 }

@@ -1,12 +1,12 @@
 //! Settings of the whole pipeline, and the ones that fit a machine.
 
-use bicycle::Vehicle;
+use bicycle::{Limits, Vehicle};
 use mppi::CostToGoConfig;
 use physics_prior::PriorConfig;
 use serde::{Deserialize, Serialize};
 use terrain::ElevationConfig;
 
-use crate::GuardConfig;
+use crate::{GuardConfig, NavigatorError};
 
 /// Vehicles below this length cannot look over what hides ground from them [m].
 const SMALL_LENGTH_M: f64 = 1.0;
@@ -94,8 +94,25 @@ impl Config {
         self.elevation.resolution_m * self.risk_map.elevation_cells as f64
     }
 
-    /// The first field of this crate's own that is out of range: name, what would do, value.
-    pub(crate) fn first_invalid(&self) -> Option<(&'static str, &'static str, f64)> {
+    /// Refuses the first field of this crate's own that is out of range.
+    pub(crate) fn validate(&self) -> Result<(), NavigatorError> {
+        match self.first_invalid() {
+            Some((field, expected, found)) => Err(NavigatorError::Config { field, expected, found }),
+            None => Ok(()),
+        }
+    }
+
+    /// What a plan may use of a vehicle's limits.
+    pub(crate) fn allowed(&self, limits: &Limits) -> Limits {
+        Limits {
+            roll_max_rad: self.attitude_share * limits.roll_max_rad,
+            pitch_max_rad: self.attitude_share * limits.pitch_max_rad,
+            ..*limits
+        }
+    }
+
+    /// Name of the field, what would do, value.
+    fn first_invalid(&self) -> Option<(&'static str, &'static str, f64)> {
         let at_least = |field, found: usize, least: usize, expected| {
             (found < least).then_some((field, expected, found as f64))
         };

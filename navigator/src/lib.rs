@@ -1,15 +1,23 @@
 //! The pipeline as one pure object: observation to map to risk map to decision. No clock, no file, no process.
 //!
-//! [`Navigator::observe`] takes in what was measured and keeps the maps; [`Navigator::decide`] asks the controller.
-//! They are apart because a robot maps and controls at different rates; a closed loop calls one after the other.
+//! It has three parts, which a robot may run in processes of their own: [`Surveyor`] maps the ground, [`Assessor`]
+//! turns the map into risk and time to the goal, [`Pilot`] decides. [`Navigator`] is the three in one, for a closed
+//! loop: [`Navigator::observe`] takes in what was measured and keeps the maps, [`Navigator::decide`] asks the
+//! controller.
 
+mod assessor;
 mod author;
 mod config;
 mod guard;
 mod navigator;
+mod pilot;
 mod risk;
+mod surveyor;
 
+pub use assessor::Assessor;
 pub use config::{Config, RiskMapConfig};
 pub use guard::{Guard, GuardConfig, Jump};
 pub use navigator::{Navigator, NavigatorError, Setup, Surface};
-pub use risk::{Belief, RiskOracle};
+pub use pilot::{Chart, Destination, Pilot};
+pub use risk::{Belief, RiskOracle, StuckPose};
+pub use surveyor::Surveyor;

@@ -8,7 +8,7 @@ use evidential::{BeliefMapError, Checkpoint, Learned, Unfamiliar};
 use physics_prior::{Assumption, PriorConfig};
 use rayon::prelude::*;
 use terrain::{CellRegion, GridGeometry, GridMap, SurfaceCell};
-use traversability::{CvarLevel, Risk, RiskMap, RiskMapView};
+use traversability::{CvarLevel, Risk, RiskMapView};
 
 use crate::author::Author;
 
@@ -36,8 +36,10 @@ pub enum Belief {
 
 /// Where the vehicle got stuck, heading this way: proof that the map promised too much there.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct StuckPose {
+pub struct StuckPose {
+    /// Where the rear axle's centre was [m].
     pub position_m: [f64; 2],
+    /// Where it was heading [rad].
     pub yaw_rad: f64,
 }
 
@@ -56,8 +58,6 @@ pub(crate) struct RiskLayer {
     oracle: Option<(RiskOracle, Vec<Risk>)>,
     stuck: Vec<StuckPose>,
     length_m: f64,
-    /// What is believed, less the poses that proved stuck.
-    map: RiskMap,
     recentre_cells: i64,
     is_filled: bool,
 }
@@ -102,15 +102,25 @@ impl RiskLayer {
             oracle,
             stuck: Vec::with_capacity(STUCK_MAX),
             length_m: geometry.length_m,
-            map: RiskMap::constant(grid, window.n_yaws, Risk::OUTSIDE),
             recentre_cells: (window.recentre_m / resolution_m).ceil() as i64,
             is_filled: false,
         })
     }
 
-    /// The map, once there was an update.
-    pub fn view(&self) -> Option<RiskMapView<'_>> {
-        self.is_filled.then(|| self.map.view())
+    /// What the author says, once there was an update.
+    pub fn known(&self) -> Option<RiskMapView<'_>> {
+        self.is_filled.then(|| self.author.risk_map().view())
+    }
+
+    /// Takes who knows better, and the poses that proved stuck, into risks that were taken from the author.
+    pub fn amend(&self, risks: &mut [Risk]) {
+        if let Some((_, answer)) = &self.oracle {
+            believe(answer, risks);
+        }
+        let known = self.author.risk_map().view();
+        for pose in &self.stuck {
+            block(risks, &known, pose, self.length_m);
+        }
     }
 
     /// Remembers a pose that proved impassable; of very many, the oldest is forgotten.
@@ -119,7 +129,6 @@ impl RiskLayer {
             self.stuck.remove(0);
         }
         self.stuck.push(pose);
-        block(&mut self.map, &pose, self.length_m);
     }
 
     /// The localisation moved by a step, and what was remembered in its frame moves along.
@@ -142,19 +151,9 @@ impl RiskLayer {
         } else {
             self.author.update_all(surface)?;
         }
-        let known = self.author.risk_map().view();
-        self.map.place_at(known.geometry.origin);
-        let (risks, ground) = self.map.arrays_mut();
-        risks.copy_from_slice(known.risks);
-        ground.copy_from_slice(known.ground);
-        if let Some((oracle, answer)) = &mut self.oracle {
-            if is_moved {
-                oracle(&known.geometry, known.n_yaws, answer);
-            }
-            believe(answer, risks);
-        }
-        for pose in &self.stuck {
-            block(&mut self.map, pose, self.length_m);
+        if let Some((oracle, answer)) = self.oracle.as_mut().filter(|_| is_moved) {
+            let known = self.author.risk_map().view();
+            oracle(&known.geometry, known.n_yaws, answer);
         }
         self.is_filled = true;
         Ok(())
@@ -176,8 +175,7 @@ impl RiskLayer {
 
 /// Blocks the poses in and just ahead of one that proved stuck, in headings close to its own: another way past the
 /// same place stays open, and so does the way back.
-fn block(map: &mut RiskMap, stuck: &StuckPose, length_m: f64) {
-    let view = map.view();
+fn block(risks: &mut [Risk], view: &RiskMapView<'_>, stuck: &StuckPose, length_m: f64) {
     let (geometry, n_yaws) = (view.geometry, view.n_yaws);
     let turned = |bin: usize| {
         let turn = (view.yaw_rad(bin) - stuck.yaw_rad).rem_euclid(TAU);
@@ -189,7 +187,6 @@ fn block(map: &mut RiskMap, stuck: &StuckPose, length_m: f64) {
         stuck.position_m[0] + ahead_m * stuck.yaw_rad.cos(),
         stuck.position_m[1] + ahead_m * stuck.yaw_rad.sin(),
     ];
-    let (risks, _) = map.arrays_mut();
     for index in 0..geometry.n_cells() {
         let [x_m, y_m] = geometry.centre_m(geometry.cell(index));
         if (x_m - centre_m[0]).hypot(y_m - centre_m[1]) <= STUCK_RADIUS * length_m {
@@ -213,12 +210,14 @@ fn believe(answer: &[Risk], risks: &mut [Risk]) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use traversability::RiskMap;
 
     #[test]
     fn a_stuck_pose_blocks_what_lies_ahead_in_its_heading_and_leaves_the_way_back() {
         let grid = GridGeometry::centred(0.25, 41, 41, 0.0, 0.0);
         let mut map = RiskMap::constant(grid, 16, Risk::NONE);
-        block(&mut map, &StuckPose { position_m: [0.0, 0.0], yaw_rad: 0.2 }, 3.4);
+        let known = map.clone();
+        block(map.arrays_mut().0, &known.view(), &StuckPose { position_m: [0.0, 0.0], yaw_rad: 0.2 }, 3.4);
         let view = map.view();
         assert!(view.risk_at(0.0, 0.0, 0.2).is_blocked() && view.risk_at(1.2, 0.2, 0.2).is_blocked());
         assert!(!view.risk_at(0.0, 0.0, 0.2 + std::f64::consts::PI).is_blocked(), "turned around");

@@ -1,1 +1,21 @@
-//! The pipeline as processes.
+//! The pipeline as processes of their own: channels without copies, a clock, health, and what happens when one of them
+//! fails.
+//!
+//! Every process does one of `navigator`'s parts, the same object that a closed loop in one process drives with, and
+//! tells the others what it found over [`channel`]s. Whoever runs the vehicle is one more process.
+
+pub mod channel;
+pub mod clock;
+pub mod control;
+mod error;
+pub mod layout;
+pub mod learning;
+pub mod mapping;
+pub mod message;
+pub mod payload;
+pub mod plant;
+pub mod risk_maker;
+pub mod status;
+pub mod watchdog;
+
+pub use error::RuntimeError;

@@ -4,7 +4,7 @@ use terrain::{Cell, GridGeometry, TerrainClass};
 
 /// Worst expected traversability of one pose: left-tail CVaR of traction, right-tail CVaR of attitude
 /// (PIETRA, equation 6). Laid out as four adjacent f32, so that one lookup is one 16-byte load.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 pub struct Risk {
     /// Achieved over commanded speed, in [0, 1].
@@ -38,7 +38,7 @@ impl Risk {
 }
 
 /// Bits that say what a cell is.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(transparent)]
 pub struct GroundFlags(pub u8);
 
@@ -62,7 +62,7 @@ impl GroundFlags {
 }
 
 /// The ground of one cell, whatever the yaw.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, bytemuck::AnyBitPattern)]
 #[repr(C)]
 pub struct Ground {
     /// Height change per metre east and north, signed [-].

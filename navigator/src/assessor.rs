@@ -1,0 +1,84 @@
+//! The second part of the pipeline: the map of the ground becomes risk and time to the goal.
+
+use bicycle::{Limits, Vehicle};
+use mppi::{CostToGo, CostToGoView};
+use terrain::{CellRegion, GridMap, SurfaceCell};
+use traversability::{CvarLevel, Risk, RiskMapView};
+
+use crate::risk::{Belief, RiskLayer, StuckPose};
+use crate::{Config, NavigatorError};
+
+/// Judges the ground and finds the least time over it to the goal.
+pub struct Assessor {
+    layer: RiskLayer,
+    cost_to_go: CostToGo,
+}
+
+impl Assessor {
+    /// An assessor of a surface with the settings of `config`; the cost to go keeps to `limits`.
+    pub fn new(
+        vehicle: &Vehicle,
+        limits: &Limits,
+        config: &Config,
+        belief: &Belief,
+        level: CvarLevel,
+    ) -> Result<Self, NavigatorError> {
+        config.validate()?;
+        let window = config.risk_map;
+        Ok(Self {
+            layer: RiskLayer::new(belief, &config.prior, level, &vehicle.geometry, config)?,
+            cost_to_go: CostToGo::new(
+                config.cost_to_go,
+                &config.allowed(limits),
+                window.n_rows,
+                window.n_cols,
+            )?,
+        })
+    }
+
+    /// Follows the vehicle and judges anew what changed of the surface.
+    pub fn update(
+        &mut self,
+        position_m: [f64; 2],
+        surface: &GridMap<SurfaceCell>,
+        changed: &CellRegion,
+    ) -> Result<(), NavigatorError> {
+        Ok(self.layer.update(position_m, surface, changed)?)
+    }
+
+    /// What the ground is judged to be, before [`Assessor::amend`]; `None` until the first update.
+    pub fn known(&self) -> Option<RiskMapView<'_>> {
+        self.layer.known()
+    }
+
+    /// Brings what driving has proved, and who knows better, into risks that were taken from
+    /// [`Assessor::known`].
+    pub fn amend(&self, risks: &mut [Risk]) {
+        self.layer.amend(risks);
+    }
+
+    /// The least time over an amended map to the goal.
+    pub fn time_to_goal(
+        &mut self,
+        map: RiskMapView<'_>,
+        goal_m: [f64; 2],
+    ) -> Result<CostToGoView<'_>, NavigatorError> {
+        self.cost_to_go.update(map, goal_m)?;
+        Ok(self.cost_to_go.view())
+    }
+
+    /// The times of the last [`Assessor::time_to_goal`].
+    pub fn last_time_to_goal(&self) -> CostToGoView<'_> {
+        self.cost_to_go.view()
+    }
+
+    /// Remembers a pose that proved impassable; of very many, the oldest is forgotten.
+    pub fn note_stuck(&mut self, pose: StuckPose) {
+        self.layer.note_stuck(pose);
+    }
+
+    /// The localisation moved by a step, and what is remembered in its frame moves along.
+    pub fn shift_stuck(&mut self, step_m: [f64; 2]) {
+        self.layer.shift_stuck(step_m);
+    }
+}

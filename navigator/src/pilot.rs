@@ -1,0 +1,141 @@
+//! The third part of the pipeline: the state of the vehicle and a risk map become a decision.
+
+use bicycle::{Decision, HoldReason, Model, Odometry, StopReason};
+use mppi::{Controller, CostToGoView, Input, Objective, Terminal};
+use traversability::RiskMapView;
+
+use crate::guard::Guard;
+use crate::risk::StuckPose;
+use crate::{Config, NavigatorError};
+
+/// What the pilot drives on.
+#[derive(Clone, Copy, Debug)]
+pub struct Chart<'a> {
+    /// Risk around the vehicle.
+    pub map: RiskMapView<'a>,
+    /// Least time to the goal over it.
+    pub time_to_goal: CostToGoView<'a>,
+}
+
+/// Where to go.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Destination {
+    /// The place in the map frame [m].
+    pub goal_m: [f64; 2],
+    /// Distance that counts as there [m].
+    pub tolerance_m: f64,
+}
+
+/// Watches what comes in and asks the controller.
+pub struct Pilot {
+    guard: Guard,
+    controller: Controller,
+    odometry: Option<Odometry>,
+    fault: Option<StopReason>,
+    decided_at_ns: Option<u64>,
+    elapsed_s: f64,
+    cycle: u64,
+    stuck: Option<StuckPose>,
+}
+
+impl Pilot {
+    /// A pilot that knows nothing yet.
+    pub fn new(model: Model, config: &Config, seed: u64) -> Result<Self, NavigatorError> {
+        config.validate()?;
+        let mut model = model;
+        model.limits = config.allowed(&model.limits);
+        Ok(Self {
+            guard: Guard::new(config.guard),
+            controller: Controller::new(config.controller.clone(), model, seed)?,
+            odometry: None,
+            fault: None,
+            decided_at_ns: None,
+            elapsed_s: 0.0,
+            cycle: 0,
+            stuck: None,
+        })
+    }
+
+    /// Takes in where the vehicle is. What cannot be used is remembered as the reason for the next decision.
+    pub fn admit(&mut self, odometry: &Odometry) {
+        match self.guard.admit_odometry(odometry) {
+            Ok(_) => {
+                self.fault = None;
+                self.odometry = Some(*odometry);
+            }
+            Err(reason) => self.fault = Some(reason),
+        }
+    }
+
+    /// Notes when the scan was measured that the map knows of.
+    pub fn note_scan(&mut self, valid_at_ns: u64) {
+        self.guard.note_scan(valid_at_ns);
+    }
+
+    /// The command for now, or the reason for none. `now_ns` is on the clock of the measurements.
+    pub fn decide(&mut self, now_ns: u64, chart: Option<Chart<'_>>, destination: &Destination) -> Decision {
+        self.elapsed_s =
+            self.decided_at_ns.map_or(0.0, |then_ns| now_ns.saturating_sub(then_ns) as f64 * 1e-9);
+        let decision = self.consider(now_ns, chart, destination);
+        let speed_mps = match decision {
+            Decision::Drive(command) => command.speed_mps,
+            Decision::Hold(_) | Decision::Stop(_) => 0.0,
+        };
+        self.guard.note_command(speed_mps);
+        self.decided_at_ns = Some(now_ns);
+        self.cycle += 1;
+        decision
+    }
+
+    /// The pose where the last decision found the vehicle stuck, once.
+    pub fn take_stuck(&mut self) -> Option<StuckPose> {
+        self.stuck.take()
+    }
+
+    /// The controller, for its diagnostics and rollouts.
+    pub fn controller(&self) -> &Controller {
+        &self.controller
+    }
+
+    /// The odometry that the next decision would act on.
+    pub fn odometry(&self) -> Option<&Odometry> {
+        self.odometry.as_ref()
+    }
+
+    /// Decisions so far.
+    pub fn cycle(&self) -> u64 {
+        self.cycle
+    }
+
+    /// Time from the decision before the last one to the last one [s].
+    pub fn elapsed_s(&self) -> f64 {
+        self.elapsed_s
+    }
+
+    fn consider(&mut self, now_ns: u64, chart: Option<Chart<'_>>, destination: &Destination) -> Decision {
+        let fresh = self.fault.map_or_else(|| self.guard.check(now_ns), Err);
+        if let Err(reason) = fresh {
+            return Decision::Stop(reason);
+        }
+        let (Some(chart), Some(odometry)) = (chart, self.odometry) else {
+            return Decision::Hold(HoldReason::NoMap);
+        };
+        let was_recovering = self.controller.diagnostics().is_recovering;
+        let decision = self.controller.decide(&Input {
+            state: odometry.state(),
+            elapsed_s: self.elapsed_s,
+            map: chart.map,
+            objective: Objective::Goal {
+                goal_m: destination.goal_m,
+                tolerance_m: destination.tolerance_m,
+                terminal: Terminal::CostToGo(chart.time_to_goal),
+            },
+            cycle: self.cycle,
+        });
+        if self.controller.diagnostics().is_recovering && !was_recovering {
+            let [x_m, y_m, _] = odometry.position_m;
+            self.stuck = Some(StuckPose { position_m: [x_m, y_m], yaw_rad: odometry.attitude_rad[2] });
+        }
+        decision
+    }
+}

@@ -1,0 +1,191 @@
+//! Channels between the processes: publish and subscribe over shared memory, without a copy on the way.
+
+mod bus;
+mod inlet;
+mod outlet;
+
+use std::fmt::Debug;
+
+use iceoryx2::prelude::ZeroCopySend;
+
+use crate::message::{
+    CommandRecord, DecisionRecord, MissionRecord, OdometryRecord, PointRecord, RiskHeader, ScanHeader, Stamp,
+    StatusRecord, StuckRecord, SurfaceHeader,
+};
+use crate::payload;
+pub use bus::{Bus, RunName, RunNameError};
+pub use inlet::{Counts, Inlet, Message, Refusal};
+pub use outlet::{Loan, Outlet};
+
+/// A header that begins with a stamp.
+pub trait Header: ZeroCopySend + bytemuck::Pod + Default + Debug + 'static {
+    /// The stamp.
+    fn stamp(&self) -> &Stamp;
+    /// The stamp, to be filled by the outlet.
+    fn stamp_mut(&mut self) -> &mut Stamp;
+}
+
+impl Header for Stamp {
+    fn stamp(&self) -> &Stamp {
+        self
+    }
+    fn stamp_mut(&mut self) -> &mut Stamp {
+        self
+    }
+}
+
+macro_rules! header {
+    ($($name:ident),*) => { $(
+        impl Header for $name {
+            fn stamp(&self) -> &Stamp {
+                &self.stamp
+            }
+            fn stamp_mut(&mut self) -> &mut Stamp {
+                &mut self.stamp
+            }
+        }
+    )* };
+}
+header!(ScanHeader, SurfaceHeader, RiskHeader);
+
+/// An element of a payload.
+pub trait Element: ZeroCopySend + bytemuck::Pod + Default + Debug + 'static {}
+impl<T: ZeroCopySend + bytemuck::Pod + Default + Debug + 'static> Element for T {}
+
+/// One kind of message: its name, its types, how many are kept, and what makes one malformed.
+pub struct Channel<H, T> {
+    /// Name of the service.
+    pub name: &'static str,
+    /// Messages that wait for a subscriber; of more, the oldest is dropped.
+    pub depth: usize,
+    /// Subscribers at once.
+    pub n_readers: usize,
+    /// A publisher that is silent for this long has lost its place to the next one [ns].
+    pub silence_ns: u64,
+    /// Refuses what no reader could use.
+    pub check: fn(&H, &[T]) -> Result<(), Refusal>,
+}
+
+const MILLISECOND_NS: u64 = 1_000_000;
+/// Publishers at once on a channel: one that counts, and room for those that do not.
+pub(crate) const PUBLISHERS_MAX: usize = 4;
+
+/// Where the vehicle is: whoever runs the vehicle.
+pub const ODOMETRY: Channel<Stamp, OdometryRecord> = Channel {
+    name: "odometry",
+    depth: 32,
+    n_readers: 6,
+    silence_ns: 300 * MILLISECOND_NS,
+    check: payload::check_odometry,
+};
+/// What the range sensor sees: whoever runs the vehicle.
+pub const SCAN: Channel<ScanHeader, PointRecord> = Channel {
+    name: "scan",
+    depth: 4,
+    n_readers: 4,
+    silence_ns: 1000 * MILLISECOND_NS,
+    check: payload::check_scan,
+};
+/// The map of the ground: mapping.
+pub const SURFACE: Channel<SurfaceHeader, [f32; 8]> = Channel {
+    name: "surface",
+    depth: 2,
+    n_readers: 3,
+    silence_ns: 1000 * MILLISECOND_NS,
+    check: payload::check_surface,
+};
+/// The risk map of what was learned: learning.
+pub const RISK: Channel<RiskHeader, [f32; 4]> = Channel {
+    name: "risk",
+    depth: 1,
+    n_readers: 4,
+    silence_ns: 600 * MILLISECOND_NS,
+    check: payload::check_risk,
+};
+/// The risk map of physics alone: mapping, while learning is silent.
+pub const RISK_PHYSICS: Channel<RiskHeader, [f32; 4]> = Channel { name: "risk_physics", ..RISK };
+/// What the vehicle shall do: control.
+pub const COMMAND: Channel<Stamp, CommandRecord> = Channel {
+    name: "command",
+    depth: 4,
+    n_readers: 6,
+    silence_ns: 400 * MILLISECOND_NS,
+    check: payload::check_command,
+};
+/// What each decision was made from: control.
+pub const DECISION: Channel<Stamp, DecisionRecord> = Channel {
+    name: "decision",
+    depth: 16,
+    n_readers: 4,
+    silence_ns: 400 * MILLISECOND_NS,
+    check: payload::check_anything,
+};
+/// Where the vehicle got stuck: control.
+pub const STUCK: Channel<Stamp, StuckRecord> = Channel {
+    name: "stuck",
+    depth: 8,
+    n_readers: 3,
+    silence_ns: 400 * MILLISECOND_NS,
+    check: payload::check_stuck,
+};
+/// Where to go: whoever runs the vehicle.
+pub const MISSION: Channel<Stamp, MissionRecord> = Channel {
+    name: "mission",
+    depth: 2,
+    n_readers: 6,
+    silence_ns: 2500 * MILLISECOND_NS,
+    check: payload::check_mission,
+};
+
+/// How a process is doing. Several publish at once: one channel for each role.
+pub const fn status_channel(name: &'static str) -> Channel<Stamp, StatusRecord> {
+    Channel {
+        name,
+        depth: 2,
+        n_readers: 3,
+        silence_ns: 1500 * MILLISECOND_NS,
+        check: payload::check_anything,
+    }
+}
+
+/// Why a channel cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum ChannelError {
+    /// The process could not join the others.
+    #[error("run {run}: expected to join its processes, found: {problem}")]
+    Join {
+        /// Name of the run.
+        run: String,
+        /// What the system said.
+        problem: String,
+    },
+    /// A channel could not be opened, e.g. because another program made one of other types under its name.
+    #[error("channel {channel}: expected to open it, found: {problem}")]
+    Open {
+        /// Its name.
+        channel: &'static str,
+        /// What the system said.
+        problem: String,
+    },
+    /// A message could not be sent.
+    #[error("channel {channel}: expected to send, found: {problem}")]
+    Send {
+        /// Its name.
+        channel: &'static str,
+        /// What the system said.
+        problem: String,
+    },
+    /// There is too little shared memory.
+    #[error(
+        "shared memory {place}: expected {needed_mb:.0} MB free for this process, found {free_mb:.0} MB; in a \
+         container, give it more, e.g. --shm-size 256m"
+    )]
+    Memory {
+        /// Where it lies.
+        place: &'static str,
+        /// What the process may need [MB].
+        needed_mb: f64,
+        /// What there is [MB].
+        free_mb: f64,
+    },
+}

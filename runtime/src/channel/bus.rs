@@ -1,0 +1,185 @@
+//! A process among the others of its run.
+
+use std::str::FromStr;
+
+use iceoryx2::config::Config;
+use iceoryx2::node::{Node, NodeBuilder};
+use iceoryx2::prelude::{FileName, LogLevel, Path, SemanticString, SignalHandlingMode, ipc, set_log_level};
+use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
+
+use super::{Channel, ChannelError, Element, Header, Inlet, Outlet, PUBLISHERS_MAX};
+use crate::clock;
+
+/// Where shared memory lies.
+const SHARED_MEMORY: &str = "/dev/shm";
+/// Where the files lie by which processes find one another.
+const ROOT: &str = "/tmp/surefoot";
+
+/// Name of a run: its processes find one another by it, and no others.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct RunName(String);
+
+/// A word that names no run.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("expected 1 to 32 letters, digits, - or _, found {found:?}")]
+pub struct RunNameError {
+    /// The word.
+    pub found: String,
+}
+
+impl FromStr for RunName {
+    type Err = RunNameError;
+
+    fn from_str(word: &str) -> Result<Self, RunNameError> {
+        let allowed = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
+        if (1..=32).contains(&word.len()) && word.chars().all(allowed) {
+            Ok(Self(word.to_owned()))
+        } else {
+            Err(RunNameError { found: word.to_owned() })
+        }
+    }
+}
+
+impl std::fmt::Display for RunName {
+    fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        formatter.write_str(&self.0)
+    }
+}
+
+impl RunName {
+    /// Start of the names of its files in shared memory.
+    pub fn prefix(&self) -> String {
+        format!("surefoot_{}_", self.0)
+    }
+
+    /// Folder of the files by which its processes find one another.
+    pub fn folder(&self) -> String {
+        format!("{ROOT}/{}", self.0)
+    }
+}
+
+/// The process's way to its channels.
+pub struct Bus {
+    node: Node<ipc::Service>,
+    epoch_ns: u64,
+}
+
+impl Bus {
+    /// Joins the processes of a run; clears away what dead ones have left behind.
+    ///
+    /// # Errors
+    /// The folder of the run or the shared memory cannot be used.
+    pub fn join(run: &RunName) -> Result<Self, ChannelError> {
+        // Failures come back as values; what else it says is for its own developers.
+        set_log_level(LogLevel::Fatal);
+        let refused = |problem: String| ChannelError::Join { run: run.to_string(), problem };
+        let config = config(run).map_err(refused)?;
+        let builder = NodeBuilder::new().config(&config).signal_handling_mode(SignalHandlingMode::Disabled);
+        let node = builder.create::<ipc::Service>().map_err(|error| refused(error.to_string()))?;
+        Ok(Self { node, epoch_ns: clock::now_ns() })
+    }
+
+    /// When this process joined, which names its life [ns].
+    pub fn epoch_ns(&self) -> u64 {
+        self.epoch_ns
+    }
+
+    /// The way into a channel, for messages of up to `n_max` elements.
+    pub fn outlet<H: Header, T: Element>(
+        &self,
+        channel: &Channel<H, T>,
+        n_max: usize,
+    ) -> Result<Outlet<H, T>, ChannelError> {
+        let service = self.service(channel)?;
+        let n_samples = channel.n_readers * (2 * channel.depth + 1) + 2;
+        check_memory((n_samples * n_max * size_of::<T>()) as f64)?;
+        let publisher = service
+            .publisher_builder()
+            .initial_max_slice_len(n_max)
+            .max_loaned_samples(1)
+            .create()
+            .map_err(|error| open_error(channel.name, error))?;
+        Ok(Outlet::new(channel.name, publisher, self.epoch_ns, n_max))
+    }
+
+    /// The way out of a channel.
+    pub fn inlet<H: Header, T: Element>(&self, channel: &Channel<H, T>) -> Result<Inlet<H, T>, ChannelError> {
+        let service = self.service(channel)?;
+        let subscriber =
+            service.subscriber_builder().create().map_err(|error| open_error(channel.name, error))?;
+        Ok(Inlet::new(channel, subscriber))
+    }
+
+    /// Clears away what dead processes of the run have left behind; returns of how many.
+    pub fn clear_dead(&self) -> u64 {
+        self.node.try_cleanup_dead_nodes().cleanups
+    }
+
+    fn service<H: Header, T: Element>(
+        &self,
+        channel: &Channel<H, T>,
+    ) -> Result<PortFactory<ipc::Service, [T], H>, ChannelError> {
+        let name = channel.name.try_into().map_err(|error| open_error(channel.name, error))?;
+        // A reader may hold as many as can wait and one that it goes on using: so a flood of one publisher is passed
+        // over once its share is held, and the others are heard.
+        self.node
+            .service_builder(&name)
+            .publish_subscribe::<[T]>()
+            .user_header::<H>()
+            .max_publishers(PUBLISHERS_MAX)
+            .max_subscribers(channel.n_readers)
+            .subscriber_max_buffer_size(channel.depth)
+            .subscriber_max_borrowed_samples(channel.depth + 1)
+            .history_size(0)
+            .enable_safe_overflow(true)
+            .open_or_create()
+            .map_err(|error| open_error(channel.name, error))
+    }
+}
+
+fn config(run: &RunName) -> Result<Config, String> {
+    let problem = |error| format!("{error:?}");
+    let mut config = Config::default();
+    config.global.prefix = FileName::new(run.prefix().as_bytes()).map_err(problem)?;
+    config.global.set_root_path(&Path::new(run.folder().as_bytes()).map_err(problem)?);
+    Ok(config)
+}
+
+fn open_error(channel: &'static str, error: impl std::fmt::Display) -> ChannelError {
+    ChannelError::Open { channel, problem: error.to_string() }
+}
+
+/// Writing into memory that is not there would end the process: better refuse before.
+fn check_memory(needed_bytes: f64) -> Result<(), ChannelError> {
+    // A system that will not say has no such limit.
+    let Ok(space) = rustix::fs::statvfs(SHARED_MEMORY) else { return Ok(()) };
+    let free_bytes = space.f_bavail as f64 * space.f_frsize as f64;
+    if free_bytes >= needed_bytes {
+        return Ok(());
+    }
+    Err(ChannelError::Memory {
+        place: SHARED_MEMORY,
+        needed_mb: needed_bytes * 1e-6,
+        free_mb: free_bytes * 1e-6,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn runs_have_plain_names() {
+        assert_eq!("field-2_b".parse::<RunName>().unwrap().prefix(), "surefoot_field-2_b_");
+        let long = "x".repeat(33);
+        for wrong in ["", "a b", "../up", "a/b", "\u{e4}", &long] {
+            assert!(wrong.parse::<RunName>().unwrap_err().to_string().contains("found"), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn more_shared_memory_than_there_is_is_refused_with_the_numbers() {
+        let told = check_memory(1e18).unwrap_err().to_string();
+        assert!(told.contains("expected 1000000000000 MB free") && told.contains("found"), "{told}");
+    }
+}

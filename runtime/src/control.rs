@@ -1,0 +1,211 @@
+//! The controller as a process: a decision at every deadline, on what there is, and never a wait for the map.
+
+use bicycle::Model;
+use navigator::{Chart, Config, Destination, Pilot};
+
+use crate::RuntimeError;
+use crate::channel::{
+    Bus, COMMAND, DECISION, Inlet, MISSION, Message, ODOMETRY, Outlet, RISK, RISK_PHYSICS, STUCK,
+};
+use crate::clock::{self, Cycle};
+use crate::message::{
+    CommandRecord, DecisionRecord, MissionRecord, OdometryRecord, RiskHeader, Source, Stamp, StuckRecord,
+};
+use crate::payload::risk_views;
+use crate::status::{Health, Meter, Role};
+
+/// Age of a scan from which on physics' younger map is preferred to a learned one [s].
+const LEARNED_AGE_MAX_S: f64 = 0.6;
+
+/// What controls.
+pub struct ControlSetup {
+    /// What is believed of the vehicle.
+    pub model: Model,
+    /// Settings of the pipeline.
+    pub config: Config,
+    /// Decides the samples.
+    pub seed: u64,
+    /// Time between two decisions [s].
+    pub period_s: f64,
+}
+
+/// Decides at every deadline until `is_over` says to end.
+pub fn run(bus: &Bus, setup: ControlSetup, is_over: &dyn Fn() -> bool) -> Result<(), RuntimeError> {
+    let period_ns = clock::nanoseconds(setup.period_s);
+    let mut control = Control::new(bus, setup)?;
+    let mut cycle = Cycle::new(clock::now_ns() + period_ns, period_ns);
+    while !is_over() {
+        let began_ns = clock::sleep_until(cycle.deadline_ns());
+        let lateness_ns = began_ns - cycle.deadline_ns();
+        control.cycle(began_ns, lateness_ns)?;
+        cycle.advance(clock::now_ns());
+        control.report(lateness_ns, cycle.n_missed())?;
+    }
+    Ok(())
+}
+
+struct Control {
+    pilot: Pilot,
+    inputs: Inputs,
+    commands: Outlet<Stamp, CommandRecord>,
+    decisions: Outlet<Stamp, DecisionRecord>,
+    stuck: Outlet<Stamp, StuckRecord>,
+    meter: Meter,
+}
+
+/// What a decision is made from.
+struct Inputs {
+    odometry: Inlet<Stamp, OdometryRecord>,
+    missions: Inlet<Stamp, MissionRecord>,
+    learned: MapInput,
+    physics: MapInput,
+    last_odometry: Option<Stamp>,
+    n_odometry: u64,
+    destination: Option<Destination>,
+}
+
+/// The newest map of an author.
+struct MapInput {
+    inlet: Inlet<RiskHeader, [f32; 4]>,
+    held: Option<Message<RiskHeader, [f32; 4]>>,
+}
+
+impl MapInput {
+    fn take(&mut self) {
+        if let Some(newest) = self.inlet.newest() {
+            self.held = Some(newest);
+        }
+    }
+
+    fn age_s(&self, now_ns: u64) -> f64 {
+        let age_s =
+            |map: &Message<RiskHeader, [f32; 4]>| clock::age_s(now_ns, map.user_header().stamp.valid_at_ns);
+        self.held.as_ref().map_or(f64::INFINITY, age_s)
+    }
+}
+
+impl Inputs {
+    fn new(bus: &Bus) -> Result<Self, RuntimeError> {
+        let map = |channel| Ok::<_, RuntimeError>(MapInput { inlet: bus.inlet(channel)?, held: None });
+        Ok(Self {
+            odometry: bus.inlet(&ODOMETRY)?,
+            missions: bus.inlet(&MISSION)?,
+            learned: map(&RISK)?,
+            physics: map(&RISK_PHYSICS)?,
+            last_odometry: None,
+            n_odometry: 0,
+            destination: None,
+        })
+    }
+
+    /// Takes in what has come since the last decision.
+    fn take(&mut self, pilot: &mut Pilot) {
+        let (last, n_taken) = (&mut self.last_odometry, &mut self.n_odometry);
+        *n_taken = 0;
+        self.odometry.poll(|stamp, records| {
+            let Some(record) = records.first() else { return };
+            pilot.admit(&record.odometry(stamp.valid_at_ns));
+            *last = Some(*stamp);
+            *n_taken += 1;
+        });
+        let destination = &mut self.destination;
+        self.missions.poll(|_, missions| {
+            let said = |mission: &MissionRecord| Destination {
+                goal_m: mission.goal_m,
+                tolerance_m: mission.tolerance_m,
+            };
+            *destination = missions.first().map(said).or(*destination);
+        });
+        self.learned.take();
+        self.physics.take();
+    }
+
+    /// The map to drive on: what was learned while it is fresh, else whatever knows of the younger scan.
+    fn map(&self, now_ns: u64) -> Option<&Message<RiskHeader, [f32; 4]>> {
+        let [learned_s, physics_s] = [&self.learned, &self.physics].map(|input| input.age_s(now_ns));
+        let is_learned = learned_s <= LEARNED_AGE_MAX_S || learned_s <= physics_s;
+        if is_learned { self.learned.held.as_ref() } else { self.physics.held.as_ref() }
+    }
+}
+
+impl Control {
+    fn new(bus: &Bus, setup: ControlSetup) -> Result<Self, RuntimeError> {
+        let ControlSetup { model, config, seed, period_s: _ } = setup;
+        Ok(Self {
+            pilot: Pilot::new(model, &config, seed)?,
+            inputs: Inputs::new(bus)?,
+            commands: bus.outlet(&COMMAND, 1)?,
+            decisions: bus.outlet(&DECISION, 1)?,
+            stuck: bus.outlet(&STUCK, 1)?,
+            meter: Meter::new(bus, Role::Control)?,
+        })
+    }
+
+    fn cycle(&mut self, began_ns: u64, lateness_ns: u64) -> Result<(), RuntimeError> {
+        self.inputs.take(&mut self.pilot);
+        let map = self.inputs.map(began_ns).map(|message| (*message.user_header(), message.payload()));
+        let chart = map.as_ref().and_then(|(header, payload)| {
+            let (map, time_to_goal) = risk_views(header, payload)?;
+            Some(Chart { map, time_to_goal })
+        });
+        if let Some((header, _)) = &map {
+            self.pilot.note_scan(header.stamp.valid_at_ns);
+        }
+        let cycle = self.pilot.cycle();
+        // Nobody has said where to: the same as knowing nothing of the ground.
+        let destination = self.inputs.destination;
+        let nowhere = Destination { goal_m: [0.0; 2], tolerance_m: 0.0 };
+        let chart = chart.filter(|_| destination.is_some());
+        let has_chart = chart.is_some();
+        let destination = destination.unwrap_or(nowhere);
+        let decision = self.pilot.decide(began_ns, chart, &destination);
+        let command = CommandRecord::from(&decision);
+        self.commands.send_one(Stamp::default(), command, began_ns)?;
+        let state = self.pilot.odometry().map(|odometry| odometry.state()).unwrap_or_default();
+        let used = map.as_ref().map(|(header, _)| header).filter(|_| has_chart);
+        let record = DecisionRecord {
+            command,
+            cycle,
+            decided_at_ns: began_ns,
+            odometry: self.inputs.last_odometry.map_or(Source::default(), |stamp| stamp.source()),
+            n_odometry: self.inputs.n_odometry,
+            risk: used.map_or(Source::default(), |header| header.stamp.source()),
+            author: used.map_or(0, |header| header.author),
+            goal_m: destination.goal_m,
+            tolerance_m: destination.tolerance_m,
+            n_rollouts: self.pilot.controller().config().n_rollouts as u64,
+            elapsed_s: self.pilot.elapsed_s(),
+            state: [state.x_m, state.y_m, state.yaw_rad, state.speed_mps, state.steering_rad],
+            duration_ns: clock::now_ns() - began_ns,
+            lateness_ns,
+        };
+        self.decisions.send_one(Stamp::default(), record, began_ns)?;
+        if let Some(pose) = self.pilot.take_stuck() {
+            let record = StuckRecord { position_m: pose.position_m, yaw_rad: pose.yaw_rad };
+            self.stuck.send_one(Stamp::default(), record, began_ns)?;
+        }
+        Ok(())
+    }
+
+    fn report(&mut self, lateness_ns: u64, n_missed: u64) -> Result<(), RuntimeError> {
+        self.meter.count(lateness_ns);
+        let now_ns = clock::now_ns();
+        let (inputs, pilot) = (&self.inputs, &self.pilot);
+        Ok(self.meter.report(now_ns, || {
+            let odometry_s =
+                inputs.last_odometry.map_or(-1.0, |stamp| clock::age_s(now_ns, stamp.valid_at_ns));
+            let [learned_s, physics_s] = [&inputs.learned, &inputs.physics]
+                .map(|input| Some(input.age_s(now_ns)).filter(|age_s| age_s.is_finite()).unwrap_or(-1.0));
+            Health {
+                age_s: [odometry_s, learned_s, physics_s],
+                n_missed,
+                figure: pilot.controller().config().n_rollouts as f64,
+                ..Health::default()
+            }
+            .with(inputs.odometry.counts())
+            .with(inputs.learned.inlet.counts())
+            .with(inputs.physics.inlet.counts())
+            .with(inputs.missions.counts())
+        })?)
+    }
+}

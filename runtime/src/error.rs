@@ -1,0 +1,20 @@
+//! Why a process ends before it was told to.
+
+use crate::channel::ChannelError;
+
+/// Why a process cannot begin or go on. Every message is one line.
+#[derive(Debug, thiserror::Error)]
+pub enum RuntimeError {
+    /// The channels.
+    #[error(transparent)]
+    Channel(#[from] ChannelError),
+    /// The pipeline.
+    #[error(transparent)]
+    Navigator(#[from] navigator::NavigatorError),
+    /// The simulated vehicle.
+    #[error(transparent)]
+    Episode(#[from] scenarios::EpisodeError),
+    /// The recording.
+    #[error(transparent)]
+    Record(#[from] formats::RecordError),
+}

@@ -1,0 +1,102 @@
+//! The learning as a process: the map of the ground becomes risk by what driving taught.
+
+use bicycle::Vehicle;
+use navigator::{Assessor, Belief, Config};
+use traversability::CvarLevel;
+
+use crate::RuntimeError;
+use crate::channel::{Bus, Inlet, MISSION, Outlet, RISK, STUCK, SURFACE};
+use crate::clock;
+use crate::mapping::{LEARNED, risk_elements, send_risk};
+use crate::message::{MissionRecord, RiskHeader, Stamp, StuckRecord, SurfaceHeader};
+use crate::risk_maker::RiskMaker;
+use crate::status::{Health, Meter, Role};
+
+/// Time between two looks at the channels [ns].
+const POLL_NS: u64 = 2_000_000;
+
+/// What judges the ground.
+pub struct LearningSetup<'a> {
+    /// The machine.
+    pub vehicle: &'a Vehicle,
+    /// Settings of the pipeline.
+    pub config: Config,
+    /// What is believed of the ground.
+    pub belief: Belief,
+    /// First 8 bytes of the SHA-256 of the networks' weights; 0 = none.
+    pub checkpoint: u64,
+    /// Share of the worst outcomes to plan for.
+    pub level: CvarLevel,
+    /// Limits that plans keep to.
+    pub limits: bicycle::Limits,
+}
+
+/// Judges until `is_over` says to end.
+pub fn run(bus: &Bus, setup: &LearningSetup<'_>, is_over: &dyn Fn() -> bool) -> Result<(), RuntimeError> {
+    let mut learning = Learning::new(bus, setup)?;
+    while !is_over() {
+        learning.look()?;
+        clock::sleep_until(clock::now_ns() + POLL_NS);
+    }
+    Ok(())
+}
+
+struct Learning {
+    maker: RiskMaker,
+    surfaces: Inlet<SurfaceHeader, [f32; 8]>,
+    missions: Inlet<Stamp, MissionRecord>,
+    stuck: Inlet<Stamp, StuckRecord>,
+    outlet: Outlet<RiskHeader, [f32; 4]>,
+    meter: Meter,
+    last_surface: Option<Stamp>,
+    n_malformed: u64,
+    took_s: f64,
+}
+
+impl Learning {
+    fn new(bus: &Bus, setup: &LearningSetup<'_>) -> Result<Self, RuntimeError> {
+        let LearningSetup { vehicle, config, belief, checkpoint, level, limits } = setup;
+        let assessor = Assessor::new(vehicle, limits, config, belief, *level)?;
+        Ok(Self {
+            maker: RiskMaker::new(assessor, LEARNED, *checkpoint),
+            surfaces: bus.inlet(&SURFACE)?,
+            missions: bus.inlet(&MISSION)?,
+            stuck: bus.inlet(&STUCK)?,
+            outlet: bus.outlet(&RISK, risk_elements(config))?,
+            meter: Meter::new(bus, Role::Learning)?,
+            last_surface: None,
+            n_malformed: 0,
+            took_s: 0.0,
+        })
+    }
+
+    fn look(&mut self) -> Result<(), RuntimeError> {
+        let maker = &mut self.maker;
+        self.missions.poll(|_, missions| missions.iter().for_each(|mission| maker.set_goal(mission.goal_m)));
+        if let Some(surface) = self.surfaces.newest() {
+            let began_ns = clock::now_ns();
+            let header = surface.user_header();
+            self.stuck.poll(|stamp, stuck| stuck.iter().for_each(|stuck| maker.note_stuck(stamp, stuck)));
+            match maker.update(header, surface.payload())? {
+                Ok(()) => send_risk(maker, &mut self.outlet, header.stamp.valid_at_ns)?,
+                Err(_) => self.n_malformed += 1,
+            }
+            self.last_surface = Some(header.stamp);
+            self.took_s = clock::age_s(clock::now_ns(), began_ns);
+            self.meter.count(began_ns.saturating_sub(header.stamp.published_at_ns));
+        }
+        self.report()
+    }
+
+    fn report(&mut self) -> Result<(), RuntimeError> {
+        let now_ns = clock::now_ns();
+        let surface_s = self.last_surface.map_or(-1.0, |stamp| clock::age_s(now_ns, stamp.valid_at_ns));
+        let (took_s, n_malformed) = (self.took_s, self.n_malformed);
+        let counts = [self.surfaces.counts(), self.missions.counts(), self.stuck.counts()];
+        Ok(self.meter.report(now_ns, || {
+            let health = Health { age_s: [surface_s, -1.0, -1.0], figure: took_s, ..Health::default() };
+            let health = counts.into_iter().fold(health, Health::with);
+            Health { messages: [health.messages[0], health.messages[1] + n_malformed], ..health }
+        })?)
+    }
+}

@@ -1,0 +1,273 @@
+//! The mapping as a process: scans become the map of the ground; while learning is silent, also physics' risk map.
+
+use std::collections::VecDeque;
+
+use bicycle::{Decision, Odometry, Vehicle};
+use navigator::{Assessor, Belief, Config, Jump, Surface, Surveyor};
+use terrain::Scan;
+use traversability::CvarLevel;
+
+use crate::RuntimeError;
+use crate::channel::{
+    Bus, COMMAND, Inlet, MISSION, ODOMETRY, Outlet, RISK, RISK_PHYSICS, SCAN, STUCK, SURFACE,
+};
+use crate::clock::{self, SECOND_NS};
+use crate::message::{
+    CommandRecord, Grid, MissionRecord, OdometryRecord, PointRecord, RiskHeader, ScanHeader, Source, Stamp,
+    StuckRecord, SurfaceHeader,
+};
+use crate::payload::{self, RiskParts};
+use crate::risk_maker::RiskMaker;
+use crate::status::{Health, Meter, Role};
+
+/// Number of [`SurfaceHeader::event`]: a scan was fused.
+pub const FUSED: u64 = 1;
+/// Number of [`SurfaceHeader::event`]: the localisation jumped.
+pub const JUMPED: u64 = 2;
+/// Number of [`RiskHeader::author`]: what was learned.
+pub const LEARNED: u64 = 1;
+/// Number of [`RiskHeader::author`]: physics alone.
+pub const PHYSICS: u64 = 2;
+
+/// Time between two looks at the channels [ns].
+const POLL_NS: u64 = 2_000_000;
+/// Odometry that scans may still be of.
+const ODOMETRY_KEPT: usize = 64;
+/// Farthest that a scan may lie from the odometry that it is placed by [ns].
+const SCAN_APART_NS: u64 = 15_000_000;
+/// Silence of learning after which physics speaks [ns].
+const LEARNING_SILENCE_NS: u64 = SECOND_NS / 2;
+
+/// What maps.
+pub struct MappingSetup<'a> {
+    /// The machine.
+    pub vehicle: &'a Vehicle,
+    /// Settings of the pipeline.
+    pub config: Config,
+    /// Share of the worst outcomes to plan for.
+    pub level: CvarLevel,
+    /// Limits that plans keep to.
+    pub limits: bicycle::Limits,
+}
+
+/// Maps until `is_over` says to end.
+pub fn run(bus: &Bus, setup: &MappingSetup<'_>, is_over: &dyn Fn() -> bool) -> Result<(), RuntimeError> {
+    let mut mapping = Mapping::new(bus, setup)?;
+    while !is_over() {
+        mapping.look()?;
+        clock::sleep_until(clock::now_ns() + POLL_NS);
+    }
+    Ok(())
+}
+
+struct Mapping {
+    surveyor: Surveyor,
+    recent: VecDeque<Odometry>,
+    odometry: Inlet<Stamp, OdometryRecord>,
+    commands: Inlet<Stamp, CommandRecord>,
+    scans: Inlet<ScanHeader, PointRecord>,
+    surfaces: Outlet<SurfaceHeader, [f32; 8]>,
+    fallback: Fallback,
+    meter: Meter,
+    last_scan: Option<Stamp>,
+    last_odometry: Option<Stamp>,
+    n_misplaced: u64,
+}
+
+/// Physics' own risk map, made while nobody hears of learning.
+struct Fallback {
+    maker: RiskMaker,
+    learned: Inlet<RiskHeader, [f32; 4]>,
+    missions: Inlet<Stamp, MissionRecord>,
+    stuck: Inlet<Stamp, StuckRecord>,
+    outlet: Outlet<RiskHeader, [f32; 4]>,
+    began_ns: u64,
+}
+
+impl Mapping {
+    fn new(bus: &Bus, setup: &MappingSetup<'_>) -> Result<Self, RuntimeError> {
+        let MappingSetup { vehicle, config, .. } = setup;
+        let n_cells = config.elevation.n_rows * config.elevation.n_cols;
+        Ok(Self {
+            surveyor: Surveyor::new(vehicle, config.elevation, config.guard, Surface::Sensed)?,
+            recent: VecDeque::with_capacity(ODOMETRY_KEPT),
+            odometry: bus.inlet(&ODOMETRY)?,
+            commands: bus.inlet(&COMMAND)?,
+            scans: bus.inlet(&SCAN)?,
+            surfaces: bus.outlet(&SURFACE, n_cells)?,
+            fallback: Fallback::new(bus, setup)?,
+            meter: Meter::new(bus, Role::Mapping)?,
+            last_scan: None,
+            last_odometry: None,
+            n_misplaced: 0,
+        })
+    }
+
+    /// Takes in what has come, and tells what became of it.
+    fn look(&mut self) -> Result<(), RuntimeError> {
+        let surveyor = &mut self.surveyor;
+        self.commands.poll(|_, commands| {
+            let speed_mps = match commands.first().and_then(CommandRecord::decision) {
+                Some(Decision::Drive(command)) => command.speed_mps,
+                _ => 0.0,
+            };
+            surveyor.note_command(speed_mps);
+        });
+        let mut odometry = Vec::new();
+        let last_odometry = &mut self.last_odometry;
+        self.odometry.poll(|stamp, records| {
+            *last_odometry = Some(*stamp);
+            odometry.extend(records.first().map(|record| record.odometry(stamp.valid_at_ns)));
+        });
+        for odometry in odometry {
+            self.follow(&odometry)?;
+        }
+        let mut scans = Vec::new();
+        self.scans.poll(|header, points| scans.push((header.stamp, header.scan(points))));
+        for (stamp, scan) in scans {
+            self.fuse(&stamp, &scan)?;
+        }
+        self.fallback.listen();
+        self.report()
+    }
+
+    fn follow(&mut self, odometry: &Odometry) -> Result<(), RuntimeError> {
+        let Ok(jump) = self.surveyor.admit(odometry) else { return Ok(()) };
+        if let Some(jump) = jump {
+            self.surveyor.follow_jump(odometry, &jump)?;
+            // Where the vehicle was before the jump is no longer a place on the map.
+            self.recent.clear();
+            let scan = self.last_scan;
+            self.tell(odometry, Event::Jumped(jump), scan)?;
+        }
+        if self.recent.len() == ODOMETRY_KEPT {
+            self.recent.pop_front();
+        }
+        self.recent.push_back(*odometry);
+        Ok(())
+    }
+
+    fn fuse(&mut self, stamp: &Stamp, scan: &Scan) -> Result<(), RuntimeError> {
+        let began_ns = clock::now_ns();
+        let apart_ns = |odometry: &&Odometry| odometry.valid_at_ns.abs_diff(scan.valid_at_ns);
+        let nearest = self.recent.iter().min_by_key(apart_ns).filter(|at| apart_ns(at) <= SCAN_APART_NS);
+        let Some(odometry) = nearest.copied() else {
+            self.n_misplaced += 1;
+            return Ok(());
+        };
+        if !self.surveyor.fuse(&odometry, scan)? {
+            self.n_misplaced += 1;
+            return Ok(());
+        }
+        self.last_scan = Some(*stamp);
+        self.tell(&odometry, Event::Fused, Some(*stamp))?;
+        self.meter.count(began_ns.saturating_sub(stamp.published_at_ns));
+        Ok(())
+    }
+
+    /// Writes the map as it is now where its readers will read it.
+    fn tell(&mut self, odometry: &Odometry, event: Event, scan: Option<Stamp>) -> Result<(), RuntimeError> {
+        let surface = self.surveyor.surface();
+        let cells = surface.values();
+        let mut loan = self.surfaces.write(cells.len(), |place| payload::cell_numbers(&cells[place]))?;
+        let (event, jump_m) = match event {
+            Event::Fused => (FUSED, [0.0; 3]),
+            Event::Jumped(jump) => (JUMPED, jump.step_m),
+        };
+        let mut header = SurfaceHeader {
+            stamp: Stamp::default(),
+            grid: Grid::from(surface.geometry()),
+            scan: scan.map_or(Source::default(), |stamp| stamp.source()),
+            odometry: OdometryRecord::from(odometry),
+            odometry_at_ns: odometry.valid_at_ns,
+            event,
+            jump_m,
+            shift_m: self.surveyor.shift_m(),
+            content_hash: payload::content_hash(loan.payload()),
+        };
+        *loan.header_mut() = header;
+        // A jump moves what was seen; it is no news of the ground.
+        let valid_at_ns = scan.map_or(odometry.valid_at_ns, |stamp| stamp.valid_at_ns);
+        let is_needed = self.fallback.is_needed();
+        let told = is_needed.then(|| loan.payload().to_vec());
+        header.stamp = self.surfaces.send(loan, valid_at_ns)?;
+        told.map_or(Ok(()), |told| self.fallback.speak(&header, &told))
+    }
+
+    fn report(&mut self) -> Result<(), RuntimeError> {
+        let now_ns = clock::now_ns();
+        let age_s =
+            |stamp: &Option<Stamp>| stamp.map_or(-1.0, |stamp| clock::age_s(now_ns, stamp.valid_at_ns));
+        let age_s = [age_s(&self.last_odometry), age_s(&self.last_scan), -1.0];
+        let (n_missed, figure) = (self.n_misplaced, self.surveyor.n_jumps() as f64);
+        let counts = [self.odometry.counts(), self.scans.counts(), self.commands.counts()];
+        let health = Health { age_s, n_missed, figure, ..Health::default() };
+        Ok(self.meter.report(now_ns, || counts.into_iter().fold(health, Health::with))?)
+    }
+}
+
+/// What changed the map.
+enum Event {
+    Fused,
+    Jumped(Jump),
+}
+
+impl Fallback {
+    fn new(bus: &Bus, setup: &MappingSetup<'_>) -> Result<Self, RuntimeError> {
+        let MappingSetup { vehicle, config, level, limits } = setup;
+        let assessor = Assessor::new(vehicle, limits, config, &Belief::Physics, *level)?;
+        Ok(Self {
+            maker: RiskMaker::new(assessor, PHYSICS, 0),
+            learned: bus.inlet(&RISK)?,
+            missions: bus.inlet(&MISSION)?,
+            stuck: bus.inlet(&STUCK)?,
+            outlet: bus.outlet(&RISK_PHYSICS, risk_elements(config))?,
+            began_ns: clock::now_ns(),
+        })
+    }
+
+    fn listen(&mut self) {
+        self.learned.poll(|_, _| ());
+        let maker = &mut self.maker;
+        self.missions.poll(|_, missions| missions.iter().for_each(|mission| maker.set_goal(mission.goal_m)));
+        self.stuck.poll(|stamp, stuck| stuck.iter().for_each(|stuck| maker.note_stuck(stamp, stuck)));
+    }
+
+    fn is_needed(&self) -> bool {
+        let heard_at_ns = self.learned.heard_at_ns().unwrap_or(self.began_ns);
+        clock::now_ns().saturating_sub(heard_at_ns) > LEARNING_SILENCE_NS
+    }
+
+    fn speak(&mut self, header: &SurfaceHeader, cells: &[[f32; 8]]) -> Result<(), RuntimeError> {
+        if self.maker.update(header, cells)?.is_ok() {
+            send_risk(&mut self.maker, &mut self.outlet, header.stamp.valid_at_ns)?;
+        }
+        Ok(())
+    }
+}
+
+/// Elements of the risk maps that settings lead to.
+pub(crate) fn risk_elements(config: &Config) -> usize {
+    let window = &config.risk_map;
+    let geometry = terrain::GridGeometry {
+        resolution_m: config.risk_resolution_m(),
+        origin: [0, 0],
+        n_rows: window.n_rows,
+        n_cols: window.n_cols,
+    };
+    RiskParts::new(&geometry, window.n_yaws).n_elements()
+}
+
+/// Writes a maker's map where its readers will read it; nothing before there is one.
+pub(crate) fn send_risk(
+    maker: &mut RiskMaker,
+    outlet: &mut Outlet<RiskHeader, [f32; 4]>,
+    valid_at_ns: u64,
+) -> Result<(), RuntimeError> {
+    let (Some(n), Some(writer)) = (maker.n_elements(), maker.writer()) else { return Ok(()) };
+    let mut loan = outlet.write(n, writer)?;
+    let header = maker.finish(loan.payload_mut())?;
+    *loan.header_mut() = header;
+    outlet.send(loan, valid_at_ns)?;
+    Ok(())
+}

@@ -1,0 +1,256 @@
+//! What the processes tell one another: records of plain numbers, the same in every process and language.
+
+mod convert;
+
+use iceoryx2::prelude::ZeroCopySend;
+
+use crate::layout::{RecordLayout, record};
+pub use convert::{HOLD_REASONS, STOP_REASONS};
+
+/// Version of everything in this file; messages of another are refused.
+pub const LAYOUT_VERSION: u32 = 1;
+
+record! {
+    /// First field of every header: whose message it is, and of when.
+    Stamp = "surefoot.Stamp" {
+        /// Version of the layouts, LAYOUT_VERSION.
+        layout_version: u32,
+        /// Zero.
+        reserved: u32,
+        /// When the publishing process began, which tells one life of it from the next [ns].
+        epoch_ns: u64,
+        /// Counts the messages of one publisher on one channel from 1.
+        sequence: u64,
+        /// When what it says was true, monotonic [ns].
+        valid_at_ns: u64,
+        /// When it was sent, monotonic [ns].
+        published_at_ns: u64,
+    }
+}
+
+record! {
+    /// A message that another one was made from.
+    Source = "surefoot.Source" {
+        /// When its publisher began [ns]; 0 = none.
+        epoch_ns: u64,
+        /// Its sequence number.
+        sequence: u64,
+    }
+}
+
+record! {
+    /// Where the cells of a map lie: square, row-major from the south-west corner.
+    Grid = "surefoot.Grid" {
+        /// Edge of a cell [m].
+        resolution_m: f64,
+        /// Lattice column and row of the first cell; its south-west corner is origin x resolution_m.
+        origin: [i64; 2],
+        /// Rows, northwards.
+        n_rows: u64,
+        /// Columns, eastwards.
+        n_cols: u64,
+    }
+}
+
+record! {
+    /// Where the vehicle is and how it moves, at stamp.valid_at_ns.
+    OdometryRecord = "surefoot.Odometry" {
+        /// Rear axle's centre in the map frame: east, north, up [m].
+        position_m: [f64; 3],
+        /// Roll, pitch, yaw [rad].
+        attitude_rad: [f64; 3],
+        /// Forward and leftward velocity in the body frame [m/s].
+        velocity_mps: [f64; 2],
+        /// Yaw rate [rad/s].
+        yaw_rate_radps: f64,
+        /// Mean circumferential speed of the driven wheels [m/s].
+        wheel_speed_mps: f64,
+        /// Measured angle of the front wheels, left positive [rad].
+        steering_rad: f64,
+    }
+}
+
+record! {
+    /// Header of a sweep of the range sensor; the payload is one PointRecord per return.
+    ScanHeader = "surefoot.ScanHeader" {
+        /// Whose and of when.
+        stamp: Stamp,
+        /// Where the rays start, in the body frame [m].
+        origin_m: [f32; 3],
+        /// Zero.
+        reserved: u32,
+    }
+}
+
+record! {
+    /// One return of the range sensor.
+    PointRecord = "surefoot.Point" {
+        /// Place in the body frame [m].
+        position_m: [f32; 3],
+        /// What it is: 0 open, 1 loose, 2 vegetation, 3 obstacle.
+        class_number: u32,
+    }
+}
+
+record! {
+    /// Header of the map of the ground; the payload is eight numbers per cell, see docs/runtime.md.
+    SurfaceHeader = "surefoot.SurfaceHeader" {
+        /// Whose and of when: valid_at_ns is that of the scan.
+        stamp: Stamp,
+        /// Where the cells lie.
+        grid: Grid,
+        /// The scan that was fused last.
+        scan: Source,
+        /// The odometry that it was fused at.
+        odometry: OdometryRecord,
+        /// When that was measured [ns].
+        odometry_at_ns: u64,
+        /// What happened since the last message: 1 = a scan was fused, 2 = the localisation jumped.
+        event: u64,
+        /// The jump, if that is what happened: east, north, up [m].
+        jump_m: [f64; 3],
+        /// All jumps so far together [m].
+        shift_m: [f64; 3],
+        /// XXH3 of the payload.
+        content_hash: u64,
+    }
+}
+
+record! {
+    /// Header of a risk map; the payload is risks, grounds and times to the goal, see docs/runtime.md.
+    RiskHeader = "surefoot.RiskHeader" {
+        /// Whose and of when: valid_at_ns is that of the scan.
+        stamp: Stamp,
+        /// Where the cells lie.
+        grid: Grid,
+        /// Yaw bins; bin k is centred at (k + 1/2) 2 pi / n_yaws.
+        n_yaws: u64,
+        /// Who judged the ground: 1 = what was learned, 2 = physics alone.
+        author: u64,
+        /// The map of the ground that was judged.
+        surface: Source,
+        /// Stuck poses that it takes into account.
+        stuck: Source,
+        /// Where the time to the goal leads [m].
+        goal_m: [f64; 2],
+        /// First 8 bytes of the SHA-256 of the networks' weights; 0 = none.
+        checkpoint: u64,
+        /// XXH3 of the payload.
+        content_hash: u64,
+    }
+}
+
+record! {
+    /// What the vehicle shall do.
+    CommandRecord = "surefoot.Command" {
+        /// Forward speed, negative in reverse [m/s].
+        speed_mps: f32,
+        /// Angle of the front wheels, left positive [rad].
+        steering_rad: f32,
+        /// 1 = drive, 2 = hold, 3 = stop; the command counts only when driving.
+        decision: u32,
+        /// Why, when it is not driving; see docs/runtime.md.
+        reason: u32,
+    }
+}
+
+record! {
+    /// A decision with all that it was made from.
+    DecisionRecord = "surefoot.DecisionRecord" {
+        /// What was decided.
+        command: CommandRecord,
+        /// Number of the decision since the process began.
+        cycle: u64,
+        /// When it was made [ns].
+        decided_at_ns: u64,
+        /// The odometry that was taken in last.
+        odometry: Source,
+        /// How many were taken in since the decision before, without a gap up to the last.
+        n_odometry: u64,
+        /// The risk map; none when there was none.
+        risk: Source,
+        /// Who made that map: 0 = none, 1 = what was learned, 2 = physics alone.
+        author: u64,
+        /// Where to go [m].
+        goal_m: [f64; 2],
+        /// How near counts as there [m].
+        tolerance_m: f64,
+        /// Futures that were sampled.
+        n_rollouts: u64,
+        /// Time since the decision before [s].
+        elapsed_s: f64,
+        /// State that it was made for: x, y [m], yaw [rad], speed [m/s], steering [rad].
+        state: [f64; 5],
+        /// Time that the decision took [ns].
+        duration_ns: u64,
+        /// By how much the cycle began after its deadline [ns].
+        lateness_ns: u64,
+    }
+}
+
+record! {
+    /// Where the vehicle got stuck.
+    StuckRecord = "surefoot.Stuck" {
+        /// Rear axle's centre [m].
+        position_m: [f64; 2],
+        /// Heading [rad].
+        yaw_rad: f64,
+    }
+}
+
+record! {
+    /// Where to go; whoever runs the vehicle says so once a second.
+    MissionRecord = "surefoot.Mission" {
+        /// The place in the map frame [m].
+        goal_m: [f64; 2],
+        /// How near counts as there [m].
+        tolerance_m: f64,
+        /// Time since the vehicle began [s].
+        time_s: f64,
+        /// 0 = under way, else how it ended; see docs/runtime.md.
+        outcome: u64,
+    }
+}
+
+record! {
+    /// How a process is doing, twice a second.
+    StatusRecord = "surefoot.Status" {
+        /// 1 plant, 2 mapping, 3 learning, 4 control, 5 recorder.
+        role: u64,
+        /// Process id.
+        process: u64,
+        /// Cycles or messages a second since the last status [Hz].
+        rate_hz: f64,
+        /// Median and largest lateness since the last status [s].
+        lateness_s: [f64; 2],
+        /// Age of up to three inputs when they were last used [s]; negative = none yet.
+        age_s: [f64; 3],
+        /// Deadlines missed since the process began.
+        n_missed: u64,
+        /// Messages lost on the way, by gaps in their numbers.
+        n_lost: u64,
+        /// Messages refused.
+        n_refused: u64,
+        /// Figure of the role's own: futures sampled, points mapped, recorded bytes.
+        figure: f64,
+    }
+}
+
+/// All records, each after those that it is made of.
+pub fn layouts() -> Vec<RecordLayout> {
+    vec![
+        Stamp::layout(),
+        Source::layout(),
+        Grid::layout(),
+        OdometryRecord::layout(),
+        ScanHeader::layout(),
+        PointRecord::layout(),
+        SurfaceHeader::layout(),
+        RiskHeader::layout(),
+        CommandRecord::layout(),
+        DecisionRecord::layout(),
+        StuckRecord::layout(),
+        MissionRecord::layout(),
+        StatusRecord::layout(),
+    ]
+}

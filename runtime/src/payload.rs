@@ -1,0 +1,310 @@
+//! What payloads hold, how maps lie in them, and what makes a message malformed.
+
+use bicycle::Odometry;
+use mppi::CostToGoView;
+use terrain::{GridGeometry, GridMap, Knowledge, SurfaceCell, TerrainClass};
+use traversability::{Ground, Risk, RiskMapView};
+use xxhash_rust::xxh3::xxh3_64;
+
+use crate::channel::Refusal;
+use crate::message::{
+    CommandRecord, MissionRecord, OdometryRecord, PointRecord, RiskHeader, ScanHeader, Stamp, StuckRecord,
+    SurfaceHeader,
+};
+
+/// Yaw bins beyond which nobody believes a map.
+const YAWS_MAX: u64 = 1024;
+/// Bytes of an element of a risk map.
+const QUAD: usize = size_of::<[f32; 4]>();
+
+/// Where the parts of a risk map lie in its payload, in elements of four f32: risks [row, col, yaw], then grounds
+/// [row, col] of twelve bytes, then times to the goal [row, col], each part filled up to whole elements.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct RiskParts {
+    n_cells: usize,
+    n_risks: usize,
+    n_ground_elements: usize,
+}
+
+impl RiskParts {
+    /// The parts of a map of this shape.
+    pub fn new(geometry: &GridGeometry, n_yaws: usize) -> Self {
+        let n_cells = geometry.n_cells();
+        Self {
+            n_cells,
+            n_risks: n_cells * n_yaws,
+            n_ground_elements: (n_cells * size_of::<Ground>()).div_ceil(QUAD),
+        }
+    }
+
+    /// Elements of the whole payload.
+    pub fn n_elements(&self) -> usize {
+        self.n_risks + self.n_ground_elements + (self.n_cells * size_of::<f32>()).div_ceil(QUAD)
+    }
+
+    /// The risks.
+    pub fn risks<'a>(&self, payload: &'a [[f32; 4]]) -> &'a [Risk] {
+        bytemuck::cast_slice(&payload[..self.n_risks])
+    }
+
+    /// The risks, to be changed in place.
+    pub fn risks_mut<'a>(&self, payload: &'a mut [[f32; 4]]) -> &'a mut [Risk] {
+        bytemuck::cast_slice_mut(&mut payload[..self.n_risks])
+    }
+
+    /// The grounds.
+    pub fn ground<'a>(&self, payload: &'a [[f32; 4]]) -> &'a [Ground] {
+        let part = &payload[self.n_risks..][..self.n_ground_elements];
+        let bytes: &[u8] = bytemuck::cast_slice(part);
+        bytemuck::cast_slice(&bytes[..self.n_cells * size_of::<Ground>()])
+    }
+
+    /// The times to the goal [s].
+    pub fn seconds<'a>(&self, payload: &'a [[f32; 4]]) -> &'a [f32] {
+        let part = &payload[self.n_risks + self.n_ground_elements..];
+        &part.as_flattened()[..self.n_cells]
+    }
+
+    /// The times to the goal, to be written in place [s].
+    pub fn seconds_mut<'a>(&self, payload: &'a mut [[f32; 4]]) -> &'a mut [f32] {
+        let part = &mut payload[self.n_risks + self.n_ground_elements..];
+        &mut part.as_flattened_mut()[..self.n_cells]
+    }
+
+    /// The element at a place of a payload that says what `known` does; times to the goal are zero.
+    pub fn element(&self, known: &RiskMapView<'_>, place: usize) -> [f32; 4] {
+        if let Some(risk) = known.risks.get(place) {
+            return [risk.linear_traction, risk.angular_traction, risk.roll_rad, risk.pitch_rad];
+        }
+        let first = 4 * (place - self.n_risks);
+        [0, 1, 2, 3].map(|k| {
+            let word = first + k;
+            let Some(ground) = known.ground.get(word / 3) else { return 0.0 };
+            match word % 3 {
+                axis @ (0 | 1) => ground.gradient[axis],
+                _ => f32::from_bits(u32::from_le_bytes([ground.class, ground.flags.0, 0, 0])),
+            }
+        })
+    }
+}
+
+/// A risk map as the controller reads it, where its message lies.
+pub fn risk_views<'a>(
+    header: &RiskHeader,
+    payload: &'a [[f32; 4]],
+) -> Option<(RiskMapView<'a>, CostToGoView<'a>)> {
+    let geometry = header.grid.geometry()?;
+    let n_yaws = (1..=YAWS_MAX).contains(&header.n_yaws).then_some(header.n_yaws as usize)?;
+    let parts = RiskParts::new(&geometry, n_yaws);
+    (parts.n_elements() == payload.len()).then(|| {
+        let map =
+            RiskMapView { geometry, n_yaws, risks: parts.risks(payload), ground: parts.ground(payload) };
+        (map, CostToGoView { geometry, seconds: parts.seconds(payload) })
+    })
+}
+
+/// Hash of a payload, as headers carry it.
+pub fn content_hash<T: bytemuck::NoUninit>(payload: &[T]) -> u64 {
+    xxh3_64(bytemuck::cast_slice(payload))
+}
+
+/// A cell of the map of the ground as eight numbers: height, its variance, height of vegetation, probabilities of the
+/// four classes, and how the height came to be known (0 unknown, 1 interpolated, 2 measured).
+pub fn cell_numbers(cell: &SurfaceCell) -> [f32; 8] {
+    let [open, loose, vegetation, obstacle] = cell.class_probability;
+    let knowledge = f32::from(cell.knowledge as u8);
+    let SurfaceCell { height_m, height_variance_m2, vegetation_height_m, .. } = *cell;
+    [height_m, height_variance_m2, vegetation_height_m, open, loose, vegetation, obstacle, knowledge]
+}
+
+/// The cell that eight numbers tell of; `None` when they cannot be a cell's.
+pub fn numbers_cell(numbers: &[f32; 8]) -> Option<SurfaceCell> {
+    let [height_m, height_variance_m2, vegetation_height_m, open, loose, vegetation, obstacle, knowledge] =
+        *numbers;
+    let knowledge = if knowledge == 0.0 {
+        Knowledge::Unknown
+    } else if knowledge == 1.0 {
+        Knowledge::Interpolated
+    } else if knowledge == 2.0 {
+        Knowledge::Measured
+    } else {
+        return None;
+    };
+    let class_probability: [f32; TerrainClass::COUNT] = [open, loose, vegetation, obstacle];
+    let is_known = knowledge != Knowledge::Unknown;
+    let is_height = height_m.is_finite() && height_variance_m2.is_finite() && height_variance_m2 >= 0.0;
+    let are_shares = class_probability.iter().all(|share| (0.0..=1.0 + 1e-4).contains(share));
+    let is_sound = (!is_known || is_height) && are_shares && vegetation_height_m.is_finite();
+    is_sound.then_some(SurfaceCell {
+        height_m,
+        height_variance_m2,
+        vegetation_height_m,
+        class_probability,
+        knowledge,
+    })
+}
+
+/// A surface message as a map; `None` when it is none.
+pub fn surface_map(header: &SurfaceHeader, payload: &[[f32; 8]]) -> Option<GridMap<SurfaceCell>> {
+    let cells = payload.iter().map(numbers_cell).collect::<Option<Vec<_>>>()?;
+    GridMap::from_values(header.grid.geometry()?, cells)
+}
+
+fn check_one<T>(payload: &[T]) -> Result<&T, Refusal> {
+    match payload {
+        [one] => Ok(one),
+        _ => Err(Refusal::Malformed),
+    }
+}
+
+fn require(holds: bool, refusal: Refusal) -> Result<(), Refusal> {
+    if holds { Ok(()) } else { Err(refusal) }
+}
+
+pub(crate) fn check_anything<T>(_: &Stamp, payload: &[T]) -> Result<(), Refusal> {
+    check_one(payload).map(drop)
+}
+
+/// Numbers that are not finite pass here and stop the vehicle at the guard, which is sooner than by their absence.
+pub(crate) fn check_odometry(_: &Stamp, payload: &[OdometryRecord]) -> Result<(), Refusal> {
+    check_one(payload).map(drop)
+}
+
+/// Some points may be no numbers, as sensors give them; the map drops these.
+pub(crate) fn check_scan(header: &ScanHeader, _: &[PointRecord]) -> Result<(), Refusal> {
+    require(header.origin_m.iter().all(|value| value.is_finite()), Refusal::NonFinite)
+}
+
+pub(crate) fn check_surface(header: &SurfaceHeader, payload: &[[f32; 8]]) -> Result<(), Refusal> {
+    let geometry = header.grid.geometry().ok_or(Refusal::Malformed)?;
+    require(geometry.n_cells() == payload.len(), Refusal::Malformed)?;
+    let at = header.odometry.odometry(header.odometry_at_ns);
+    let shifts = header.jump_m.iter().chain(&header.shift_m);
+    require(Odometry::is_finite(&at) && shifts.clone().all(|m| m.is_finite()), Refusal::NonFinite)
+}
+
+pub(crate) fn check_risk(header: &RiskHeader, payload: &[[f32; 4]]) -> Result<(), Refusal> {
+    let (map, time_to_goal) = risk_views(header, payload).ok_or(Refusal::Malformed)?;
+    require(matches!(header.author, 1 | 2), Refusal::Malformed)?;
+    // A finite number times zero is zero; of anything else the sum is no number. One pass, without a branch.
+    let of_risks = map.risks.iter().fold(0.0, |sum: f32, risk| {
+        sum + 0.0 * (risk.linear_traction + risk.angular_traction + risk.roll_rad + risk.pitch_rad)
+    });
+    let of_ground =
+        map.ground.iter().fold(0.0, |sum: f32, ground| sum + 0.0 * (ground.gradient[0] + ground.gradient[1]));
+    let of_times = time_to_goal.seconds.iter().fold(0.0, |sum: f32, seconds| sum + 0.0 * seconds);
+    require(of_risks + of_ground + of_times == 0.0, Refusal::NonFinite)?;
+    let known = |ground: &Ground| usize::from(ground.class) < TerrainClass::COUNT;
+    require(map.ground.iter().all(known), Refusal::Malformed)
+}
+
+pub(crate) fn check_command(_: &Stamp, payload: &[CommandRecord]) -> Result<(), Refusal> {
+    let command = check_one(payload)?;
+    require(command.speed_mps.is_finite() && command.steering_rad.is_finite(), Refusal::NonFinite)?;
+    require(command.decision().is_some(), Refusal::Malformed)
+}
+
+pub(crate) fn check_stuck(_: &Stamp, payload: &[StuckRecord]) -> Result<(), Refusal> {
+    let stuck = check_one(payload)?;
+    let numbers = stuck.position_m.iter().chain([&stuck.yaw_rad]);
+    require(numbers.clone().all(|value| value.is_finite()), Refusal::NonFinite)
+}
+
+pub(crate) fn check_mission(_: &Stamp, payload: &[MissionRecord]) -> Result<(), Refusal> {
+    let mission = check_one(payload)?;
+    let numbers = mission.goal_m.iter().chain([&mission.tolerance_m]);
+    require(numbers.clone().all(|value| value.is_finite()), Refusal::NonFinite)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::message::Grid;
+    use traversability::{GroundFlags, RiskMap};
+
+    /// A map of odd sizes, so that every part ends within an element, and its message.
+    fn told() -> (RiskMap, RiskHeader, Vec<[f32; 4]>) {
+        let geometry = GridGeometry { resolution_m: 0.2, origin: [-3, 4], n_rows: 3, n_cols: 5 };
+        let mut map = RiskMap::constant(geometry, 3, Risk::NONE);
+        let (risks, ground) = map.arrays_mut();
+        for (k, risk) in risks.iter_mut().enumerate() {
+            risk.pitch_rad = k as f32;
+        }
+        for (k, ground) in ground.iter_mut().enumerate() {
+            *ground =
+                Ground { gradient: [k as f32, -0.5], class: (k % 4) as u8, flags: GroundFlags(k as u8) };
+        }
+        let parts = RiskParts::new(&geometry, 3);
+        let known = map.view();
+        let payload = (0..parts.n_elements()).map(|place| parts.element(&known, place)).collect();
+        let header =
+            RiskHeader { grid: Grid::from(&geometry), n_yaws: 3, author: 1, ..RiskHeader::default() };
+        (map, header, payload)
+    }
+
+    #[test]
+    fn a_risk_map_is_read_where_its_message_lies() {
+        let (map, header, mut payload) = told();
+        let parts = RiskParts::new(map.geometry(), 3);
+        parts.seconds_mut(&mut payload)[14] = 7.0;
+        let (view, time_to_goal) = risk_views(&header, &payload).unwrap();
+        assert_eq!((view.risks, view.ground), (map.view().risks, map.view().ground));
+        assert_eq!((time_to_goal.seconds.len(), time_to_goal.seconds[14]), (15, 7.0));
+        assert_eq!(view.risks.as_ptr().cast(), payload.as_ptr(), "no copy");
+        assert_eq!(check_risk(&header, &payload), Ok(()));
+    }
+
+    #[test]
+    fn risk_maps_that_cannot_be_are_refused() {
+        let (map, header, payload) = told();
+        let refused = |header: RiskHeader, payload: &[[f32; 4]]| check_risk(&header, payload).unwrap_err();
+        assert_eq!(refused(header, &payload[1..]), Refusal::Malformed);
+        assert_eq!(refused(RiskHeader { n_yaws: u64::MAX, ..header }, &payload), Refusal::Malformed);
+        assert_eq!(refused(RiskHeader { n_yaws: 0, ..header }, &payload), Refusal::Malformed);
+        assert_eq!(refused(RiskHeader { author: 3, ..header }, &payload), Refusal::Malformed);
+        let huge = Grid { n_rows: u64::MAX, ..header.grid };
+        assert_eq!(refused(RiskHeader { grid: huge, ..header }, &payload), Refusal::Malformed);
+        let parts = RiskParts::new(map.geometry(), 3);
+        let n_risks = parts.n_risks;
+        for (place, k) in [(0, 0), (n_risks - 1, 3), (n_risks, 0), (payload.len() - 1, 1)] {
+            for value in [f32::NAN, f32::INFINITY] {
+                let mut broken = payload.clone();
+                broken[place][k] = value;
+                assert_eq!(refused(header, &broken), Refusal::NonFinite, "{place} {k}");
+            }
+        }
+        let mut broken = payload;
+        broken[n_risks][2] = f32::from_bits(4);
+        assert_eq!(refused(header, &broken), Refusal::Malformed, "a class that there is not");
+    }
+
+    #[test]
+    fn cells_survive_the_way_and_what_is_none_is_refused() {
+        let known = SurfaceCell::certain(1.5, TerrainClass::Loose, 0.2);
+        assert_eq!(numbers_cell(&cell_numbers(&known)), Some(known));
+        let unknown = numbers_cell(&cell_numbers(&SurfaceCell::UNKNOWN)).unwrap();
+        assert!(unknown.height_m.is_nan() && !unknown.is_known());
+        let numbers = cell_numbers(&known);
+        for (place, value) in [(0, f32::NAN), (1, -1.0), (2, f32::INFINITY), (3, 1.5), (6, -0.1), (7, 0.5)] {
+            let mut broken = numbers;
+            broken[place] = value;
+            assert_eq!(numbers_cell(&broken), None, "{place}");
+        }
+    }
+
+    #[test]
+    fn small_messages_are_one_record_of_numbers() {
+        let stamp = Stamp::default();
+        let drive = CommandRecord { speed_mps: 1.0, decision: 1, ..CommandRecord::default() };
+        assert_eq!(check_command(&stamp, &[drive]), Ok(()));
+        assert_eq!(check_command(&stamp, &[]), Err(Refusal::Malformed));
+        assert_eq!(check_command(&stamp, &[drive, drive]), Err(Refusal::Malformed));
+        let wild = CommandRecord { steering_rad: f32::NAN, ..drive };
+        assert_eq!(check_command(&stamp, &[wild]), Err(Refusal::NonFinite));
+        assert_eq!(check_command(&stamp, &[CommandRecord::default()]), Err(Refusal::Malformed));
+        let lost = StuckRecord { yaw_rad: f64::INFINITY, ..StuckRecord::default() };
+        assert_eq!(check_stuck(&stamp, &[lost]), Err(Refusal::NonFinite));
+        let nowhere = MissionRecord { goal_m: [0.0, f64::NAN], ..MissionRecord::default() };
+        assert_eq!(check_mission(&stamp, &[nowhere]), Err(Refusal::NonFinite));
+    }
+}
