@@ -7,6 +7,7 @@ mod config;
 mod drive_log_csv;
 mod elevation;
 mod gap_case;
+mod gap_case_write;
 mod model_text;
 mod numpy;
 mod overlay;
@@ -27,6 +28,9 @@ pub use elevation::{
 pub use gap_case::{
     DriveFileError, GapCase, GapGround, GapKind, GapLabel, GapNoise, GapVehicle, GapVehicleError, ReadDrive,
     parse_gap_labels, read_drive, read_gap_case, read_gap_labels, read_gap_vehicle,
+};
+pub use gap_case_write::{
+    GapSeal, GapSealError, read_sealed_labels, write_gap_case, write_gap_labels, write_gap_seal, write_gap_vehicle,
 };
 pub use model_text::model_text;
 pub use overlay::overlay;

@@ -12,6 +12,7 @@ mod pair;
 mod plant;
 mod random;
 mod rock_field;
+mod sealed;
 mod sensor_imu;
 mod sensor_odometry;
 mod sensor_range;
@@ -31,9 +32,13 @@ pub use layers::{LayerConfig, LayersError, WorldLayers, world_from_layers};
 pub use motion::Motion;
 pub use pair::{End, Pair, PairError, PairWish, check_pair, feasible_pair};
 pub use plant::{CommandError, Plant, PlantError, WheelState};
-pub use random::stream;
+pub use random::{seed_of, stream};
 pub use rock_field::{
     MAPS_PER_SPLIT, RockFieldConfig, RockFieldError, RockMap, RockPopulation, Split, rock_field,
+};
+pub use sealed::{
+    Amount, DrawnCase, EFFECTS, LOG_HZ, LOG_S, Magnitude, Style, TestDriveError, TestMachine, UNKNOWNS,
+    test_drive,
 };
 pub use sensor_imu::{IMU_PERIOD_NS, Imu, ImuConfig};
 pub use sensor_odometry::{OdometryConfig, OdometrySensor};

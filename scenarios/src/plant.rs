@@ -32,14 +32,17 @@ use terrain::Pose;
 use crate::deviation::{altered_actuators, altered_body, altered_wheel};
 use crate::{Deviation, DeviationError, Motion, World};
 use chassis::{BodyMotion, Chassis, Wrench};
+pub(crate) use drivetrain::DIFFERENTIAL_S_PER_M;
 use drivetrain::Drivetrain;
 use envelope::Disc;
 use ground::Ground;
 use linkage::Linkage;
+pub(crate) use load::AIR_KGPM3;
 use load::Load;
 use receiver::Receiver;
 use rest::{Rest, Stance};
 use servo::SteeringServo;
+pub(crate) use vegetation::vegetation_resistance;
 use wheel::{RunningGear, Strut, Wheel, WheelInput};
 
 /// Acceleration of gravity [m/s2].

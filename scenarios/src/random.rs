@@ -6,7 +6,12 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 
 /// The generator that belongs to `seed` and `key`, whatever else was drawn.
 pub fn stream(seed: u64, key: &[u64]) -> Xoshiro256PlusPlus {
-    Xoshiro256PlusPlus::seed_from_u64(key.iter().fold(mixed(seed), |state, word| mixed(state ^ mixed(*word))))
+    Xoshiro256PlusPlus::seed_from_u64(seed_of(seed, key))
+}
+
+/// The seed that belongs to `seed` and `key`.
+pub fn seed_of(seed: u64, key: &[u64]) -> u64 {
+    key.iter().fold(mixed(seed), |state, word| mixed(state ^ mixed(*word)))
 }
 
 /// A standard normal number.

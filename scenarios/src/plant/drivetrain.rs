@@ -7,7 +7,7 @@ use crate::Deviation;
 
 /// Torque between a wheel and the mean of the driven wheels, per difference of circumferential speed, over the
 /// wheel's load: how tight the limited-slip differentials are [s/m].
-const DIFFERENTIAL_S_PER_M: f64 = 0.25;
+pub(crate) const DIFFERENTIAL_S_PER_M: f64 = 0.25;
 /// Time the servo adds to the motor's response [s].
 const SERVO_TIME_S: f64 = 0.08;
 /// The integral's time over the servo's [-].

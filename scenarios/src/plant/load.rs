@@ -11,7 +11,7 @@ use super::trailer::Trailer;
 use crate::Deviation;
 
 /// Density of the air [kg/m3].
-const AIR_KGPM3: f64 = 1.2;
+pub(crate) const AIR_KGPM3: f64 = 1.2;
 
 /// One of them.
 #[derive(Clone, Debug)]

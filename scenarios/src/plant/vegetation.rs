@@ -1,5 +1,6 @@
 //! Plants that a wheel presses down and a bumper pushes through.
 
+use bicycle::Vehicle;
 use nalgebra::Vector2;
 
 /// Resistance over load for plants as tall as the wheel [-].
@@ -34,6 +35,13 @@ impl Immersion {
         let above_belly = (self.height_m - self.clearance_m).max(0.0) / self.diameter_m;
         self.density * (WHEEL_RESISTANCE * ratio * ratio + BUMPER_RESISTANCE * above_belly)
     }
+}
+
+/// Resistance over the vehicle's weight in plants of a height on even ground [-].
+pub(crate) fn vegetation_resistance(vehicle: &Vehicle, height_m: f64) -> f64 {
+    let diameter_m = 2.0 * vehicle.geometry.wheel_radius_m;
+    let clearance_m = vehicle.geometry.ground_clearance_m;
+    Immersion { height_m, diameter_m, clearance_m, density: 1.0 }.resistance()
 }
 
 impl Stems {
