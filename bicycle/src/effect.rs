@@ -165,6 +165,11 @@ catalogue! {
 }
 
 impl Effect {
+    /// Whether it changes the command before the actuators follow it.
+    pub fn acts_on_command(&self) -> bool {
+        self.stages().contains(&Stage::Command)
+    }
+
     /// Refuses parameters outside their bounds.
     pub fn validate(&self) -> Result<(), EffectError> {
         let Description { id, parameters, .. } = self.description();
@@ -179,4 +184,11 @@ impl Effect {
             None => Ok(()),
         }
     }
+}
+
+/// Adds an effect to others where the order of the catalogue, the order of a machine from command to sensor, has its
+/// place: after all that come before it there and after those of its own kind.
+pub fn add_in_order(effects: &mut Vec<Effect>, effect: Effect) {
+    let place = effects.iter().position(|other| other.kind() as usize > effect.kind() as usize);
+    effects.insert(place.unwrap_or(effects.len()), effect);
 }

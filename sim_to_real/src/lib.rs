@@ -1,13 +1,34 @@
 //! Why simulator and robot disagree: where the gap lies, which unmodelled effect causes it, how far it shrinks.
 
 mod answer;
+mod baseline;
+mod calibration;
+mod causes;
+mod comparison;
+mod conditions;
+mod diagnosis;
+mod drive;
+mod explanation;
 mod findings;
+mod intervals;
+mod judgement;
+mod least_squares;
 mod machine;
+mod residual_table;
+mod rollout;
+pub mod scratch_api;
 mod screening;
+mod smoothing;
+mod verification;
 
 pub use answer::{Answer, BeforeAfter, Condition, Estimate, NamedEffect, Place, Ranked, Shrink, Verdict};
+pub use baseline::{Baseline, GapError};
+pub use diagnosis::{Diagnosis, diagnose};
+pub use drive::DriveError;
 pub use findings::{
-    ConditionBin, ConditionTable, Findings, GroundResidual, Prediction, PredictionModel, ResidualCell, ResidualState,
+    ConditionBin, ConditionTable, Findings, GroundResidual, Prediction, PredictionModel, ResidualCell,
+    ResidualState,
 };
 pub use machine::{GroundMap, Machine, SensorNoise};
 pub use screening::{Gravity, Place as RowPlace, Suspicion, screen, screen_sets, split_at_breaks};
+pub use verification::{Verification, verify};

@@ -1,0 +1,111 @@
+//! The nominal model calibrated on nominal drives, with everything that the catalogue holds of ordinary physics.
+
+use crate::comparison::{Comparison, Yardstick};
+use crate::drive::Drive;
+use crate::least_squares::{Coordinate, fit};
+use bicycle::Effect;
+use bicycle::effect::{CATALOGUE, Parameter};
+
+/// What every machine has a little of, in order of action, with the values that the fit starts from.
+const ORDINARY: [(&str, [f64; 4]); 17] = [
+    ("steer_delay", [0.02, 0.0, 0.0, 0.0]),
+    ("speed_delay", [0.02, 0.0, 0.0, 0.0]),
+    ("speed_scale", [1.0, 0.0, 0.0, 0.0]),
+    ("steer_gain", [1.0, 0.0, 0.0, 0.0]),
+    ("steer_bias", [0.0; 4]),
+    ("steer_rate", [3.0, 0.0, 0.0, 0.0]),
+    ("steer_lag", [0.06, 0.0, 0.0, 0.0]),
+    ("speed_loop", [0.4, 0.0, 0.0, 0.0]),
+    ("drive_limit", [8.0, 8.0, 0.0, 0.0]),
+    ("rolling_drag", [0.0; 4]),
+    ("veg_drag", [0.0; 4]),
+    ("loose_drag", [0.0; 4]),
+    ("cornering_drag", [0.0; 4]),
+    ("slope_gravity", [0.3, 0.0, 0.0, 0.0]),
+    ("cross_slope", [0.0; 4]),
+    ("understeer", [0.0; 4]),
+    ("rear_slip", [0.0; 4]),
+];
+/// Pull towards no effect, so that what the drives leave open stays small.
+const PULL: f64 = 1.5;
+
+/// Fits the ordinary effects to drives, and the yardstick to what is left.
+pub(crate) fn calibrated(wheelbase_m: f64, drives: &[&Drive]) -> (Vec<Effect>, Yardstick) {
+    let mut effects = ordinary();
+    let mut yardstick = Yardstick::rough();
+    for _ in 0..3 {
+        let comparison = Comparison::new(wheelbase_m, drives.to_vec(), &yardstick);
+        effects = refined(&comparison, &effects);
+        yardstick = Yardstick::of(&comparison.residuals(&effects), &yardstick);
+    }
+    (effects, yardstick)
+}
+
+fn ordinary() -> Vec<Effect> {
+    ORDINARY.iter().filter_map(|&(id, values)| Effect::from_values(id, values)).collect()
+}
+
+/// All parameters of all effects fitted together.
+fn refined(comparison: &Comparison<'_>, effects: &[Effect]) -> Vec<Effect> {
+    let coordinates: Vec<Coordinate> = effects.iter().flat_map(coordinates_of).collect();
+    let found = fit(&coordinates, |values| comparison.residuals(&with_values(effects, values)));
+    with_values(effects, &found.values)
+}
+
+fn coordinates_of(effect: &Effect) -> Vec<Coordinate> {
+    let parameters = effect.description().parameters;
+    parameters
+        .iter()
+        .zip(effect.values())
+        .map(|(parameter, value)| coordinate(parameter, value, Some(PULL)))
+        .collect()
+}
+
+/// A parameter as the fit sees it: limits by their logarithm, all else as it is.
+pub(crate) fn coordinate(parameter: &Parameter, value: f64, pull: Option<f64>) -> Coordinate {
+    if is_limit(parameter) {
+        let [start, low, high] = [value, parameter.low, parameter.high].map(f64::ln);
+        return Coordinate { start, low, high, scale: 0.3, pull: None };
+    }
+    let scale = scale(parameter);
+    let (low, high) = (parameter.low, parameter.high);
+    Coordinate { start: value, low, high, scale, pull: pull.map(|strength| (parameter.neutral, strength)) }
+}
+
+/// A change of a parameter that matters: half the smallest effect that is tried.
+fn scale(parameter: &Parameter) -> f64 {
+    let distance = |tried: &f64| (tried - parameter.neutral).abs();
+    0.5 * parameter.tried.iter().map(distance).fold(f64::INFINITY, f64::min)
+}
+
+/// Whether the parameter bounds something, so that its largest value is no effect.
+pub(crate) fn is_limit(parameter: &Parameter) -> bool {
+    parameter.neutral == parameter.high
+}
+
+/// From the fit's coordinate to the parameter's value.
+pub(crate) fn value_at(parameter: &Parameter, coordinate: f64) -> f64 {
+    let value = if is_limit(parameter) { coordinate.exp() } else { coordinate };
+    value.clamp(parameter.low, parameter.high)
+}
+
+/// The same effects with other values of their parameters, in the coordinates of the fit.
+pub(crate) fn with_values(effects: &[Effect], coordinates: &[f64]) -> Vec<Effect> {
+    let mut coordinates = coordinates.iter();
+    effects
+        .iter()
+        .map(|effect| {
+            let description = effect.description();
+            let mut values = effect.values();
+            for (value, parameter) in values.iter_mut().zip(description.parameters) {
+                *value = coordinates.next().map_or(*value, |&coordinate| value_at(parameter, coordinate));
+            }
+            Effect::from_values(description.id, values).unwrap_or(*effect)
+        })
+        .collect()
+}
+
+/// Whether the catalogue holds an effect of this id.
+pub(crate) fn is_known(id: &str) -> bool {
+    CATALOGUE.iter().any(|description| description.id == id)
+}

@@ -1,0 +1,78 @@
+//! Drives, what a model foretells on them, and the difference in standard deviations.
+
+use crate::drive::{Drive, HORIZONS};
+use crate::least_squares::mean_loss;
+use crate::rollout::{N_QUANTITIES, PER_START, Simulator};
+use bicycle::Effect;
+use serde::{Deserialize, Serialize};
+
+/// Standard deviation of each quantity at each horizon on nominal drives, horizon by horizon; [m], [rad], [m/s], [rad/s].
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Yardstick(pub(crate) Vec<f64>);
+
+/// Drives with what was measured after every start.
+#[derive(Clone, Debug)]
+pub(crate) struct Comparison<'a> {
+    wheelbase_m: f64,
+    drives: Vec<&'a Drive>,
+    measured: Vec<Vec<f32>>,
+    per_sigma: Vec<f32>,
+}
+
+impl<'a> Comparison<'a> {
+    pub(crate) fn new(wheelbase_m: f64, drives: Vec<&'a Drive>, yardstick: &Yardstick) -> Self {
+        let measured = drives.iter().map(|drive| outcomes(drive)).collect();
+        let per_sigma = yardstick.0.iter().map(|sigma| (1.0 / sigma) as f32).collect();
+        Self { wheelbase_m, drives, measured, per_sigma }
+    }
+
+    /// Foretold less measured, in standard deviations: drive by drive, start by start, [`PER_START`] numbers each.
+    pub(crate) fn residuals(&self, effects: &[Effect]) -> Vec<f32> {
+        let simulator = Simulator::new(self.wheelbase_m, effects);
+        let mut residuals = Vec::with_capacity(self.measured.iter().map(Vec::len).sum());
+        for (drive, measured) in self.drives.iter().zip(&self.measured) {
+            let predicted = simulator.predict(drive);
+            let starts = predicted.chunks(PER_START).zip(measured.chunks(PER_START));
+            residuals.extend(starts.flat_map(|(predicted, measured)| {
+                let both = predicted.iter().zip(measured).zip(&self.per_sigma);
+                both.map(|((predicted, measured), per_sigma)| (predicted - measured) * per_sigma)
+            }));
+        }
+        residuals
+    }
+
+    /// Mean robust loss of a model.
+    pub(crate) fn loss(&self, effects: &[Effect]) -> f64 {
+        mean_loss(&self.residuals(effects))
+    }
+}
+
+/// Root mean square.
+pub(crate) fn root_mean_square(residuals: &[f32]) -> f64 {
+    let sum: f64 = residuals.iter().map(|r| f64::from(*r) * f64::from(*r)).sum();
+    (sum / residuals.len() as f64).sqrt()
+}
+
+/// What was measured after every start, [`PER_START`] numbers each.
+fn outcomes(drive: &Drive) -> Vec<f32> {
+    let at = |&start: &usize| HORIZONS.iter().flat_map(move |&steps| drive.outcome(start, steps));
+    drive.starts.iter().flat_map(at).map(|value| value as f32).collect()
+}
+
+impl Yardstick {
+    /// Before anything is known: a few per cent of what a vehicle of this size does.
+    pub(crate) fn rough() -> Self {
+        Self([0.05, 0.05, 0.02, 0.1, 0.05].repeat(HORIZONS.len()))
+    }
+
+    /// The spread of residuals that were measured in units of `unit`; outliers count with the loss's weight.
+    pub(crate) fn of(residuals: &[f32], unit: &Self) -> Self {
+        let spread = |place: usize| {
+            let values: Vec<f32> = residuals.chunks(PER_START).map(|start| start[place]).collect();
+            unit.0[place] * root_mean_square(&values).max(1e-6)
+        };
+        Self((0..PER_START).map(spread).collect())
+    }
+}
+
+const _: () = assert!(PER_START == HORIZONS.len() * N_QUANTITIES);

@@ -1,0 +1,147 @@
+//! The diagnosis: which effects separate the real drives from the calibrated nominal model.
+
+use crate::answer::{Answer, NamedEffect, Ranked, Shrink, Verdict};
+use crate::baseline::{Baseline, GapError, drives_of};
+use crate::causes::{Explanation, Trial};
+use crate::comparison::{Comparison, root_mean_square};
+use crate::conditions::{StartRecord, condition_tables, ground_residuals, places};
+use crate::drive::Drive;
+use crate::explanation::{pairs, single_explanations};
+use crate::findings::Findings;
+use crate::intervals::named_effects;
+use crate::judgement::{Judgement, Weighed};
+use crate::machine::Machine;
+use crate::residual_table::residual_cells;
+use bicycle::{DriveLog, Effect};
+
+/// What the real drives alone have shown.
+#[derive(Clone, Debug)]
+pub struct Diagnosis {
+    /// Announced effects with their parameters, strongest first.
+    pub named: Vec<NamedEffect>,
+    /// The numbers behind a report.
+    pub findings: Findings,
+    /// Error of the calibrated nominal model and of the repaired one on the real drives, in standard deviations.
+    pub errors: [f64; 2],
+    pub debug: Vec<(Vec<String>, Vec<f64>, f64)>,
+    pub(crate) effects: Vec<Effect>,
+    pub(crate) verdict: Verdict,
+    pub(crate) ranking: Vec<Ranked>,
+    pub(crate) credible_set: Vec<String>,
+    pub(crate) predicted_closed: Option<f64>,
+    pub(crate) floor: f64,
+}
+
+/// Metric of [`Shrink`].
+pub(crate) const METRIC: &str = "normalised held-out rollout error";
+/// Below this many floors there is no gap to close.
+pub(crate) const GAP_IN_FLOORS: f64 = 1.2;
+
+/// Finds what separates real drives from the calibrated nominal model.
+///
+/// # Errors
+/// No run, or a run without the needed columns or too short.
+pub fn diagnose(baseline: &Baseline, machine: &Machine, real: &[DriveLog]) -> Result<Diagnosis, GapError> {
+    let drives = drives_of("real", machine, real)?;
+    if drives.is_empty() {
+        return Err(GapError::Few { set: "real", needed: 1, found: 0 });
+    }
+    let all: Vec<&Drive> = drives.iter().collect();
+    let trial = baseline.trial(&all);
+    let before = trial.residuals(&[]);
+    let judgement = judged(baseline, &trial);
+    let causes = judgement.announced.clone();
+    let after = trial.residuals(&causes);
+    let (own, repaired) = (StartRecord::of(&all, &before), StartRecord::of(&all, &after));
+    let tables = condition_tables(&own, &baseline.null.starts);
+    let findings = Findings {
+        conditions: tables,
+        residuals: residual_cells(&before, &after, Some(&baseline.null.cells)),
+        map: ground_residuals(&own, &repaired),
+    };
+    Ok(Diagnosis {
+        named: named_effects(&trial, &causes),
+        findings,
+        errors: [root_mean_square(&before), root_mean_square(&after)],
+        predicted_closed: predicted_closed(baseline, &drives, &causes),
+        debug: judgement.debug,
+        effects: causes,
+        verdict: judgement.verdict,
+        ranking: judgement.ranking,
+        credible_set: judgement.credible_set,
+        floor: baseline.null.error,
+    })
+}
+
+impl Baseline {
+    pub(crate) fn trial<'a>(&'a self, drives: &[&'a Drive]) -> Trial<'a> {
+        let comparison = Comparison::new(self.wheelbase_m, drives.to_vec(), &self.yardstick);
+        Trial { comparison, baseline: &self.effects }
+    }
+
+    /// (before - after) / (before - floor), where there is a gap.
+    pub(crate) fn closed(&self, before: f64, after: f64) -> Option<f64> {
+        let floor = self.null.error;
+        (before >= GAP_IN_FLOORS * floor).then(|| (before - after) / (before - floor))
+    }
+}
+
+fn judged(baseline: &Baseline, trial: &Trial<'_>) -> Judgement {
+    let none = Explanation { causes: Vec::new(), loss: trial.loss(&[]) };
+    let singles = single_explanations(trial);
+    let mut weighed = Weighed { none, pairs: Vec::new(), singles };
+    if weighed.may_hold_pairs(&baseline.null) {
+        weighed.pairs = pairs(trial, &weighed.singles);
+    }
+    weighed.judge(&baseline.null)
+}
+
+/// What is closed on each half of the real drives by the parameters that the other half gives.
+fn predicted_closed(baseline: &Baseline, drives: &[Drive], causes: &[Effect]) -> Option<f64> {
+    let halves: Vec<Drive> = if drives.len() == 1 { drives[0].halves() } else { drives.to_vec() };
+    let mut squares = [0.0; 2];
+    for out in 0..halves.len() {
+        let rest: Vec<&Drive> = (0..halves.len()).filter(|&i| i != out).map(|i| &halves[i]).collect();
+        let own = baseline.trial(&[&halves[out]]);
+        let learned = baseline.trial(&rest);
+        let start = Explanation { loss: learned.loss(causes), causes: causes.to_vec() };
+        let elsewhere = if causes.is_empty() { start } else { learned.refined(start) };
+        for (sum, causes) in squares.iter_mut().zip([&[][..], &elsewhere.causes]) {
+            *sum += root_mean_square(&own.residuals(causes)).powi(2);
+        }
+    }
+    let [before, after] = squares.map(|sum| (sum / halves.len() as f64).sqrt());
+    baseline.closed(before, after)
+}
+
+impl Diagnosis {
+    /// The announced effects with their best parameters, to be added to a model.
+    pub fn effects(&self) -> &[Effect] {
+        &self.effects
+    }
+
+    /// The answer before the held-out drives are opened.
+    pub fn answer(&self, case: &str) -> Answer {
+        Answer {
+            case: case.to_owned(),
+            verdict: self.verdict,
+            effects: self.named.clone(),
+            ranking: self.ranking.clone(),
+            credible_set: self.credible_set.clone(),
+            places: places(&self.findings.conditions),
+            shrink: Shrink {
+                metric: METRIC.to_owned(),
+                before: None,
+                after: None,
+                floor: self.floor,
+                closed: None,
+                closed_low: None,
+                closed_high: None,
+                predicted_closed: self.predicted_closed,
+                learned_bound_closed: None,
+                position_error_2s_m: None,
+            },
+            advice: Vec::new(),
+        }
+    }
+}

@@ -1,0 +1,46 @@
+//! Which explanations there are, and how much each is to be believed.
+
+use crate::causes::{Explanation, Trial, candidates};
+
+/// Seconds are sought beside this many of the best singles.
+const N_FIRSTS: usize = 3;
+/// Pairs that are fitted together.
+const N_REFINED: usize = 5;
+
+/// Every effect alone, best first.
+pub(crate) fn single_explanations(trial: &Trial<'_>) -> Vec<Explanation> {
+    let alone = |description| trial.with_one_more(&[], description);
+    let mut singles: Vec<Explanation> = candidates().filter_map(alone).collect();
+    singles.sort_by(|a, b| a.loss.total_cmp(&b.loss));
+    singles
+}
+
+/// The best pair that holds one of the best singles.
+pub(crate) fn best_pair(trial: &Trial<'_>, singles: &[Explanation]) -> Option<Explanation> {
+    pairs(trial, singles).into_iter().next()
+}
+
+/// Pairs that hold one of the best singles, the best of them fitted together, best first.
+pub(crate) fn pairs(trial: &Trial<'_>, singles: &[Explanation]) -> Vec<Explanation> {
+    let mut pairs: Vec<Explanation> = Vec::new();
+    for first in singles.iter().take(N_FIRSTS) {
+        pairs.extend(with_a_second(trial, first));
+    }
+    pairs.sort_by(|a, b| a.loss.total_cmp(&b.loss));
+    pairs.dedup_by_key(|pair| {
+        let mut ids = pair.ids();
+        ids.sort_unstable();
+        ids
+    });
+    pairs.truncate(N_REFINED);
+    let mut refined: Vec<Explanation> = pairs.into_iter().map(|pair| trial.refined(pair)).collect();
+    refined.sort_by(|a, b| a.loss.total_cmp(&b.loss));
+    refined
+}
+
+/// An explanation with every other effect added.
+pub(crate) fn with_a_second(trial: &Trial<'_>, first: &Explanation) -> Vec<Explanation> {
+    let known = first.ids();
+    let others = candidates().filter(|description| !known.contains(&description.id));
+    others.filter_map(|description| trial.with_one_more(&first.causes, description)).collect()
+}

@@ -1,0 +1,130 @@
+//! From explanations to a verdict: every explanation has an energy, the logarithm of its loss plus a price per effect;
+//! the smallest energy wins, and energies become probabilities.
+
+use crate::answer::{Ranked, Verdict};
+use crate::baseline::Null;
+use crate::causes::{Explanation, candidates};
+use bicycle::Effect;
+
+/// Logarithmic gain that the first effect must bring, at least.
+const PRICE_OF_ONE: f64 = 0.17;
+/// The same in gains of the null.
+const NULLS_OF_ONE: f64 = 1.4;
+/// Logarithmic gain that the second effect must bring, at least.
+const PRICE_OF_TWO: f64 = 0.30;
+/// The same in gains of the null.
+const NULLS_OF_TWO: f64 = 2.0;
+/// Difference in energy that makes one explanation e times as probable as another.
+const TEMPERATURE: f64 = 0.035;
+/// Explanations this much less probable than the best are told apart from it.
+const TOLD_APART: f64 = 0.05;
+/// What is left is unknown when it exceeds this many floors and
+const UNKNOWN_IN_FLOORS: f64 = 1.9;
+/// this share of the gap, both as errors.
+const UNKNOWN_SHARE: f64 = 0.2;
+/// Less of the gap than this is not worth a name.
+const WORTH_A_NAME: f64 = 0.35;
+
+/// All explanations that were tried, singles and pairs best first.
+pub(crate) struct Weighed {
+    pub(crate) none: Explanation,
+    pub(crate) singles: Vec<Explanation>,
+    pub(crate) pairs: Vec<Explanation>,
+}
+
+/// The verdict with what led to it.
+pub(crate) struct Judgement {
+    pub(crate) verdict: Verdict,
+    pub(crate) announced: Vec<Effect>,
+    pub(crate) ranking: Vec<Ranked>,
+    pub(crate) credible_set: Vec<String>,
+    pub(crate) debug: Vec<(Vec<String>, Vec<f64>, f64)>,
+}
+
+/// Prices of effects for a vehicle with this null.
+fn prices(null: &Null) -> [f64; 2] {
+    [
+        PRICE_OF_ONE.max(NULLS_OF_ONE * null.gain_of_one.min(2.0 * PRICE_OF_ONE)),
+        PRICE_OF_TWO.max(NULLS_OF_TWO * null.gain_of_two.min(PRICE_OF_TWO)),
+    ]
+}
+
+impl Weighed {
+    /// Whether what the best single leaves is more than a pair's price above what could be left at best.
+    pub(crate) fn may_hold_pairs(&self, null: &Null) -> bool {
+        let [_, price] = prices(null);
+        self.singles.first().is_some_and(|single| (single.loss / (0.6 * null.loss)).ln() > price)
+    }
+
+    pub(crate) fn judge(&self, null: &Null) -> Judgement {
+        let [one, two] = prices(null);
+        let priced =
+            |price: f64| move |explanation| (f64::ln(Explanation::loss(explanation)) + price, explanation);
+        let mut all: Vec<(f64, &Explanation)> = vec![priced(0.0)(&self.none)];
+        all.extend(self.singles.iter().map(priced(one)));
+        all.extend(self.pairs.iter().map(priced(one + two)));
+        all.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let best = all[0].1;
+        let (verdict, announced) = self.verdict(best, null);
+        Judgement {
+            verdict,
+            announced,
+            ranking: ranking(&all),
+            credible_set: self.credible_set(best),
+            debug: std::iter::once(&self.none)
+                .chain(self.singles.iter().take(6))
+                .chain(self.pairs.iter().take(4))
+                .map(|e| {
+                    (
+                        e.ids().iter().map(|x| x.to_string()).collect(),
+                        e.causes.iter().map(|c| c.values()[0]).collect(),
+                        e.loss,
+                    )
+                })
+                .collect(),
+        }
+    }
+
+    fn verdict(&self, best: &Explanation, null: &Null) -> (Verdict, Vec<Effect>) {
+        let over = |loss: f64| (loss - null.loss).max(0.0);
+        let left = over(best.loss) / over(self.none.loss).max(1e-9);
+        let floors = (best.loss / null.loss).sqrt();
+        let unknown = floors > UNKNOWN_IN_FLOORS && left.sqrt() > UNKNOWN_SHARE;
+        match (best.causes.is_empty(), unknown) {
+            (true, false) => (Verdict::None, Vec::new()),
+            (true, true) => (Verdict::Unknown, Vec::new()),
+            (false, false) => (Verdict::Effects, best.causes.clone()),
+            (false, true) if 1.0 - left < WORTH_A_NAME => (Verdict::Unknown, Vec::new()),
+            (false, true) => (Verdict::EffectsAndUnknown, best.causes.clone()),
+        }
+    }
+
+    /// Singles that the data cannot tell apart from the best single; of a pair, its members.
+    fn credible_set(&self, best: &Explanation) -> Vec<String> {
+        let reach = -TEMPERATURE * TOLD_APART.ln();
+        let Some(first) = self.singles.first() else { return Vec::new() };
+        let near = self.singles.iter().take_while(|single| (single.loss / first.loss).ln() < reach);
+        let mut ids: Vec<String> = match best.causes.len() {
+            2.. => best.ids().iter().map(|id| (*id).to_owned()).collect(),
+            _ => near.flat_map(Explanation::ids).map(str::to_owned).collect(),
+        };
+        ids.dedup();
+        ids
+    }
+}
+
+/// The probability of every effect to be in the true explanation.
+fn ranking(all: &[(f64, &Explanation)]) -> Vec<Ranked> {
+    let least = all[0].0;
+    let weight = |energy: f64| (-(energy - least) / TEMPERATURE).exp();
+    let total: f64 = all.iter().map(|(energy, _)| weight(*energy)).sum();
+    let of = |id: &str| {
+        let holds = all.iter().filter(|(_, explanation)| explanation.ids().contains(&id));
+        holds.map(|(energy, _)| weight(*energy)).sum::<f64>() / total
+    };
+    let mut ranking: Vec<Ranked> = candidates()
+        .map(|description| Ranked { id: description.id.to_owned(), score: of(description.id) })
+        .collect();
+    ranking.sort_by(|a, b| b.score.total_cmp(&a.score));
+    ranking
+}

@@ -1,0 +1,228 @@
+//! Robust non-linear least squares with bounds, for a handful of parameters and thousands of residuals.
+
+use nalgebra::{DMatrix, DVector};
+
+/// Where the pseudo-Huber loss bends from square to straight, in standard deviations.
+const BEND: f64 = 3.0;
+const N_ITERATIONS: usize = 25;
+
+/// A parameter of a fit, in the coordinate it is fitted in.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Coordinate {
+    pub(crate) start: f64,
+    pub(crate) low: f64,
+    pub(crate) high: f64,
+    /// A change that matters.
+    pub(crate) scale: f64,
+    /// Pull towards a value: the value, and its strength in residuals per scale.
+    pub(crate) pull: Option<(f64, f64)>,
+}
+
+/// What a fit found.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Fit {
+    pub(crate) values: Vec<f64>,
+    /// Mean pseudo-Huber loss of the residuals, in which a residual of one standard deviation counts about one.
+    pub(crate) loss: f64,
+}
+
+/// Mean of 2 b^2 (sqrt(1 + (r / b)^2) - 1) over residuals r in standard deviations.
+pub(crate) fn mean_loss(residuals: &[f32]) -> f64 {
+    let sum: f64 = residuals.iter().map(|r| loss(f64::from(*r))).sum();
+    sum / residuals.len() as f64
+}
+
+fn loss(residual: f64) -> f64 {
+    let ratio = residual / BEND;
+    2.0 * BEND * BEND * ((1.0 + ratio * ratio).sqrt() - 1.0)
+}
+
+/// Levenberg and Marquardt with reweighting; derivatives by differences of a hundredth of a parameter's scale.
+pub(crate) fn fit(coordinates: &[Coordinate], mut residuals: impl FnMut(&[f64]) -> Vec<f32>) -> Fit {
+    let mut values: Vec<f64> = coordinates.iter().map(|coordinate| coordinate.start).collect();
+    let mut here = residuals(&values);
+    let mut total = total_loss(coordinates, &values, &here);
+    let mut damping = 1e-3;
+    for _ in 0..N_ITERATIONS {
+        let linearised = Linearised::around(coordinates, &values, here.clone(), &mut residuals);
+        let normal = linearised.normal(0..here.len()).pulled(coordinates, &values);
+        let mut improved = false;
+        while damping < 1e6 {
+            let next = normal.step(coordinates, &values, damping);
+            let there = residuals(&next);
+            let after = total_loss(coordinates, &next, &there);
+            if after < total {
+                improved = (total - after) > 1e-5 * total;
+                (values, here, total) = (next, there, after);
+                damping = (damping * 0.2).max(1e-6);
+                break;
+            }
+            damping *= 5.0;
+        }
+        if !improved {
+            break;
+        }
+    }
+    Fit { loss: mean_loss(&here), values }
+}
+
+fn pulls<'a>(
+    coordinates: &'a [Coordinate],
+    values: &'a [f64],
+) -> impl Iterator<Item = (usize, f64, f64)> + 'a {
+    coordinates.iter().zip(values).enumerate().filter_map(|(i, (coordinate, value))| {
+        let (towards, strength) = coordinate.pull?;
+        let slope = strength / coordinate.scale;
+        Some((i, slope, (value - towards) * slope))
+    })
+}
+
+fn total_loss(coordinates: &[Coordinate], values: &[f64], residuals: &[f32]) -> f64 {
+    let pulled: f64 = pulls(coordinates, values).map(|(_, _, residual)| residual * residual).sum();
+    mean_loss(residuals) * residuals.len() as f64 + pulled
+}
+
+/// The residuals at a point and their weighted derivatives.
+pub(crate) struct Linearised {
+    columns: Vec<Vec<f32>>,
+    weights: Vec<f32>,
+    here: Vec<f32>,
+}
+
+impl Linearised {
+    pub(crate) fn at(
+        coordinates: &[Coordinate],
+        values: &[f64],
+        mut residuals: impl FnMut(&[f64]) -> Vec<f32>,
+    ) -> Self {
+        let here = residuals(values);
+        Self::around(coordinates, values, here, &mut residuals)
+    }
+
+    fn around(
+        coordinates: &[Coordinate],
+        values: &[f64],
+        here: Vec<f32>,
+        residuals: &mut impl FnMut(&[f64]) -> Vec<f32>,
+    ) -> Self {
+        let column = |(i, coordinate): (usize, &Coordinate)| {
+            let mut moved = values.to_vec();
+            let step = 0.01 * coordinate.scale;
+            let step = if values[i] + step > coordinate.high { -step } else { step };
+            moved[i] += step;
+            let there = residuals(&moved);
+            there.iter().zip(&here).map(|(b, a)| (b - a) / step as f32).collect()
+        };
+        let columns = coordinates.iter().enumerate().map(column).collect();
+        let weights = here.iter().map(|r| 1.0 / (1.0 + (r / BEND as f32).powi(2)).sqrt()).collect();
+        Self { columns, weights, here }
+    }
+
+    /// The weighted normal equations of a range of residuals.
+    fn normal(&self, range: std::ops::Range<usize>) -> Normal {
+        let n = self.columns.len();
+        let mut normal = Normal { matrix: DMatrix::zeros(n, n), gradient: DVector::zeros(n) };
+        for i in 0..n {
+            let own = self.columns[i][range.clone()].iter().zip(&self.weights[range.clone()]);
+            let weighed: Vec<f32> = own.map(|(column, weight)| column * weight).collect();
+            normal.gradient[i] = dot(&weighed, &self.here[range.clone()]);
+            for j in 0..=i {
+                normal.matrix[(i, j)] = dot(&weighed, &self.columns[j][range.clone()]);
+                normal.matrix[(j, i)] = normal.matrix[(i, j)];
+            }
+        }
+        normal
+    }
+
+    /// Standard error of each parameter, by leaving out one of `n` stretches after the other and taking the step that
+    /// the rest then asks for: sqrt((n - 1) / n sum of squares).
+    pub(crate) fn jackknife(&self, n: usize) -> Vec<f64> {
+        let whole = self.normal(0..self.here.len());
+        let length = self.here.len().div_ceil(n).max(1);
+        let mut squares = vec![0.0; self.columns.len()];
+        for first in (0..self.here.len()).step_by(length) {
+            let out = self.normal(first..(first + length).min(self.here.len()));
+            let (matrix, gradient) = (&whole.matrix - out.matrix, &whole.gradient - out.gradient);
+            let step = matrix.cholesky().map(|factor| factor.solve(&gradient));
+            for (i, square) in squares.iter_mut().enumerate() {
+                *square += step.as_ref().map_or(f64::INFINITY, |step| step[i] * step[i]);
+            }
+        }
+        let share = (n - 1) as f64 / n as f64;
+        squares.into_iter().map(|square| (share * square).sqrt()).collect()
+    }
+}
+
+/// The weighted normal equations at a point.
+struct Normal {
+    matrix: DMatrix<f64>,
+    gradient: DVector<f64>,
+}
+
+impl Normal {
+    fn pulled(mut self, coordinates: &[Coordinate], values: &[f64]) -> Self {
+        for (i, slope, residual) in pulls(coordinates, values) {
+            self.matrix[(i, i)] += slope * slope;
+            self.gradient[i] += slope * residual;
+        }
+        self
+    }
+
+    fn step(&self, coordinates: &[Coordinate], values: &[f64], damping: f64) -> Vec<f64> {
+        let mut damped = self.matrix.clone();
+        for (i, coordinate) in coordinates.iter().enumerate() {
+            damped[(i, i)] += damping * (self.matrix[(i, i)] + 1.0 / (coordinate.scale * coordinate.scale));
+        }
+        let step = damped.cholesky().map(|factor| factor.solve(&self.gradient));
+        let moved = |(i, coordinate): (usize, &Coordinate)| {
+            let change = step.as_ref().map_or(0.0, |step| step[i]);
+            (values[i] - change).clamp(coordinate.low, coordinate.high)
+        };
+        coordinates.iter().enumerate().map(moved).collect()
+    }
+}
+
+fn dot(a: &[f32], b: &[f32]) -> f64 {
+    let chunks = a.chunks(64).zip(b.chunks(64));
+    chunks.map(|(a, b)| f64::from(a.iter().zip(b).map(|(a, b)| a * b).sum::<f32>())).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn coordinate(start: f64) -> Coordinate {
+        Coordinate { start, low: -10.0, high: 10.0, scale: 1.0, pull: None }
+    }
+
+    /// y = a exp(-b t) with a = 2, b = 0.7, and an outlier of a hundred standard deviations.
+    #[test]
+    fn a_curve_is_found_in_spite_of_an_outlier() {
+        let model = |a: f64, b: f64, t: f64| a * (-b * t).exp();
+        let measured: Vec<f64> = (0..200)
+            .map(|k| model(2.0, 0.7, 0.02 * f64::from(k)) + if k == 50 { 1.0 } else { 0.0 })
+            .collect();
+        let found = fit(&[coordinate(1.0), coordinate(0.1)], |values| {
+            let at =
+                |(k, y): (usize, &f64)| ((model(values[0], values[1], 0.02 * k as f64) - y) * 100.0) as f32;
+            measured.iter().enumerate().map(at).collect()
+        });
+        assert!((found.values[0] - 2.0).abs() < 5e-3 && (found.values[1] - 0.7).abs() < 5e-3, "{found:?}");
+    }
+
+    #[test]
+    fn bounds_hold_and_pulls_decide_what_nothing_else_does() {
+        let bounded =
+            fit(&[Coordinate { high: 3.0, ..coordinate(0.0) }], |values| vec![(values[0] - 5.0) as f32; 4]);
+        assert_eq!(bounded.values, [3.0]);
+        let pulled = fit(&[Coordinate { pull: Some((1.5, 1.0)), ..coordinate(0.0) }], |_| vec![0.0; 4]);
+        assert!((pulled.values[0] - 1.5).abs() < 1e-3);
+    }
+
+    /// A small residual counts as its square, a large one as 2 b |r|.
+    #[test]
+    fn the_loss_bends() {
+        assert!((mean_loss(&[0.01]) / 1e-4 - 1.0).abs() < 1e-3);
+        assert!((mean_loss(&[3000.0]) / 18000.0 - 1.0).abs() < 1e-2);
+    }
+}

@@ -1,0 +1,260 @@
+//! Rollouts of a model from the measured states of a drive, sixteen or eight at a time, against what was measured.
+
+use crate::drive::{Drive, HORIZONS, N_STEPS, STEP_S, VX, YAW};
+use bicycle::effect::Effect;
+use bicycle::lanes::{Lanes, Portable, Real, Scalar};
+use bicycle::{GroundSample, LaneState, Limits, Model, SensorModel, Stepper};
+use pulp::{NullaryFnOnce, f32x8, f32x16};
+use std::f64::consts::TAU;
+
+/// Quantities compared: along, across [m], turn [rad], speed [m/s], yaw rate [rad/s].
+pub(crate) const N_QUANTITIES: usize = 5;
+/// Numbers per start: every quantity at every horizon.
+pub(crate) const PER_START: usize = HORIZONS.len() * N_QUANTITIES;
+/// Most lanes of any instruction set.
+const WIDEST: usize = 16;
+
+/// The effects of a model ready for rollouts of [`STEP_S`].
+pub(crate) struct Simulator {
+    stepper: Stepper,
+    sensors: SensorModel,
+}
+
+impl Simulator {
+    pub(crate) fn new(wheelbase_m: f64, effects: &[Effect]) -> Self {
+        let model = Model { wheelbase_m, limits: UNLIMITED, effects: effects.to_vec() };
+        Self {
+            stepper: Stepper::new(&model, STEP_S, 1.0).with_instant_actuators(),
+            sensors: SensorModel::of(effects),
+        }
+    }
+
+    /// Predicted measurements of every start of a drive, [`PER_START`] numbers each, horizon by horizon.
+    pub(crate) fn predict(&self, drive: &Drive) -> Vec<f32> {
+        let asked = self.asked(drive);
+        let roll_out = RollOut { simulator: self, drive, asked: &asked };
+        #[cfg(target_arch = "x86_64")]
+        {
+            if let Some(lanes) = pulp::x86::V4::try_new() {
+                return lanes.vectorize(On(lanes, roll_out));
+            }
+            if let Some(lanes) = pulp::x86::V3::try_new() {
+                return lanes.vectorize(On(lanes, roll_out));
+            }
+        }
+        On(Portable, roll_out).call()
+    }
+
+    /// What the commands ask of the actuators, over the whole drive: speed and steering angle.
+    fn asked(&self, drive: &Drive) -> Vec<[f32; 2]> {
+        let mut memory = vec![0.0; self.stepper.n_slots()];
+        self.stepper.settle(drive.commands[0], &mut memory);
+        let ask = |(step, command): (usize, &bicycle::Command)| {
+            let command =
+                [command.speed_mps, command.steering_rad].map(|value| Real(Scalar, f64::from(value)));
+            self.stepper.asked(command, &mut memory, step).map(|value| value.1 as f32)
+        };
+        drive.commands.iter().enumerate().map(ask).collect()
+    }
+}
+
+const UNLIMITED: Limits = Limits {
+    speed_max_mps: f64::MAX,
+    reverse_speed_max_mps: f64::MAX,
+    steering_max_rad: bicycle::lanes::STEERING_DOMAIN_RAD,
+    steering_rate_max_radps: f64::MAX,
+    acceleration_max_mps2: f64::MAX,
+    lateral_acceleration_max_mps2: f64::MAX,
+    roll_max_rad: f64::MAX,
+    pitch_max_rad: f64::MAX,
+};
+
+/// Packs that can be filled from numbers and read.
+trait Pack: Lanes {
+    fn pack(values: &[f32; WIDEST]) -> Self::Value;
+    fn unpack(value: Self::Value) -> [f32; WIDEST];
+}
+
+fn first_eight(values: &[f32; WIDEST]) -> [f32; 8] {
+    std::array::from_fn(|lane| values[lane])
+}
+
+fn widened(values: [f32; 8]) -> [f32; WIDEST] {
+    std::array::from_fn(|lane| values[lane % 8])
+}
+
+impl Pack for Portable {
+    #[inline(always)]
+    fn pack(values: &[f32; WIDEST]) -> [f32; 8] {
+        first_eight(values)
+    }
+    #[inline(always)]
+    fn unpack(value: [f32; 8]) -> [f32; WIDEST] {
+        widened(value)
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+impl Pack for pulp::x86::V3 {
+    #[inline(always)]
+    fn pack(values: &[f32; WIDEST]) -> f32x8 {
+        pulp::cast(first_eight(values))
+    }
+    #[inline(always)]
+    fn unpack(value: f32x8) -> [f32; WIDEST] {
+        widened(pulp::cast(value))
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+impl Pack for pulp::x86::V4 {
+    #[inline(always)]
+    fn pack(values: &[f32; WIDEST]) -> f32x16 {
+        pulp::cast(*values)
+    }
+    #[inline(always)]
+    fn unpack(value: f32x16) -> [f32; WIDEST] {
+        pulp::cast(value)
+    }
+}
+
+/// Work on one instruction set.
+struct On<L, W>(L, W);
+
+struct RollOut<'a> {
+    simulator: &'a Simulator,
+    drive: &'a Drive,
+    asked: &'a [[f32; 2]],
+}
+
+impl<L: Pack> NullaryFnOnce for On<L, RollOut<'_>> {
+    type Output = Vec<f32>;
+    #[inline(always)]
+    fn call(self) -> Vec<f32> {
+        let Self(lanes, work) = self;
+        let mut predicted = vec![0.0; work.drive.starts.len() * PER_START];
+        let packs = work.drive.starts.chunks(L::WIDTH);
+        for (starts, outcomes) in packs.zip(predicted.chunks_mut(L::WIDTH * PER_START)) {
+            work.roll(lanes, starts, outcomes);
+        }
+        predicted
+    }
+}
+
+/// Poses of a pack after every step, from the first: east, north [m] and turn [rad] from the start.
+type Way = [[[f32; WIDEST]; 3]; N_STEPS + 1];
+
+impl RollOut<'_> {
+    #[inline(always)]
+    fn roll<L: Pack>(&self, lanes: L, starts: &[usize], outcomes: &mut [f32]) {
+        // The last pack may be short: its spare lanes repeat the last start.
+        let rows: [usize; WIDEST] = std::array::from_fn(|lane| starts[lane.min(starts.len() - 1)]);
+        let origin = rows.map(|row| self.origin(row));
+        let real = |values: [f32; WIDEST]| Real(lanes, L::pack(&values));
+        let zero = lanes.real(0.0);
+        let mut state = LaneState {
+            x: zero,
+            y: zero,
+            turns: real(origin.map(|origin| origin.turns)),
+            speed: real(origin.map(|origin| origin.speed_mps)),
+            steering: zero,
+        };
+        let mut turned = zero;
+        let mut way: Way = [[[0.0; WIDEST]; 3]; N_STEPS + 1];
+        let mut next_horizon = 0;
+        for step in 0..N_STEPS {
+            let asked = [0, 1].map(|channel| real(rows.map(|row| self.asked[row + step][channel])));
+            let ground = self.ground(lanes, rows.map(|row| row + step));
+            let rates = self.simulator.stepper.follow(&mut state, asked, &ground);
+            turned = rates.yaw_rate.mul_add(lanes.real(STEP_S), turned);
+            way[step + 1] = [state.x, state.y, turned].map(|value| L::unpack(value.1));
+            if step + 1 == HORIZONS[next_horizon] {
+                let rates = [rates.speed, rates.yaw_rate].map(|value| L::unpack(value.1));
+                self.sense(&way, next_horizon, (&origin, rates), outcomes);
+                next_horizon += 1;
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn ground<L: Pack>(&self, lanes: L, rows: [usize; WIDEST]) -> GroundSample<Real<L>> {
+        let firm = lanes.real(1.0);
+        let zero = lanes.real(0.0);
+        let level =
+            GroundSample { linear_traction: firm, angular_traction: firm, gradient: [zero; 2], class: zero };
+        if !self.simulator.stepper.uses_ground() {
+            return level;
+        }
+        let read = |values: &[f32]| Real(lanes, L::pack(&rows.map(|row| values[row])));
+        let [east, north] = &self.drive.gradient;
+        GroundSample { gradient: [read(east), read(north)], class: read(&self.drive.class), ..level }
+    }
+
+    fn origin(&self, row: usize) -> Origin {
+        let sensors = &self.simulator.sensors;
+        let age_steps = sensors.pose_latency_s / STEP_S;
+        let since = |sums: &[f64]| sums[row] - interpolated(|k| sums[k], row as f64 - age_steps);
+        let way_m = since(&self.drive.travelled[0]) / sensors.velocity_ratio;
+        let turn_rad = since(&self.drive.travelled[1]) - sensors.yaw_rate_bias_radps * sensors.pose_latency_s;
+        let heading_rad = self.drive.smooth[YAW][row];
+        let seen_yaw_rad = heading_rad - sensors.yaw_offset_rad;
+        let (sine, cosine) = (seen_yaw_rad + 0.5 * turn_rad).sin_cos();
+        let turns = (seen_yaw_rad + turn_rad) / TAU;
+        Origin {
+            turns: (turns - turns.round()) as f32,
+            speed_mps: (self.drive.smooth[VX][row] / sensors.velocity_ratio) as f32,
+            seen_m: [-way_m * cosine, -way_m * sine],
+            turn_rad,
+            heading: heading_rad.sin_cos(),
+        }
+    }
+
+    /// Writes what the sensors would say at a horizon.
+    fn sense(
+        &self,
+        way: &Way,
+        horizon: usize,
+        (origin, rates): (&[Origin; WIDEST], [[f32; WIDEST]; 2]),
+        outcomes: &mut [f32],
+    ) {
+        let sensors = &self.simulator.sensors;
+        let seen_step = HORIZONS[horizon] as f64 - sensors.pose_latency_s / STEP_S;
+        for (lane, outcomes) in outcomes.chunks_mut(PER_START).enumerate() {
+            let start = &origin[lane];
+            let at = |quantity: usize| interpolated(|k| f64::from(way[k][quantity][lane]), seen_step);
+            let (dx, dy) = (at(0) - start.seen_m[0], at(1) - start.seen_m[1]);
+            let (sine, cosine) = start.heading;
+            let seen = [
+                dx * cosine + dy * sine,
+                dy * cosine - dx * sine,
+                at(2) + start.turn_rad,
+                f64::from(rates[0][lane]) * sensors.velocity_ratio,
+                f64::from(rates[1][lane]) + sensors.yaw_rate_bias_radps,
+            ];
+            outcomes[horizon * N_QUANTITIES..][..N_QUANTITIES]
+                .copy_from_slice(&seen.map(|value| value as f32));
+        }
+    }
+}
+
+/// Where a rollout starts. Places are relative to where the vehicle then is.
+#[derive(Clone, Copy)]
+struct Origin {
+    /// True yaw [turns].
+    turns: f32,
+    /// True speed [m/s].
+    speed_mps: f32,
+    /// Where the pose that was measured then puts the vehicle: east, north [m].
+    seen_m: [f64; 2],
+    /// How far the vehicle has turned since that pose [rad].
+    turn_rad: f64,
+    /// Sine and cosine of the measured yaw.
+    heading: (f64, f64),
+}
+
+/// Linear between whole places; before the first, the first.
+fn interpolated(value: impl Fn(usize) -> f64, place: f64) -> f64 {
+    let place = place.max(0.0);
+    let (below, share) = (place as usize, place.fract());
+    if share == 0.0 { value(below) } else { value(below) + share * (value(below + 1) - value(below)) }
+}
