@@ -35,7 +35,7 @@ pub struct DensityRange {
 
 impl DensityRange {
     /// Share of the validation footprints, all in distribution, that shall weigh less than the prior.
-    pub const EDGE_SHARE: f64 = 0.02;
+    pub const EDGE_SHARE: f64 = 0.005;
 
     /// EVORA's normalised density: 0 at the least likely training footprint, 1 at the likeliest.
     pub fn normalised(&self, log_density: f64) -> f64 {

@@ -26,6 +26,8 @@ pub struct Trial {
     pub data: String,
     /// Validation EMD2 per parameter; `None` if the loss did not stay finite.
     pub validation_emd2: Option<[f64; Architecture::N_HEADS]>,
+    /// Standard error of its sum over the validation drives; 0 if there is none.
+    pub validation_standard_error: f64,
     /// Passes of the joint training.
     pub n_epochs: usize,
 }
@@ -42,6 +44,8 @@ pub struct Selection {
     pub validation_total: f64,
     /// Standard deviation of that sum over the seeds.
     pub validation_deviation: f64,
+    /// Standard error of that sum over the validation drives, mean over the seeds.
+    pub validation_standard_error: f64,
     /// Trainings that the mean is taken over.
     pub n_seeds: usize,
 }
@@ -116,8 +120,8 @@ pub fn fingerprint(training: &Dataset, validation: &Dataset) -> Result<String, D
 
 impl Selection {
     /// The candidate with the least mean validation EMD2 over the seeds 1 to `n_seeds`, by the rule of one standard
-    /// error (Breiman and others, 1984): whatever lies within the standard error of that least mean is as good, and of
-    /// these the one that holds most to physics is taken, the largest kappa. Validation data are like the training data
+    /// error (Breiman and others, 1984): whatever lies within the least mean's standard error over the validation drives
+    /// is as good, and of these the one that holds most to physics is taken, the largest kappa. Validation data are like the training data
     /// and do not ask for it; ground beyond them does. Of equal kappas the least mean counts, of equals the first.
     ///
     /// # Errors
@@ -133,7 +137,7 @@ impl Selection {
         let by_total = |left: &&Self, right: &&Self| left.validation_total.total_cmp(&right.validation_total);
         let best = judged.iter().min_by(by_total);
         let best = best.ok_or(SelectionError { method: method.name(), n_seeds })?;
-        let limit = best.validation_total + best.validation_deviation / (n_seeds as f64).sqrt();
+        let limit = best.validation_total + best.validation_standard_error;
         let as_good = || judged.iter().filter(|selection| selection.validation_total <= limit);
         let kappa = as_good().map(|selection| selection.settings.physics_weight).fold(0.0, f64::max);
         let chosen =
@@ -145,9 +149,11 @@ impl Selection {
     fn judged(candidate: &Settings, n_seeds: usize, trials: &[Trial]) -> Option<Self> {
         let of_seed = |seed: u64| {
             let settings = Settings { seed, ..candidate.clone() };
-            trials.iter().find(|trial| trial.settings == settings)?.validation_emd2
+            let trial = trials.iter().find(|trial| trial.settings == settings)?;
+            Some((trial.validation_emd2?, trial.validation_standard_error))
         };
-        let errors: Vec<[f64; 4]> = (1..=n_seeds as u64).map(of_seed).collect::<Option<_>>()?;
+        let seeds: Vec<([f64; 4], f64)> = (1..=n_seeds as u64).map(of_seed).collect::<Option<_>>()?;
+        let (errors, standard_errors): (Vec<[f64; 4]>, Vec<f64>) = seeds.into_iter().unzip();
         let n = errors.len() as f64;
         let totals = || errors.iter().map(|error| error.iter().sum::<f64>());
         let validation_total = totals().sum::<f64>() / n;
@@ -160,6 +166,7 @@ impl Selection {
             validation_total,
             // Of the seeds as a sample; one seed has none.
             validation_deviation: (variance / (n - 1.0).max(1.0)).sqrt(),
+            validation_standard_error: standard_errors.iter().sum::<f64>() / n,
             n_seeds,
         })
     }
@@ -191,6 +198,7 @@ mod tests {
             settings,
             data: String::new(),
             validation_emd2: error.map(|error| [error, 0.0, 1.0, 0.0]),
+            validation_standard_error: 0.0,
             n_epochs: 1,
         }
     }
@@ -236,9 +244,10 @@ mod tests {
     fn within_one_standard_error_the_largest_kappa_is_selected() {
         let trial = |physics_weight: f64, seed: u64, error: f64| Trial {
             settings: Settings { physics_weight, ..Settings::new(Method::Pietra, seed) },
+            validation_standard_error: 0.1,
             ..trial(1e-3, seed, Some(error))
         };
-        // Mean 0.5 with a deviation of sqrt(0.02) = 0.1414, a standard error of 0.1.
+        // Mean 0.5, standard error 0.1.
         let least = [trial(0.1, 1, 0.4), trial(0.1, 2, 0.6)];
         let selected = |errors: [f64; 2]| {
             let others = [0.5, 1.0].into_iter().zip(errors);

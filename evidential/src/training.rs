@@ -77,6 +77,8 @@ pub struct Outcome {
     pub curves: Vec<Epoch>,
     /// Validation EMD2 per parameter of the checkpoint.
     pub validation_emd2: [f64; Architecture::N_HEADS],
+    /// Standard error of its sum: how much other drives of the kind would change it.
+    pub validation_standard_error: f64,
     /// n / (n + n_prior) over the validation data; `None` without evidence.
     pub learned_weight: Option<Percentiles>,
     /// Whether it was broken off.
@@ -237,6 +239,7 @@ impl<'a> Run<'a> {
             checkpoint,
             curves: self.curves,
             validation_emd2: evaluation.emd2,
+            validation_standard_error: evaluation.standard_error,
             learned_weight,
             end: self.end,
         })

@@ -200,6 +200,7 @@ mod tests {
             validation_emd2: [0.0; 4],
             validation_total: 0.0,
             validation_deviation: 0.0,
+            validation_standard_error: 0.0,
             n_seeds: 1,
         };
         let mut selections = Selections {

@@ -90,8 +90,9 @@ pub struct TrainArguments {
     #[arg(long, value_name = "N", value_parser = width, allow_hyphen_values = true, help_heading = "Parameters")]
     pub latent: Option<usize>,
 
-    /// Search learning rate, kappa and entropy weight on the validation data, and write selections.json
-    #[arg(long, conflicts_with_all = ["seed", "learning_rate", "kappa", "entropy", "json"], help_heading = "Search")]
+    /// Search learning rate, unless one is given, kappa and entropy weight on the validation data, and write
+    /// selections.json
+    #[arg(long, conflicts_with_all = ["seed", "kappa", "entropy", "json"], help_heading = "Search")]
     pub sweep: bool,
 
     /// Train every candidate with the seeds 1 to N
@@ -192,8 +193,8 @@ Writes weights.safetensors and weights.json, which belong together, training.png
 
 With --sweep every combination of learning rate (1e-3, 1e-4, 1e-5), kappa (0.1, 0.5, 1) and entropy weight (1e-3,
 1e-4, 1e-5) is trained with every seed, as far as the method looks at them. Finished trainings are kept in
-trials.jsonl, and the same command goes on where it was broken off. selections.json holds the parameters with the
-least mean validation EMD2 of each method.
+trials.jsonl, and the same command goes on where it was broken off. selections.json holds the parameters of each
+method: within one standard error of the least mean validation EMD2 the largest kappa, and of that the least mean.
 
 Examples:
   surefoot train traversability --train train.safetensors --validation validation.safetensors --out weights
@@ -225,6 +226,7 @@ mod tests {
                 validation_emd2: [0.0; 4],
                 validation_total: 0.0,
                 validation_deviation: 0.0,
+                validation_standard_error: 0.0,
                 n_seeds: 1,
             };
             Selections { selections: vec![selection], ..Selections::default() }

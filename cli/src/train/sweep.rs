@@ -48,7 +48,9 @@ pub(super) fn run(arguments: &TrainArguments, data: &Data) -> anyhow::Result<()>
 fn candidates(arguments: &TrainArguments, method: Method) -> Candidates {
     // A search starts from the defaults, not from what an earlier one has found.
     let base = arguments.settings(method, &Selections::default());
-    Candidates { method, settings: Grid::paper().candidates(&base) }
+    let paper = Grid::paper();
+    let learning_rates = arguments.learning_rate.map_or(paper.learning_rates.clone(), |rate| vec![rate]);
+    Candidates { method, settings: Grid { learning_rates, ..paper }.candidates(&base) }
 }
 
 /// What is not yet trained: all methods' first seeds first, so that an early end leaves something of each.
@@ -149,18 +151,19 @@ impl<'a> Search<'a> {
         let trained = evidential::train(training, validation, settings, summary::revision(), &mut |_| {
             if interrupt::interrupted() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         });
-        let (validation_emd2, n_epochs) = match trained {
+        let (validation_emd2, validation_standard_error, n_epochs) = match trained {
             Ok(outcome) if outcome.end == TrainingEnd::Interrupted => return Ok(None),
             Ok(outcome) => {
                 let joint = outcome.curves.iter().filter(|epoch| epoch.phase == Phase::Joint);
-                (Some(outcome.validation_emd2), joint.count())
+                (Some(outcome.validation_emd2), outcome.validation_standard_error, joint.count())
             }
             // A candidate that runs away is a result.
-            Err(TrainError::NonFiniteLoss { epoch, .. }) => (None, epoch),
+            Err(TrainError::NonFiniteLoss { epoch, .. }) => (None, 0.0, epoch),
             Err(other) => return Err(told(other)),
         };
         let data = lock(&self.log).data_hash.clone();
-        Ok(Some(Trial { settings: settings.clone(), data, validation_emd2, n_epochs }))
+        let settings = settings.clone();
+        Ok(Some(Trial { settings, data, validation_emd2, validation_standard_error, n_epochs }))
     }
 
     /// Says how far the search has come, on the bar or, where there is none, in a line.

@@ -13,6 +13,8 @@ pub(super) struct Samples {
     pub n: usize,
     inputs: Vec<f32>,
     targets: Vec<f32>,
+    /// Which drive each example belongs to.
+    drives: Vec<u32>,
 }
 
 impl Samples {
@@ -27,7 +29,8 @@ impl Samples {
             targets
                 .extend(measured.map(|(&value, bins)| bins.bin_of(value).map_or(UNMEASURED, |b| b as f32)));
         }
-        Self { n, inputs, targets }
+        let drives = dataset.examples.iter().map(|example| example.drive).collect();
+        Self { n, inputs, targets, drives }
     }
 
     /// Every example twice, as it is and seen in a mirror: what lies left and what lies right teach alike.
@@ -38,6 +41,7 @@ impl Samples {
             standardisation.apply(&mirrored, &mut samples.inputs);
         }
         samples.targets.extend_from_within(..);
+        samples.drives.extend_from_within(..);
         samples.n *= 2;
         samples
     }
@@ -45,6 +49,11 @@ impl Samples {
     /// Inputs and targets of the examples named.
     pub(super) fn batch(&self, indices: &[u32]) -> Result<(Tensor, Tensor)> {
         Ok((gather(&self.inputs, self.n, indices)?, gather(&self.targets, self.n, indices)?))
+    }
+
+    /// Drive of every example.
+    pub(super) fn drives(&self) -> &[u32] {
+        &self.drives
     }
 
     /// Inputs and the rows of targets of the examples from `start` on, at most so many.
