@@ -222,20 +222,22 @@ impl Stepper {
         memory: &mut [L::Value],
         step: usize,
     ) -> Rates<L> {
-        let asked = self.asked(command, memory, step);
+        let asked = self.asked(command, state.speed, memory, step);
         self.follow(state, asked, ground)
     }
 
-    /// The first half of a step: what the command asks of the actuators once the effects on it have acted.
+    /// The first half of a step: what the command asks of the actuators at a speed that was reached, once the effects
+    /// on it have acted.
     #[inline(always)]
     pub fn asked<L: Lanes>(
         &self,
         command: [Real<L>; 2],
+        reached_speed: Real<L>,
         memory: &mut [L::Value],
         step: usize,
     ) -> [Real<L>; 2] {
         let [speed, steering] = command;
-        let mut asked = CommandStep { speed, steering, step };
+        let mut asked = CommandStep { speed, steering, reached_speed, step };
         self.effects.on_command(memory, &mut asked);
         [asked.speed, asked.steering]
     }
@@ -272,8 +274,9 @@ impl Stepper {
             side_acceleration = driving.side_acceleration;
         }
         let yaw_rate = state.speed * per_wheelbase * tangent;
-        let mut moving =
-            Moving { forward: state.speed, lateral: lanes.real(0.0), yaw_rate, side_acceleration };
+        let acceleration = (state.speed - reached_speed) * Real::constant(lanes, self.per_step);
+        let lateral = lanes.real(0.0);
+        let mut moving = Moving { forward: state.speed, lateral, yaw_rate, side_acceleration, acceleration };
         self.effects.on_motion(&mut moving);
         let Moving { forward, lateral, yaw_rate, .. } = moving;
         let share = ground.linear_traction * Real::constant(lanes, self.advance);

@@ -52,7 +52,8 @@ impl Simulator {
         let ask = |(step, command): (usize, &bicycle::Command)| {
             let command =
                 [command.speed_mps, command.steering_rad].map(|value| Real(Scalar, f64::from(value)));
-            self.stepper.asked(command, &mut memory, step).map(|value| value.1 as f32)
+            let reached_speed = Real(Scalar, drive.smooth[VX][step]);
+            self.stepper.asked(command, reached_speed, &mut memory, step).map(|value| value.1 as f32)
         };
         drive.commands.iter().enumerate().map(ask).collect()
     }

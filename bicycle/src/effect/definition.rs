@@ -52,6 +52,8 @@ pub struct Commanding<'a, L: Lanes> {
     pub speed: Real<L>,
     /// Angle that the steering is asked for; effects change it [rad].
     pub steering: Real<L>,
+    /// Speed reached before this step [m/s].
+    pub reached_speed: Real<L>,
     /// What the effect carries from step to step.
     pub memory: &'a mut [L::Value],
     /// Steps since the start.
@@ -112,6 +114,8 @@ pub struct Moving<L: Lanes> {
     pub yaw_rate: Real<L>,
     /// Acceleration that a force from outside gives the body along its y axis [m/s2].
     pub side_acceleration: Real<L>,
+    /// Acceleration along the body's x axis in this step [m/s2].
+    pub acceleration: Real<L>,
 }
 
 impl<L: Lanes> Moving<L> {

@@ -1,7 +1,7 @@
 //! Grip of the tyres.
 
 use super::STANDARD_GRAVITY_MPS2;
-use super::definition::{Constants, Definition, Driving, Moving, Stage, parameters};
+use super::definition::{Commanding, Constants, Definition, Driving, Moving, Stage, parameters};
 use crate::lanes::{Lanes, Real};
 
 parameters! {
@@ -15,11 +15,29 @@ parameters! {
 impl Definition for Friction {
     const ID: &'static str = "friction";
     const MEANING: &'static str = "friction: lateral acceleration a of the tyres falls to a / (1 + (a / mu g)^4)^(1/4), drive and brakes stay below mu g";
-    const STAGES: &'static [Stage] = &[Stage::Drive, Stage::Motion];
+    const STAGES: &'static [Stage] = &[Stage::Command, Stage::Drive, Stage::Motion];
 
-    fn constants(&self, _step_s: f64) -> [f64; 4] {
+    fn constants(&self, step_s: f64) -> [f64; 4] {
         let limit_mps2 = self.mu * STANDARD_GRAVITY_MPS2;
-        [limit_mps2, 1.0 / limit_mps2, 0.0, 0.0]
+        [limit_mps2, 1.0 / limit_mps2, limit_mps2 * step_s, 0.0]
+    }
+
+    fn n_slots(&self, _step_s: f64) -> usize {
+        1
+    }
+
+    fn settled(&self, command: [f64; 2]) -> f64 {
+        command[1]
+    }
+
+    #[inline(always)]
+    fn on_command<L: Lanes>(constants: &Constants, state: &mut Commanding<'_, L>) {
+        let lanes = state.steering.0;
+        let speed = state.reached_speed.abs().max(lanes.real(0.1));
+        let limit = Real::constant(lanes, constants[2]) / speed;
+        let reached = Real(lanes, state.memory[0]);
+        state.steering = state.steering.clamp(reached - limit, reached + limit);
+        state.memory[0] = state.steering.1;
     }
 
     #[inline(always)]

@@ -78,7 +78,8 @@ impl PreparedEffects {
         self.settle(at(0), memory);
         for k in 0..self.n_past {
             let [speed, steering] = at(k).map(|value| Real(Scalar, value));
-            self.pass_command(memory, &mut CommandStep { speed, steering, step: k });
+            let reached_speed = speed;
+            self.pass_command(memory, &mut CommandStep { speed, steering, reached_speed, step: k });
         }
     }
 
@@ -103,6 +104,7 @@ impl PreparedEffects {
             let mut commanding = Commanding {
                 speed: state.speed,
                 steering: state.steering,
+                reached_speed: state.reached_speed,
                 memory: &mut memory[prepared.first_slot..prepared.first_slot + prepared.n_slots],
                 step: state.step,
             };
@@ -130,5 +132,6 @@ impl PreparedEffects {
 pub(crate) struct CommandStep<L: Lanes> {
     pub(crate) speed: Real<L>,
     pub(crate) steering: Real<L>,
+    pub(crate) reached_speed: Real<L>,
     pub(crate) step: usize,
 }
