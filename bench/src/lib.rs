@@ -5,6 +5,7 @@ pub mod closed_loop;
 pub mod collection;
 pub mod control;
 mod error;
+pub mod gap_score;
 pub mod learned_map;
 pub mod learning;
 pub mod navigation;

@@ -15,6 +15,7 @@ mod envelope;
 mod ground;
 mod linkage;
 mod load;
+mod machine;
 mod receiver;
 mod rest;
 mod servo;
@@ -29,7 +30,6 @@ use bicycle::{Command, Vehicle, VehicleError};
 use nalgebra::{Isometry3, Rotation3, Translation3, UnitQuaternion, Vector3};
 use terrain::Pose;
 
-use crate::deviation::{altered_actuators, altered_body, altered_wheel};
 use crate::{Deviation, DeviationError, Motion, World};
 use chassis::{BodyMotion, Chassis, Wrench};
 pub(crate) use drivetrain::DIFFERENTIAL_S_PER_M;
@@ -39,6 +39,7 @@ use ground::Ground;
 use linkage::Linkage;
 pub(crate) use load::AIR_KGPM3;
 use load::Load;
+use machine::Machine;
 use receiver::Receiver;
 use rest::{Rest, Stance};
 use servo::SteeringServo;
@@ -355,40 +356,6 @@ impl Plant {
         self.pose().is_finite()
             && self.motion.linear_mps.iter().chain(self.motion.angular_radps.iter()).all(|v| v.is_finite())
             && wheels.into_iter().all(f64::is_finite)
-    }
-}
-
-/// The machine as described, and as it is.
-struct Machine<'a> {
-    vehicle: &'a Vehicle,
-    deviations: &'a [Deviation],
-    body: Vehicle,
-    actuators: Vehicle,
-    rest: Rest,
-}
-
-impl<'a> Machine<'a> {
-    fn new(vehicle: &'a Vehicle, deviations: &'a [Deviation]) -> Self {
-        let body = altered_body(vehicle, deviations);
-        let rest = Rest::new(&body);
-        Self { vehicle, deviations, body, actuators: altered_actuators(vehicle, deviations), rest }
-    }
-
-    /// Tyres are made for the vehicle as described, and keep their stiffness under another load.
-    fn gear(&self, cell_m: f64, step_s: f64) -> [RunningGear; 4] {
-        let described = Rest::new(self.vehicle);
-        std::array::from_fn(|i| {
-            let wheel = altered_wheel(&self.body, self.deviations, i);
-            RunningGear::new(&wheel, &described, cell_m, step_s).deviating(self.deviations, i)
-        })
-    }
-
-    /// The motor controller knows mass and wheels from the description.
-    fn drivetrain(&self, ground: &Ground) -> Drivetrain {
-        let rest = Rest::new(self.vehicle);
-        let gear = RunningGear::new(self.vehicle, &rest, ground.resolution_m(), Plant::STEP_S);
-        let stance = rest.stance(self.vehicle, &gear.envelope);
-        Drivetrain::new(&self.actuators, &rest, &stance).deviating(self.deviations)
     }
 }
 

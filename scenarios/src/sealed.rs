@@ -154,9 +154,9 @@ fn pair(rng: &mut Xoshiro256PlusPlus) -> [&'static str; 2] {
     }
 }
 
-/// Grip shows at its limit only, where no careful driver goes.
+/// Grip shows at its limit only, where no careful driver goes; and one speed alone is all or nothing to a dead band.
 fn style(effects: &[&str], rng: &mut Xoshiro256PlusPlus) -> Style {
-    if effects.contains(&"friction") {
+    if effects.iter().any(|id| ["friction", "motor_deadband"].contains(id)) {
         return Style::Rich;
     }
     let rich = 1.0 - POOR_SHARE - TRACK_SHARE;

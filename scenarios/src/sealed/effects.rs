@@ -141,7 +141,7 @@ fn motor(id: &str, of: impl Fn([f64; 3]) -> f64, sign: f64, machine: &TestMachin
             Made::new("v_scale", factor, Deviation::WheelRadius { factor })
         }
         _ => {
-            let speed_mps = of([0.5, 0.57, 0.65]) * fast_mps;
+            let speed_mps = of([0.38, 0.45, 0.52]) * fast_mps;
             Made::new("v_deadband", speed_mps, Deviation::MotorDeadBand { speed_mps })
         }
     }
