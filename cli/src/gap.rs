@@ -1,11 +1,22 @@
 //! `surefoot gap`: why simulator and robot disagree, and the controller's model repaired.
 
 mod apply;
+mod baseline;
+mod diagnose;
+mod drives;
+mod html;
+mod machine;
+mod outputs;
+mod predictions;
+mod progress;
+mod request;
+pub(crate) mod told;
 
 use crate::arguments::GapCommand;
 
 pub(crate) fn run(command: &GapCommand) -> anyhow::Result<()> {
     match command {
+        GapCommand::Diagnose(diagnose) => diagnose::run(diagnose),
         GapCommand::Apply(apply) => apply::run(apply),
     }
 }

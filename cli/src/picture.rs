@@ -5,6 +5,7 @@ mod axes;
 mod canvas;
 mod collection;
 mod colour;
+mod gap;
 mod learning;
 mod legend;
 mod loss_curves;
@@ -24,6 +25,9 @@ use terrain::GridMap;
 use canvas::{Anchor, Canvas, TextStyle};
 pub use collection::draw_collection;
 use colour::Rgb;
+#[cfg(test)]
+pub(crate) use gap::examples as gap_examples;
+pub use gap::{GapPicture, GapPictures, HeldOutSample, HeldOutStrip, draw_gap};
 pub use learning::{draw_learning, learning_svg};
 pub use loss_curves::draw_loss_curves;
 pub use navigation_table::draw_navigation_table;

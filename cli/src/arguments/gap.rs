@@ -1,4 +1,4 @@
-//! `surefoot gap diagnose` and `apply`.
+//! `surefoot gap`; this file holds `diagnose` and `apply`.
 
 use std::path::PathBuf;
 
@@ -7,6 +7,9 @@ use clap::{Args, Subcommand};
 /// What can be asked about the gap between simulator and robot.
 #[derive(Clone, Debug, Subcommand)]
 pub enum GapCommand {
+    /// Say where simulator and robot disagree, which effect causes it and how far the gap shrinks
+    #[command(long_about = DIAGNOSE_ABOUT)]
+    Diagnose(Box<GapDiagnoseArguments>),
     /// Put the effects of a diagnosis into the controller's model
     #[command(long_about = APPLY_ABOUT)]
     Apply(GapApplyArguments),

@@ -1,0 +1,156 @@
+//! `surefoot gap diagnose`: read, screen, calibrate, diagnose, predict; only then open the held-out drives and verify.
+
+use bicycle::DriveLog;
+use sim_to_real::{Answer, Baseline, Diagnosis, Machine, Verification, diagnose, verify};
+
+use super::outputs::Outputs;
+use super::progress::Progress;
+use super::request::Request;
+use super::{baseline, drives, html, machine, predictions, told};
+use crate::arguments::GapDiagnoseArguments;
+use crate::picture::{GapPicture, GapPictures, draw_gap};
+use crate::{UsageError, WorkFailed, summary};
+
+/// What a diagnosis is made from.
+struct Inputs {
+    machine: Machine,
+    sim: Vec<DriveLog>,
+    real: Vec<DriveLog>,
+}
+
+/// The held-out drives and what they say; without any there is nothing.
+struct Verified {
+    heldout: Vec<DriveLog>,
+    verification: Option<Verification>,
+}
+
+pub(super) fn run(arguments: &GapDiagnoseArguments) -> anyhow::Result<()> {
+    let request = Request::of(arguments)?;
+    let outputs = Outputs::prepare(arguments)?;
+    let mut doubts = request.doubtful_names();
+    let inputs = read(&request, &mut doubts)?;
+    let folder = arguments.baseline_cache.clone().or_else(baseline::default_folder);
+    let baseline = baseline::load_or_calibrate(&inputs.machine, &inputs.sim, folder.as_deref(), &mut doubts)
+        .map_err(UsageError::from_input)?;
+    let searching = Progress::search();
+    let diagnosis = diagnose(&baseline, &inputs.machine, &inputs.real);
+    searching.finish();
+    let diagnosis = diagnosis.map_err(UsageError::from_input)?;
+    let predicted = diagnosis.answer(request.name.as_deref().unwrap_or(&inputs.machine.name));
+    outputs.write_json("prediction.json", &predicted)?;
+
+    // From here on the prediction cannot change any more.
+    let verified = open_heldout(&request, &inputs, &baseline, &diagnosis, &mut doubts)?;
+    let complete = |verification: &Verification| verification.complete(predicted.clone());
+    let mut answer = verified.verification.as_ref().map_or_else(|| predicted.clone(), complete);
+    answer.advice.extend(doubts.iter().map(|doubt| format!("check {doubt}")));
+    let report = Report {
+        request: &request,
+        inputs: &inputs,
+        answer: &answer,
+        diagnosis: &diagnosis,
+        doubts: &doubts,
+    };
+    report.write(&outputs, &verified)?;
+    report.say(&outputs);
+    Ok(())
+}
+
+fn read(request: &Request, doubts: &mut Vec<String>) -> Result<Inputs, UsageError> {
+    let (sim, real) = (drives::read(&request.sim, doubts)?, drives::read(&request.real, doubts)?);
+    let machine = machine::read(&request.vehicle, &[&sim[..], &real[..]].concat())?;
+    let sim = drives::screened(&machine, &request.sim, sim, doubts)?;
+    let real = drives::screened(&machine, &request.real, real, doubts)?;
+    drives::screen_together(&machine, &sim, &real, doubts)?;
+    Ok(Inputs { machine, sim, real })
+}
+
+/// Opens the drives that nothing has looked at so far and judges the diagnosis on them.
+fn open_heldout(
+    request: &Request,
+    inputs: &Inputs,
+    baseline: &Baseline,
+    diagnosis: &Diagnosis,
+    doubts: &mut Vec<String>,
+) -> Result<Verified, UsageError> {
+    let heldout = drives::read(&request.heldout, doubts)?;
+    let heldout = drives::screened(&inputs.machine, &request.heldout, heldout, doubts)?;
+    let seen_paths: Vec<_> = request.sim.iter().chain(&request.real).collect();
+    let seen = [&inputs.sim[..], &inputs.real[..]].concat();
+    drives::refuse_seen(&heldout, &request.heldout, &seen, &seen_paths)?;
+    let judged = || verify(baseline, &inputs.machine, diagnosis, &heldout);
+    let verification =
+        if heldout.is_empty() { None } else { Some(judged().map_err(UsageError::from_input)?) };
+    Ok(Verified { heldout, verification })
+}
+
+/// Everything that files and terminal tell.
+struct Report<'a> {
+    request: &'a Request,
+    inputs: &'a Inputs,
+    answer: &'a Answer,
+    diagnosis: &'a Diagnosis,
+    doubts: &'a [String],
+}
+
+impl Report<'_> {
+    fn write(&self, outputs: &Outputs, verified: &Verified) -> anyhow::Result<()> {
+        outputs.write_json("answer.json", self.answer)?;
+        if let (Some(path), Some(verification)) = (&outputs.predictions, &verified.verification) {
+            let names = predictions::run_names(&verified.heldout, &self.request.heldout);
+            let csv = predictions::csv(&verification.predictions, &names);
+            formats::write_bytes_atomic(path, csv.as_bytes())?;
+        }
+        let Some(folder) = &outputs.folder else { return Ok(()) };
+        let pictures = self.pictures(verified)?;
+        for picture in &pictures {
+            formats::write_bytes_atomic(&folder.join(picture.file), &picture.png)?;
+        }
+        let page = html::page(&html::Page {
+            answer: self.answer,
+            drives: &self.told_drives(),
+            doubts: self.doubts,
+            pictures: &pictures,
+            program: &format!("surefoot {}, revision {}", env!("CARGO_PKG_VERSION"), summary::revision()),
+        });
+        Ok(formats::write_bytes_atomic(&folder.join("report.html"), page.as_bytes())?)
+    }
+
+    fn pictures(&self, verified: &Verified) -> Result<Vec<GapPicture>, WorkFailed> {
+        let verification = verified.verification.as_ref();
+        let names = predictions::run_names(&verified.heldout, &self.request.heldout);
+        let strip = verification.and_then(|v| predictions::strip(&v.predictions, &verified.heldout, &names));
+        draw_gap(&GapPictures {
+            answer: self.answer,
+            findings: &self.diagnosis.findings,
+            heldout_residuals: verification.map_or(&[], |verification| &verification.residuals),
+            ground: self.inputs.machine.ground.as_ref(),
+            heldout: strip.as_ref(),
+        })
+        .map_err(|reason| WorkFailed(format!("expected pages to encode as PNG, found: {reason}")))
+    }
+
+    fn say(&self, outputs: &Outputs) {
+        for doubt in self.doubts {
+            eprintln!("surefoot: {doubt}");
+        }
+        print!("{}", told::answer(self.answer, &self.told_drives()));
+        let report = outputs.in_folder("report.html");
+        for path in
+            [report.as_ref(), outputs.json.as_ref(), outputs.predictions.as_ref()].into_iter().flatten()
+        {
+            println!("  {}", path.display());
+        }
+    }
+
+    /// `veh_b: 4 nominal drives, 2 real drives, 1 held-out drive`.
+    fn told_drives(&self) -> String {
+        let request = self.request;
+        let kinds = [(&request.sim, "nominal"), (&request.real, "real"), (&request.heldout, "held-out")];
+        let counted = kinds.map(|(drives, what)| match drives.len() {
+            1 => format!("1 {what} drive"),
+            n => format!("{n} {what} drives"),
+        });
+        format!("{}: {}", self.inputs.machine.name, counted.join(", "))
+    }
+}

@@ -1,0 +1,116 @@
+//! What is to be diagnosed: names and files, before anything but a case's own file is opened.
+
+use std::path::{Path, PathBuf};
+
+use crate::UsageError;
+use crate::arguments::GapDiagnoseArguments;
+
+/// Which file or name stands for the vehicle, and which files hold its drives.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Request {
+    /// Name of the case; without a case file the vehicle's is taken.
+    pub name: Option<String>,
+    pub vehicle: String,
+    pub sim: Vec<PathBuf>,
+    pub real: Vec<PathBuf>,
+    pub heldout: Vec<PathBuf>,
+}
+
+impl Request {
+    pub(super) fn of(arguments: &GapDiagnoseArguments) -> Result<Self, UsageError> {
+        let request = match (&arguments.case, &arguments.vehicle) {
+            (Some(case), _) => Self::of_case(case)?,
+            (None, vehicle) => Self {
+                name: None,
+                vehicle: vehicle.clone().unwrap_or_default(),
+                sim: arguments.sim.clone(),
+                real: arguments.real.clone(),
+                heldout: arguments.heldout.clone(),
+            },
+        };
+        request.check()?;
+        Ok(request)
+    }
+
+    fn of_case(case: &Path) -> Result<Self, UsageError> {
+        let case = formats::read_gap_case(case).map_err(UsageError::from_input)?;
+        Ok(Self {
+            name: Some(case.name),
+            vehicle: case.vehicle.to_string_lossy().into_owned(),
+            sim: case.sim,
+            real: case.real,
+            heldout: case.heldout,
+        })
+    }
+
+    /// Every drive's file stands where it is said to and is named once. The held-out ones are not opened for it.
+    fn check(&self) -> Result<(), UsageError> {
+        let drives: Vec<&PathBuf> = self.sim.iter().chain(&self.real).chain(&self.heldout).collect();
+        if let Some(missing) = drives.iter().find(|path| !path.is_file()) {
+            return Err(UsageError(format!("{}: expected a file, found none", missing.display())));
+        }
+        let repeated = (0..drives.len()).find(|&drive| drives[..drive].contains(&drives[drive]));
+        match repeated.map(|drive| drives[drive].display()) {
+            Some(file) => Err(UsageError(format!("{file}: expected each drive once, found it twice"))),
+            None => Ok(()),
+        }
+    }
+
+    /// Files whose names contradict what they are given as.
+    pub(super) fn doubtful_names(&self) -> Vec<String> {
+        let named = |paths: &[PathBuf], word: &str, role: &str| {
+            let contradicts = |path: &&PathBuf| {
+                let stem = path.file_stem().unwrap_or_default().to_string_lossy().to_lowercase();
+                stem.split(|c: char| !c.is_alphabetic()).any(|part| part == word)
+            };
+            let doubted = paths.iter().filter(contradicts);
+            doubted
+                .map(|path| format!("{}: given as a {role} drive, named '{word}': swapped?", path.display()))
+                .collect()
+        };
+        let of_sim: Vec<String> = named(&self.sim, "real", "nominal");
+        let of_real: Vec<String> = named(&self.real, "sim", "real");
+        [of_sim, of_real].concat()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_that_contradict_their_role_are_told() {
+        let request = Request {
+            name: None,
+            vehicle: "v".to_owned(),
+            sim: vec!["a/real_1.csv".into(), "surreal.csv".into()],
+            real: vec!["sim_real/drive.csv".into(), "SIM-2.csv".into()],
+            heldout: Vec::new(),
+        };
+        assert_eq!(
+            request.doubtful_names(),
+            [
+                "a/real_1.csv: given as a nominal drive, named 'real': swapped?",
+                "SIM-2.csv: given as a real drive, named 'sim': swapped?"
+            ]
+        );
+    }
+
+    #[test]
+    fn files_that_are_absent_or_twice_are_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("d.csv");
+        std::fs::write(&file, "").unwrap();
+        let with = |sim: &Path, real: &Path| Request {
+            name: None,
+            vehicle: "v".to_owned(),
+            sim: vec![sim.to_owned()],
+            real: vec![real.to_owned()],
+            heldout: Vec::new(),
+        };
+        let told = with(&file, &file).check().unwrap_err().0;
+        assert!(told.ends_with("d.csv: expected each drive once, found it twice"), "{told}");
+        let told = with(&file, &folder.path().join("e.csv")).check().unwrap_err().0;
+        assert!(told.ends_with("e.csv: expected a file, found none"), "{told}");
+    }
+}

@@ -1,0 +1,179 @@
+//! A diagnosis in plain words.
+
+use std::fmt::Write;
+
+use bicycle::effect::{CATALOGUE, Parameter};
+use sim_to_real::{Answer, Condition, Estimate, NamedEffect, Shrink, Verdict};
+
+/// The verdict in a sentence.
+pub(crate) fn verdict(answer: &Answer) -> String {
+    let names = answer.effects.iter().map(|effect| effect.id.as_str()).collect::<Vec<_>>().join(" and ");
+    match answer.verdict {
+        Verdict::None => {
+            "No gap: the real drives differ from the simulator by no more than its own drives from one another."
+                .to_owned()
+        }
+        Verdict::Effects => format!("The gap comes from {names}."),
+        Verdict::EffectsAndUnknown => {
+            format!("A part of the gap comes from {names}; the rest is nothing that the catalogue knows.")
+        }
+        Verdict::Unknown => "There is a gap, and nothing that the catalogue knows explains it.".to_owned(),
+    }
+}
+
+/// What an effect is, from the catalogue.
+pub(crate) fn meaning(id: &str) -> &'static str {
+    CATALOGUE.iter().find(|description| description.id == id).map_or("", |description| description.meaning)
+}
+
+/// Parameters with values and intervals: `time_constant 0.210 s (0.180 to 0.240)`.
+pub(crate) fn parameters(effect: &NamedEffect) -> String {
+    let told = |(name, estimate): (&String, &Estimate)| parameter(&effect.id, name, estimate);
+    effect.parameters.iter().map(told).collect::<Vec<_>>().join(", ")
+}
+
+/// One parameter with value, unit and 90 % interval.
+pub(crate) fn parameter(id: &str, name: &str, estimate: &Estimate) -> String {
+    let known = CATALOGUE.iter().find(|description| description.id == id);
+    let known = known.and_then(|description| description.parameters.iter().find(|p| p.name == name));
+    let unit = known.map_or("", |parameter: &Parameter| parameter.unit);
+    let unit = if unit == "-" || unit.is_empty() { String::new() } else { format!(" {unit}") };
+    let Estimate { value, low, high } = *estimate;
+    format!("{} {}{unit} ({} to {})", plain_name(name), rounded(value), rounded(low), rounded(high))
+}
+
+/// `time_constant_s` without its unit and underscores.
+fn plain_name(name: &str) -> String {
+    let units = ["_s", "_rad", "_mps", "_mps2", "_radps", "_per_m", "_m", "_s2_per_m2"];
+    let longest = units.iter().filter_map(|unit| name.strip_suffix(unit)).min_by_key(|rest| rest.len());
+    longest.unwrap_or(name).replace('_', " ")
+}
+
+/// Three significant digits.
+fn rounded(value: f64) -> String {
+    if value == 0.0 || !value.is_finite() {
+        return format!("{value}");
+    }
+    let decimals = (2 - value.abs().log10().floor() as i32).clamp(0, 6) as usize;
+    format!("{value:.decimals$}")
+}
+
+/// A condition in words.
+pub(crate) fn condition(condition: Condition) -> &'static str {
+    match condition {
+        Condition::Speed => "speed",
+        Condition::Steering => "steering",
+        Condition::SteeringChange => "change of steering",
+        Condition::SpeedChange => "change of speed",
+        Condition::LateralAcceleration => "lateral acceleration",
+        Condition::Pitch => "pitch of the ground",
+        Condition::Roll => "roll of the ground",
+        Condition::TerrainClass => "terrain class",
+        Condition::Heading => "heading",
+        Condition::Constant => "everywhere the same",
+    }
+}
+
+/// The conditions that stand out, as `speed 0.61, pitch 0.12`.
+pub(crate) fn places(answer: &Answer) -> String {
+    let standing = answer.places.iter().filter(|place| place.share >= 0.01);
+    let told: Vec<_> =
+        standing.map(|place| format!("{} {:.2}", condition(place.condition), place.share)).collect();
+    if told.is_empty() { "nowhere in particular".to_owned() } else { told.join(", ") }
+}
+
+/// How far the gap shrinks, line by line.
+pub(crate) fn shrink(shrink: &Shrink) -> Vec<String> {
+    let mut lines = Vec::new();
+    if let Some(predicted) = shrink.predicted_closed {
+        lines.push(format!(
+            "predicted from the real drives alone: {:.0} % of the gap closes",
+            100.0 * predicted
+        ));
+    }
+    match (shrink.before, shrink.after) {
+        (Some(before), Some(after)) => lines.push(format!(
+            "held-out rollout error {before:.2} before, {after:.2} after, {:.2} is the floor",
+            shrink.floor
+        )),
+        _ => lines.push("no held-out drives: nothing was verified".to_owned()),
+    }
+    lines.extend(closed(shrink));
+    if let Some(error) = shrink.position_error_2s_m {
+        lines.push(format!(
+            "position error after 2 s {:.3} m before, {:.3} m after",
+            error.before, error.after
+        ));
+    }
+    if let Some(bound) = shrink.learned_bound_closed {
+        lines.push(format!(
+            "a learned residual closes {:.0} %: about the most that any model could",
+            100.0 * bound
+        ));
+    }
+    lines
+}
+
+fn closed(shrink: &Shrink) -> Option<String> {
+    let before = shrink.before?;
+    let Some(closed) = shrink.closed else {
+        return (before < 1.2 * shrink.floor)
+            .then(|| "so near to the floor that there is nothing to close".to_owned());
+    };
+    let interval = shrink.closed_low.zip(shrink.closed_high);
+    let interval = interval
+        .map(|(low, high)| format!(" ({:.0} to {:.0} %)", 100.0 * low, 100.0 * high))
+        .unwrap_or_default();
+    Some(format!("{:.0} %{interval} of the gap closes on the held-out drives", 100.0 * closed))
+}
+
+/// Everything for the terminal.
+pub(super) fn answer(answer: &Answer, drives: &str) -> String {
+    let mut text = format!("\n  {} · {drives}\n\n  {}\n", answer.case, verdict(answer));
+    // Writing to a string cannot fail.
+    let mut line = |name: &str, told: &str| drop(writeln!(text, "  {name:<10}{told}"));
+    for effect in &answer.effects {
+        line("", &format!("{}: {}", effect.id, meaning(&effect.id)));
+        line("", &parameters(effect));
+    }
+    let others: Vec<_> = answer
+        .credible_set
+        .iter()
+        .filter(|id| answer.effects.iter().all(|effect| effect.id != **id))
+        .collect();
+    if !others.is_empty() {
+        let names = others.iter().map(|id| id.as_str()).collect::<Vec<_>>().join(", ");
+        line("", &format!("alone, these would explain as much: {names}"));
+    }
+    if answer.verdict != Verdict::None {
+        line("where", &places(answer));
+    }
+    for (place, told) in shrink(&answer.shrink).iter().enumerate() {
+        line(if place == 0 { "how far" } else { "" }, told);
+    }
+    for (place, advice) in answer.advice.iter().enumerate() {
+        line(if place == 0 { "next" } else { "" }, advice);
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_parameter_is_told_with_unit_and_interval() {
+        let estimate = Estimate { value: 0.2104, low: 0.18, high: 0.2399 };
+        assert_eq!(
+            parameter("steer_lag", "time_constant_s", &estimate),
+            "time constant 0.210 s (0.180 to 0.240)"
+        );
+        let ratio = Estimate { value: 1.0, low: 0.95, high: 1.05 };
+        assert_eq!(parameter("steer_gain", "ratio", &ratio), "ratio 1.00 (0.950 to 1.05)");
+    }
+
+    #[test]
+    fn three_digits_are_kept() {
+        assert_eq!([0.0, 12345.6, 0.012345, -2.5].map(rounded), ["0", "12346", "0.0123", "-2.50"]);
+    }
+}

@@ -1,0 +1,67 @@
+//! Which: every effect with its probability, the announced ones and the credible set marked.
+
+use sim_to_real::{Answer, Ranked};
+
+use super::super::PAGE_WIDTH;
+use super::super::axes::{Axes, Range, number};
+use super::super::canvas::{Anchor, Canvas, Rect, Stroke, TextStyle};
+use super::super::colour::Rgb;
+use super::{AFTER, BEFORE, draw_header, draw_legend};
+
+const LEFT: f64 = 240.0;
+const TOP: f64 = 170.0;
+const WIDTH: f64 = 700.0;
+const ROW: f64 = 40.0;
+/// Effects that are shown.
+const MOST: usize = 14;
+
+pub(super) fn page(answer: &Answer) -> Option<Canvas> {
+    let shown = &answer.ranking[..answer.ranking.len().min(MOST)];
+    if shown.is_empty() {
+        return None;
+    }
+    let height = ROW * shown.len() as f64;
+    let mut canvas = Canvas::new(PAGE_WIDTH, TOP + height + 80.0);
+    let n_more = answer.ranking.len() - shown.len();
+    let more =
+        if n_more > 0 { format!(" · {n_more} less likely ones are not shown") } else { String::new() };
+    let line = format!("probability that an effect is the cause{more}");
+    draw_header("Which effect", &line, &mut canvas);
+    let entries = [
+        ("announced", Stroke::solid(BEFORE, 12.0)),
+        ("cannot be told from it", Stroke::solid(AFTER, 12.0)),
+        ("other", Stroke::solid(Rgb::RULE, 12.0)),
+    ];
+    draw_legend(&entries, (LEFT, 130.0), &mut canvas);
+    draw_bars(answer, shown, Rect { x: LEFT, y: TOP, width: WIDTH, height }, &mut canvas);
+    Some(canvas)
+}
+
+fn draw_bars(answer: &Answer, shown: &[Ranked], frame: Rect, canvas: &mut Canvas) {
+    let n = shown.len() as f64;
+    let axes = Axes { frame, x: Range { low: 0.0, high: 1.0 }, y: Range { low: -n, high: 0.0 } };
+    for (row, ranked) in shown.iter().enumerate() {
+        let (x, y) = axes.place(ranked.score.clamp(0.0, 1.0), -(row as f64) - 0.5);
+        let announced = answer.effects.iter().find(|effect| effect.id == ranked.id);
+        let colour = match announced {
+            Some(_) => BEFORE,
+            None if answer.credible_set.contains(&ranked.id) => AFTER,
+            None => Rgb::RULE,
+        };
+        canvas.rect(
+            Rect { x: frame.x, y: y - 12.0, width: (x - frame.x).max(2.0), height: 24.0 },
+            colour,
+            0.9,
+        );
+        canvas.text((frame.x - 14.0, y + 6.0), &ranked.id, TextStyle::new(18, Anchor::End));
+        let score = TextStyle::new(16, Anchor::Start).coloured(Rgb::INK_SOFT);
+        canvas.text((frame.right() + 16.0, y + 6.0), &number(ranked.score, 3), score);
+        if let Some(effect) = announced {
+            let told = crate::gap::told::parameters(effect);
+            canvas.text((frame.right() + 90.0, y + 6.0), &told, TextStyle::new(17, Anchor::Start));
+        }
+    }
+    axes.draw_frame(canvas);
+    axes.draw_x_ticks(canvas);
+    axes.draw_x_label(canvas, "probability [-]");
+}

@@ -1,0 +1,71 @@
+use sim_to_real::{Answer, Findings};
+
+use super::examples::{answer, cells, findings, ground, strip};
+use super::{GapPicture, GapPictures, draw_gap, ground as ground_page, places, residuals};
+
+/// Where pictures go when somebody wants to look at them.
+fn keep(drawn: &[GapPicture]) {
+    if let Some(folder) = std::env::var_os("SUREFOOT_PICTURES") {
+        for picture in drawn {
+            std::fs::write(std::path::Path::new(&folder).join(picture.file), &picture.png).unwrap();
+        }
+    }
+}
+
+#[test]
+fn every_page_is_drawn_when_there_is_something_on_it() {
+    let (answer, findings, cells, ground, strip) = (answer(), findings(), cells(), ground(), strip());
+    let pictures = GapPictures {
+        answer: &answer,
+        findings: &findings,
+        heldout_residuals: &cells,
+        ground: Some(&ground),
+        heldout: Some(&strip),
+    };
+    let drawn = draw_gap(&pictures).unwrap();
+    keep(&drawn);
+    let files: Vec<_> = drawn.iter().map(|picture| picture.file).collect();
+    assert_eq!(files, ["ranking.png", "places.png", "residuals.png", "ground.png", "heldout.png"]);
+    for picture in &drawn {
+        // PNG's signature, then IHDR with the width as the first number.
+        assert_eq!(&picture.png[..8], b"\x89PNG\r\n\x1a\n", "{}", picture.file);
+        assert_eq!(picture.png[16..20], 1600_u32.to_be_bytes(), "{}", picture.file);
+    }
+}
+
+#[test]
+fn pages_without_anything_on_them_are_left_out() {
+    let empty = Answer { ranking: Vec::new(), ..answer() };
+    let nothing = GapPictures {
+        answer: &empty,
+        findings: &Findings::default(),
+        heldout_residuals: &[],
+        ground: None,
+        heldout: None,
+    };
+    assert!(draw_gap(&nothing).unwrap().is_empty());
+    let only_heldout = GapPictures { heldout_residuals: &cells(), ..nothing };
+    assert_eq!(draw_gap(&only_heldout).unwrap()[0].file, "residuals.png");
+}
+
+#[test]
+fn numbers_that_are_none_do_not_reach_the_page() {
+    let mut findings = findings();
+    findings.conditions[0].share = f64::NAN;
+    findings.residuals[0].before = f64::INFINITY;
+    findings.map[0].before = f64::NAN;
+    let answer = answer();
+    let pictures = GapPictures {
+        answer: &answer,
+        findings: &findings,
+        heldout_residuals: &[],
+        ground: None,
+        heldout: None,
+    };
+    let [places, residuals, ground] =
+        [places::page(&pictures), residuals::page(&pictures), ground_page::page(&pictures)]
+            .map(|page| page.unwrap().svg());
+    for page in [places, residuals, ground] {
+        assert!(!page.contains("NaN") && !page.contains("inf\""), "a number that is none");
+    }
+}

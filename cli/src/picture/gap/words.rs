@@ -1,0 +1,40 @@
+//! Names and units on the pictures.
+
+use sim_to_real::{Condition, ResidualState};
+
+pub(super) const RANKING: &str =
+    "Which effect: the probability of every effect of the catalogue to be the cause.";
+pub(super) const PLACES: &str =
+    "Where: how much of the residual each condition explains, less what it explains between nominal drives.";
+pub(super) const RESIDUALS: &str =
+    "How large: the residual of every predicted quantity, by how far ahead it is predicted.";
+pub(super) const GROUND: &str =
+    "Over the ground: the residual of every rollout where it began, before and after.";
+pub(super) const HELDOUT: &str = "A held-out drive: what was measured and what both models had predicted.";
+
+/// Name and unit of a condition.
+pub(super) fn condition(condition: Condition) -> (&'static str, &'static str) {
+    match condition {
+        Condition::Speed => ("speed", "m/s"),
+        Condition::Steering => ("steering", "rad"),
+        Condition::SteeringChange => ("change of steering", "rad/s"),
+        Condition::SpeedChange => ("change of speed", "m/s²"),
+        Condition::LateralAcceleration => ("lateral acceleration", "m/s²"),
+        Condition::Pitch => ("pitch", "rad"),
+        Condition::Roll => ("roll", "rad"),
+        Condition::TerrainClass => ("terrain class", "number"),
+        Condition::Heading => ("heading", "rad"),
+        Condition::Constant => ("everywhere the same", "-"),
+    }
+}
+
+/// Name of a predicted quantity.
+pub(super) fn state(state: ResidualState) -> &'static str {
+    match state {
+        ResidualState::Along => "displacement along",
+        ResidualState::Across => "displacement across",
+        ResidualState::Yaw => "yaw",
+        ResidualState::ForwardSpeed => "forward speed",
+        ResidualState::YawRate => "yaw rate",
+    }
+}

@@ -1,0 +1,257 @@
+//! `surefoot gap diagnose` and `apply` from the outside: a labelled case, what is written, and what is refused.
+
+#![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use bicycle::{Column, DriveLog};
+use sim_to_real::Answer;
+
+const OPEN: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/gap/open/");
+/// Steering lag of 0.35 s in a third-party multi-body plant.
+const CASE: &str = "cases/open_10";
+const VEHICLE: &str = "vehicles/veh_d";
+
+fn open(path: &str) -> String {
+    format!("{OPEN}{path}")
+}
+
+fn surefoot(folder: &Path, words: &[&str]) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_surefoot"));
+    command.current_dir(folder).arg("gap").args(words).output().unwrap()
+}
+
+fn succeed(folder: &Path, words: &[&str]) -> String {
+    let output = surefoot(folder, words);
+    let told = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(output.status.success(), "{words:?}: {told}");
+    String::from_utf8(output.stdout).unwrap()
+}
+
+fn refuse(folder: &Path, words: &[&str]) -> String {
+    let output = surefoot(folder, words);
+    let told = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(2), "{words:?}: {told}");
+    assert!(told.lines().count() == 1 && output.stdout.is_empty(), "{words:?}: {told}");
+    told
+}
+
+fn names(folder: &Path) -> Vec<String> {
+    let mut names: Vec<_> = fs::read_dir(folder)
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+        .collect();
+    names.sort();
+    names
+}
+
+/// A folder whose `cache` keeps the calibration over the runs of one test.
+fn folder() -> tempfile::TempDir {
+    tempfile::tempdir().unwrap()
+}
+
+/// Root mean square distance after two seconds, from the predictions' file and the drive alone.
+fn position_error_2s_m(predictions: &str, drive: &DriveLog, model: &str) -> f64 {
+    let run = drive.runs().next().unwrap();
+    let [x, y] = [Column::X, Column::Y].map(|column| run.column(column).unwrap());
+    let square = |line: &str| {
+        let cells: Vec<&str> = line.split(',').collect();
+        let number = |cell: usize| cells[cell].parse::<f64>().unwrap();
+        let is_meant = cells[3] == model && number(2) == 2.0;
+        // Rows are 0.02 s apart.
+        let row = ((number(1) + 2.0) / 0.02).round() as usize;
+        is_meant.then(|| (number(4) - x[row]).powi(2) + (number(5) - y[row]).powi(2))
+    };
+    let squares: Vec<f64> = predictions.lines().skip(1).filter_map(square).collect();
+    assert!(squares.len() > 150, "{}", squares.len());
+    (squares.iter().sum::<f64>() / squares.len() as f64).sqrt()
+}
+
+#[test]
+fn a_labelled_case_is_diagnosed_verified_written_and_applied() {
+    let folder = folder();
+    let path = |name: &str| folder.path().join(name);
+    let words = [
+        "diagnose",
+        &open(CASE),
+        "--out",
+        "r",
+        "--json",
+        "a.json",
+        "--predictions",
+        "p.csv",
+        "--baseline-cache",
+        "cache",
+    ];
+    let told = succeed(folder.path(), &words);
+    let answer: Answer = serde_json::from_slice(&fs::read(path("a.json")).unwrap()).unwrap();
+    assert_eq!(answer.case, "open_10");
+    assert_eq!(answer.effects[0].id, "steer_lag", "{:?}", answer.effects);
+    let lag = answer.effects[0].parameters["time_constant_s"];
+    assert!((lag.value - 0.35).abs() < 0.07 && lag.low <= lag.value && lag.value <= lag.high, "{lag:?}");
+    assert!(
+        told.contains("The gap comes from steer_lag") && told.contains("position error after 2 s"),
+        "{told}"
+    );
+
+    assert_eq!(fs::read(path("a.json")).unwrap(), fs::read(path("r/answer.json")).unwrap());
+    let pictures = ["ground.png", "heldout.png", "places.png", "ranking.png", "residuals.png"];
+    let written = [
+        "answer.json",
+        pictures[0],
+        pictures[1],
+        pictures[2],
+        "prediction.json",
+        pictures[3],
+        "report.html",
+        pictures[4],
+    ];
+    assert_eq!(names(&path("r")), written);
+    let html = fs::read_to_string(path("r/report.html")).unwrap();
+    assert_eq!(html.matches("data:image/png;base64,").count(), pictures.len());
+    assert_eq!(names(&path("cache")).len(), 1);
+
+    let drive = formats::read_drive(Path::new(&open(&format!("{CASE}/real_heldout.csv")))).unwrap().log;
+    let predictions = fs::read_to_string(path("p.csv")).unwrap();
+    let told = answer.shrink.position_error_2s_m.unwrap();
+    for (model, told) in [("nominal", told.before), ("repaired", told.after)] {
+        let found = position_error_2s_m(&predictions, &drive, model);
+        assert!((found / told - 1.0).abs() < 0.01, "{model}: {found} against {told}");
+    }
+
+    succeed(folder.path(), &["apply", "a.json", "--model", "rc_car", "--out", "m.toml"]);
+    let model = formats::read_model(&path("m.toml")).unwrap();
+    assert_eq!(model.effects.len(), answer.effects.len());
+    assert_eq!(model.effects[0].values()[0], lag.value);
+}
+
+#[test]
+fn the_prediction_stands_before_the_held_out_drives_are_opened() {
+    let folder = folder();
+    let drives = |names: &[&str]| names.iter().map(|name| open(name)).collect::<Vec<_>>();
+    let vehicle = open(&format!("{VEHICLE}/vehicle.toml"));
+    let sim = drives(&["vehicles/veh_d/sim_1.csv", "vehicles/veh_d/sim_2.csv"]);
+    let real = drives(&["cases/open_10/real_train_1.csv"]);
+    let words = |heldout: &str, out: &str| {
+        let mut words =
+            vec!["diagnose".to_owned(), "--vehicle".to_owned(), vehicle.clone(), "--sim".to_owned()];
+        words.extend(sim.clone());
+        words.push("--real".to_owned());
+        words.extend(real.clone());
+        words.extend(["--heldout", heldout, "--out", out, "--baseline-cache", "cache"].map(str::to_owned));
+        words
+    };
+    let run = |heldout: &str, out: &str| {
+        let words = words(heldout, out);
+        surefoot(folder.path(), &words.iter().map(String::as_str).collect::<Vec<_>>())
+    };
+    let file = |name: &str| fs::read(folder.path().join(name)).unwrap();
+    assert!(run(&open("cases/open_10/real_heldout.csv"), "one").status.success());
+    assert!(run(&open("cases/open_01/real_heldout.csv"), "two").status.success());
+    assert_eq!(file("one/prediction.json"), file("two/prediction.json"));
+    assert_ne!(file("one/answer.json"), file("two/answer.json"));
+    // A held-out drive that nobody can read does not keep the prediction from standing.
+    fs::write(folder.path().join("broken.csv"), "t,x\n0,a\n").unwrap();
+    let broken = run("broken.csv", "three");
+    assert_eq!(broken.status.code(), Some(2));
+    assert_eq!(file("one/prediction.json"), file("three/prediction.json"));
+    assert!(!folder.path().join("three/answer.json").exists());
+    let told = run(&open("cases/open_10/../open_10/real_train_1.csv"), "four");
+    let told = String::from_utf8(told.stderr).unwrap();
+    assert!(told.contains("expected a drive not used before, found the drive of"), "{told}");
+}
+
+/// A real drive of the case with a column changed, as a file.
+fn changed(folder: &Path, name: &str, column: Column, change: impl Fn(f64) -> f64) -> PathBuf {
+    let mut file =
+        formats::read_drive_log_csv(Path::new(&open(&format!("{CASE}/real_train_1.csv")))).unwrap();
+    let mut log = DriveLog::default();
+    for run in file.log.runs() {
+        for row in run.drive_rows() {
+            log.push(run.name(), &row.with(column, change(row.value(column)))).unwrap();
+        }
+    }
+    file.log = log;
+    let path = folder.join(name);
+    formats::write_drive_log_csv(&path, &file).unwrap();
+    path
+}
+
+#[test]
+fn drives_that_would_be_misread_are_refused_with_the_suspicion() {
+    let folder = folder();
+    let vehicle = open(&format!("{VEHICLE}/vehicle.toml"));
+    let sim = open(&format!("{VEHICLE}/sim_1.csv"));
+    let diagnose = |real: &str| {
+        let words = ["diagnose", "--vehicle", &vehicle, "--sim", &sim, "--real", real, "--json", "a.json"];
+        refuse(folder.path(), &words)
+    };
+    let degrees = |value: f64| value.to_degrees();
+    changed(folder.path(), "yaw.csv", Column::Yaw, degrees);
+    changed(folder.path(), "steer.csv", Column::CmdSteer, degrees);
+    changed(folder.path(), "mirrored.csv", Column::CmdSteer, |angle| -angle);
+    changed(folder.path(), "kmh.csv", Column::Vx, |speed| 3.6 * speed);
+    changed(folder.path(), "nan.csv", Column::Wz, |rate| if rate > 0.3 { f64::NAN } else { rate });
+    let text = fs::read_to_string(open(&format!("{CASE}/real_train_1.csv"))).unwrap();
+    let lines: Vec<&str> = text.lines().collect();
+    fs::write(folder.path().join("short.csv"), lines[..101].join("\n")).unwrap();
+    let backwards = [&lines[..1000], &lines[500..600]].concat().join("\n");
+    fs::write(folder.path().join("backwards.csv"), backwards).unwrap();
+    let cases = [
+        ("yaw.csv", "yaw.csv: yaw: expected radians, found degrees? "),
+        ("steer.csv", "steer.csv: cmd_steer: expected radians, found degrees? "),
+        ("mirrored.csv", "mirrored.csv: cmd_steer: expected left positive, found mirrored? "),
+        ("kmh.csv", "kmh.csv: vx: expected SI units, found km/h? "),
+        ("nan.csv", "nan.csv: wz: expected a number in every row, found none in "),
+        ("short.csv", "short.csv: expected at least 8 s of driving, found 1.98 s"),
+        ("backwards.csv", "backwards.csv:1001: t: expected a time > "),
+        ("none.csv", "none.csv: expected a file, found none"),
+    ];
+    for (file, expected) in cases {
+        let told = diagnose(file);
+        assert!(told.contains(expected), "{told}");
+    }
+    assert!(!folder.path().join("a.json").exists());
+}
+
+#[test]
+fn what_cannot_be_asked_is_refused() {
+    let folder = folder();
+    let cases: [(&[&str], &str); 5] = [
+        (&["diagnose"], "CASE"),
+        (&["diagnose", "nowhere"], "nowhere: expected a readable text file"),
+        (&["diagnose", &open(CASE), "--real", "a.csv"], "cannot be used with"),
+        (
+            &["apply", "none.json", "--model", "rc_car", "--out", "m.toml"],
+            "none.json: expected a readable file",
+        ),
+        (&["diagnose", &open(CASE), "--json", "."], "--json: expected a file, found the folder"),
+    ];
+    for (words, expected) in cases {
+        let told = refuse(folder.path(), words);
+        assert!(told.contains(expected), "{told}");
+    }
+    assert!(names(folder.path()).iter().all(|name| name == "surefoot-out"));
+}
+
+#[test]
+fn an_interrupted_run_leaves_nothing_half_written() {
+    let folder = folder();
+    let mut command = Command::new(env!("CARGO_BIN_EXE_surefoot"));
+    let words =
+        ["gap", "diagnose", &open(CASE), "--out", "r", "--json", "a.json", "--baseline-cache", "cache"];
+    let mut child = command.current_dir(folder.path()).args(words).spawn().unwrap();
+    std::thread::sleep(std::time::Duration::from_millis(700));
+    child.kill().unwrap();
+    child.wait().unwrap();
+    for json in ["a.json", "r/answer.json", "r/prediction.json"] {
+        let path = folder.path().join(json);
+        // Either not there yet or whole.
+        assert!(
+            !path.exists() || serde_json::from_slice::<Answer>(&fs::read(&path).unwrap()).is_ok(),
+            "{json}"
+        );
+    }
+}
