@@ -9,7 +9,7 @@ use std::sync::LazyLock;
 
 /// Every crate with the internal crates that its product may use, and no others. `cli` calls `bench` to run
 /// `surefoot bench`; `tests` may use all, but has no product: it has dev-dependencies only.
-const MAY_USE: [(&str, &[&str]); 13] = [
+const MAY_USE: [(&str, &[&str]); 14] = [
     ("terrain", &[]),
     ("traversability", &["terrain"]),
     ("bicycle", &[]),
@@ -18,13 +18,14 @@ const MAY_USE: [(&str, &[&str]); 13] = [
     ("evidential", &["terrain", "traversability", "bicycle", "physics_prior"]),
     ("navigator", &["terrain", "traversability", "bicycle", "physics_prior", "evidential", "mppi"]),
     ("scenarios", &["terrain", "bicycle"]),
+    ("sim_to_real", &["terrain", "bicycle"]),
     ("formats", &["terrain", "traversability", "bicycle"]),
     ("runtime", &LIBRARIES),
     ("bench", &LIBRARIES),
     ("cli", &LIBRARIES_AND_BENCH),
     ("tests", &[]),
 ];
-const LIBRARIES: [&str; 9] = [
+const LIBRARIES: [&str; 10] = [
     "terrain",
     "traversability",
     "bicycle",
@@ -33,9 +34,10 @@ const LIBRARIES: [&str; 9] = [
     "mppi",
     "navigator",
     "scenarios",
+    "sim_to_real",
     "formats",
 ];
-const LIBRARIES_AND_BENCH: [&str; 11] = [
+const LIBRARIES_AND_BENCH: [&str; 12] = [
     "terrain",
     "traversability",
     "bicycle",
@@ -44,6 +46,7 @@ const LIBRARIES_AND_BENCH: [&str; 11] = [
     "mppi",
     "navigator",
     "scenarios",
+    "sim_to_real",
     "formats",
     "runtime",
     "bench",
