@@ -4,6 +4,7 @@ mod bench;
 mod collect;
 mod drive;
 mod gap;
+mod gap_check;
 mod learned_map;
 mod train;
 mod values;
@@ -17,6 +18,7 @@ pub use bench::{
 pub use collect::{CollectArguments, CollectMap, CollectSplit, CollectWorld};
 pub use drive::{DriveArguments, InstructionSet, MapSource, Method, Pace};
 pub use gap::{GapApplyArguments, GapCommand, GapDiagnoseArguments};
+pub use gap_check::{GapScoreArguments, GapSealArguments};
 pub use learned_map::{BenchLearnedMapArguments, NetworkSizes};
 pub use train::{TrainArguments, TrainCommand};
 pub use values::{Goal, StartPose, WorldSource};

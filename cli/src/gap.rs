@@ -10,7 +10,10 @@ mod outputs;
 mod predictions;
 mod progress;
 mod request;
+mod score;
+mod seal;
 pub(crate) mod told;
+mod workers;
 
 use crate::arguments::GapCommand;
 
@@ -18,5 +21,7 @@ pub(crate) fn run(command: &GapCommand) -> anyhow::Result<()> {
     match command {
         GapCommand::Diagnose(diagnose) => diagnose::run(diagnose),
         GapCommand::Apply(apply) => apply::run(apply),
+        GapCommand::Seal(seal) => seal::run(seal),
+        GapCommand::Score(score) => score::run(score),
     }
 }

@@ -6,6 +6,7 @@ mod canvas;
 mod collection;
 mod colour;
 mod gap;
+mod gap_score;
 mod learning;
 mod legend;
 mod loss_curves;
@@ -28,6 +29,7 @@ use colour::Rgb;
 #[cfg(test)]
 pub(crate) use gap::examples as gap_examples;
 pub use gap::{GapPicture, GapPictures, HeldOutSample, HeldOutStrip, draw_gap};
+pub use gap_score::draw_gap_score;
 pub use learning::{draw_learning, learning_svg};
 pub use loss_curves::draw_loss_curves;
 pub use navigation_table::draw_navigation_table;

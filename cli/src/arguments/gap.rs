@@ -13,6 +13,12 @@ pub enum GapCommand {
     /// Put the effects of a diagnosis into the controller's model
     #[command(long_about = APPLY_ABOUT)]
     Apply(GapApplyArguments),
+    /// Make cases with withheld causes, to try a diagnosis on
+    #[command(long_about = super::gap_check::SEAL_ABOUT)]
+    Seal(super::GapSealArguments),
+    /// Diagnose a set of cases and hold the answers against their labels
+    #[command(long_about = super::gap_check::SCORE_ABOUT)]
+    Score(super::GapScoreArguments),
 }
 
 /// Which drives to diagnose, and where the answer goes.
