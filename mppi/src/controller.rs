@@ -41,6 +41,8 @@ pub struct Controller {
     machine: Machine,
     workers: Workers,
     pub(crate) chunks: Vec<Chunk>,
+    /// Chunks that are sampled, from the first on.
+    pub(crate) n_used: usize,
     pub(crate) plan: Plan,
     /// The model with lengths in metres, for judging.
     pub(crate) stepper: Stepper,
@@ -81,6 +83,7 @@ impl Controller {
         Ok(Self {
             workers: Workers::new(config.n_threads, n_chunks)?,
             chunks: vec![Chunk::new(config.n_steps); n_chunks],
+            n_used: n_chunks,
             plan: Plan::new(&config),
             cell_stepper: stepper.clone(),
             stepper,
@@ -105,6 +108,18 @@ impl Controller {
         self.history = History::new();
         self.watch.reset();
         self.temperature_s = 1.0;
+    }
+
+    /// From now on samples at most `n` futures a cycle, in whole blocks of 64, at least one and at most as many as
+    /// are configured: for a processor that is too slow for all of them. Decisions are then those of a controller
+    /// that is configured for as many.
+    pub fn use_rollouts(&mut self, n: usize) {
+        self.n_used = (n / CHUNK).clamp(1, self.chunks.len());
+    }
+
+    /// Futures that a cycle samples.
+    pub fn n_rollouts(&self) -> usize {
+        self.n_used * CHUNK
     }
 
     /// What the last cycle that sampled tells about itself.
@@ -186,7 +201,9 @@ impl Controller {
     }
 
     fn describe(&mut self, summary: &WeightSummary, mode: Mode) {
-        let totals = self.chunks.iter().fold(Totals::default(), |totals, chunk| totals.plus(&chunk.totals));
+        let totals = self.chunks[..self.n_used]
+            .iter()
+            .fold(Totals::default(), |totals, chunk| totals.plus(&chunk.totals));
         let (chunk, lane) = summary.best;
         self.diagnostics = Diagnostics {
             isa: self.machine.isa(),
@@ -196,7 +213,7 @@ impl Controller {
             normalizer: summary.normalizer,
             effective_sample_size: summary.effective_sample_size,
             temperature_s: summary.temperature_s,
-            free_energy_s: summary.free_energy_s(self.config.n_rollouts),
+            free_energy_s: summary.free_energy_s(self.n_rollouts()),
             n_feasible: totals.n_feasible as usize,
             n_non_finite: summary.n_non_finite,
             is_recovering: mode != Mode::Onward,
@@ -207,7 +224,7 @@ impl Controller {
     /// The plan's first command, if the plan may be driven; else that of the best rollout, if that may.
     fn judge(&mut self, input: &Input<'_>, summary: &WeightSummary) -> Decision {
         let finite = self.plan.nominal.iter().flatten().all(|value| value.is_finite());
-        if summary.n_non_finite == self.config.n_rollouts || !finite {
+        if summary.n_non_finite == self.n_rollouts() || !finite {
             self.is_fresh = true;
             return Decision::Stop(StopReason::NonFiniteResult);
         }

@@ -29,7 +29,7 @@ impl Controller {
     /// The `n` cheapest rollouts of the last cycle over `map`, the cheapest first.
     pub fn best_rollouts(&self, n: usize, map: RiskMapView<'_>) -> Vec<Rollout> {
         let mut order: Vec<(f32, usize, usize)> = Vec::new();
-        for (index, chunk) in self.chunks.iter().enumerate() {
+        for (index, chunk) in self.chunks[..self.n_used].iter().enumerate() {
             order.extend(chunk.costs.0.iter().enumerate().map(|(lane, &cost_s)| (cost_s, index, lane)));
         }
         order.sort_by(|a, b| a.0.total_cmp(&b.0));

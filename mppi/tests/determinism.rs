@@ -102,3 +102,29 @@ fn instruction_sets_agree() {
         }
     }
 }
+
+#[test]
+fn using_fewer_rollouts_is_being_configured_for_fewer() {
+    let map = rough(7);
+    let decisions = |configured: usize, used: usize| {
+        let config = Config { n_rollouts: configured, n_threads: 2, ..Config::default() };
+        let mut controller = Controller::new(config, model(), 1).unwrap();
+        controller.use_rollouts(used);
+        assert_eq!(controller.n_rollouts(), used.clamp(64, configured) / 64 * 64);
+        let mut decide = |cycle| {
+            controller.decide(&Input {
+                state: State::default(),
+                elapsed_s: 0.1,
+                map: map.view(),
+                objective: goal([10.0, 3.0]),
+                cycle,
+            })
+        };
+        [0, 1, 2].map(&mut decide)
+    };
+    let few = decisions(256, 256);
+    assert_eq!(decisions(1024, 300), few, "whole blocks only");
+    assert_ne!(decisions(1024, 1024), few);
+    assert_eq!(decisions(1024, 1), decisions(64, 64));
+    assert_eq!(decisions(256, 5000), few);
+}

@@ -1,6 +1,6 @@
 //! One cycle of the pipeline.
 
-use bicycle::{Decision, Model, Odometry, Vehicle};
+use bicycle::{Decision, Model, Odometry, SensorModel, Vehicle};
 use mppi::Controller;
 use terrain::{GridGeometry, GridMap, Scan, SurfaceCell};
 use traversability::{CvarLevel, Risk, RiskMap, RiskMapView};
@@ -83,7 +83,8 @@ impl Navigator {
     pub fn new(setup: Setup<'_>) -> Result<Self, NavigatorError> {
         let Setup { vehicle, model, config, belief, surface, level, seed, goal_m, tolerance_m } = setup;
         Ok(Self {
-            surveyor: Surveyor::new(vehicle, config.elevation, config.guard, surface)?,
+            surveyor: Surveyor::new(vehicle, config.elevation, config.guard, surface)?
+                .with_sensors(SensorModel::of(&model.effects)),
             assessor: Assessor::new(vehicle, &model.limits, &config, &belief, level)?,
             pilot: Pilot::new(model, &config, seed)?,
             map: None,

@@ -1,6 +1,6 @@
 //! The third part of the pipeline: the state of the vehicle and a risk map become a decision.
 
-use bicycle::{Decision, HoldReason, Model, Odometry, StopReason};
+use bicycle::{Decision, HoldReason, Model, Odometry, SensorModel, StopReason};
 use mppi::{Controller, CostToGoView, Input, Objective, Terminal};
 use traversability::RiskMapView;
 
@@ -29,6 +29,7 @@ pub struct Destination {
 /// Watches what comes in and asks the controller.
 pub struct Pilot {
     guard: Guard,
+    sensors: SensorModel,
     controller: Controller,
     odometry: Option<Odometry>,
     fault: Option<StopReason>,
@@ -46,6 +47,7 @@ impl Pilot {
         model.limits = config.allowed(&model.limits);
         Ok(Self {
             guard: Guard::new(config.guard),
+            sensors: SensorModel::of(&model.effects),
             controller: Controller::new(config.controller.clone(), model, seed)?,
             odometry: None,
             fault: None,
@@ -56,12 +58,14 @@ impl Pilot {
         })
     }
 
-    /// Takes in where the vehicle is. What cannot be used is remembered as the reason for the next decision.
-    pub fn admit(&mut self, odometry: &Odometry) {
-        match self.guard.admit_odometry(odometry) {
+    /// Takes in where the vehicle says it is, and corrects it by what the model believes of the sensors. What cannot be
+    /// used is remembered as the reason for the next decision.
+    pub fn admit(&mut self, measured: &Odometry) {
+        let odometry = self.sensors.corrected(measured);
+        match self.guard.admit_odometry(&odometry) {
             Ok(_) => {
                 self.fault = None;
-                self.odometry = Some(*odometry);
+                self.odometry = Some(odometry);
             }
             Err(reason) => self.fault = Some(reason),
         }
@@ -92,12 +96,17 @@ impl Pilot {
         self.stuck.take()
     }
 
+    /// From now on samples at most `n` futures a decision; see [`Controller::use_rollouts`].
+    pub fn use_rollouts(&mut self, n: usize) {
+        self.controller.use_rollouts(n);
+    }
+
     /// The controller, for its diagnostics and rollouts.
     pub fn controller(&self) -> &Controller {
         &self.controller
     }
 
-    /// The odometry that the next decision would act on.
+    /// The odometry, corrected, that the next decision would act on.
     pub fn odometry(&self) -> Option<&Odometry> {
         self.odometry.as_ref()
     }

@@ -1,6 +1,6 @@
 //! The first part of the pipeline: measurements become a map of the ground.
 
-use bicycle::{Odometry, StopReason, Vehicle};
+use bicycle::{Odometry, SensorModel, StopReason, Vehicle};
 use terrain::{
     AssumedGround, CellRegion, ElevationConfig, ElevationMap, Footprint, GridMap, Pose, Scan, SurfaceCell,
 };
@@ -14,6 +14,7 @@ const ASSUMED_HEIGHT_STD_M: f64 = 0.05;
 /// Keeps the map of the ground up to date and in the frame of the localisation.
 pub struct Surveyor {
     guard: Guard,
+    sensors: SensorModel,
     elevation: ElevationMap,
     given: Option<GridMap<SurfaceCell>>,
     assumed: AssumedGround,
@@ -32,6 +33,7 @@ impl Surveyor {
     ) -> Result<Self, NavigatorError> {
         Ok(Self {
             guard: Guard::new(guard),
+            sensors: SensorModel::NEUTRAL,
             elevation: ElevationMap::new(elevation)?,
             given: match surface {
                 Surface::Sensed => None,
@@ -44,10 +46,15 @@ impl Surveyor {
         })
     }
 
+    /// The same for odometry that these sensors misstate: all that comes in is corrected first.
+    pub fn with_sensors(self, sensors: SensorModel) -> Self {
+        Self { sensors, ..self }
+    }
+
     /// Takes in where the vehicle is; returns the jump of the localisation that it made out, which
     /// [`Surveyor::follow_jump`] then follows. Odometry that cannot be used has its reason.
     pub fn admit(&mut self, odometry: &Odometry) -> Result<Option<Jump>, StopReason> {
-        self.guard.admit_odometry(odometry)
+        self.guard.admit_odometry(&self.sensors.corrected(odometry))
     }
 
     /// Notes what the vehicle was told, so that standing still on purpose is not taken for frozen odometry.
@@ -59,7 +66,7 @@ impl Surveyor {
     pub fn fuse(&mut self, odometry: &Odometry, scan: &Scan) -> Result<bool, NavigatorError> {
         if self.given.is_none() {
             // A scan whose origin is no place holds nothing to fuse.
-            let Ok(report) = self.elevation.fuse(scan, &pose(odometry)) else { return Ok(false) };
+            let Ok(report) = self.elevation.fuse(scan, &self.pose(odometry)) else { return Ok(false) };
             if report.n_points == report.n_rejected_non_finite {
                 return Ok(false);
             }
@@ -72,7 +79,7 @@ impl Surveyor {
     pub fn follow_jump(&mut self, odometry: &Odometry, jump: &Jump) -> Result<(), NavigatorError> {
         self.n_jumps += 1;
         self.shift_m = [0, 1, 2].map(|axis| self.shift_m[axis] + jump.step_m[axis]);
-        let after = pose(odometry);
+        let after = self.pose(odometry);
         let [x_m, y_m, z_m] = jump.step_m;
         let before = Pose { x_m: after.x_m - x_m, y_m: after.y_m - y_m, z_m: after.z_m - z_m, ..after };
         Ok(self.elevation.reanchor(&before, &after)?)
@@ -107,9 +114,16 @@ impl Surveyor {
     /// Once, as soon as the place is known: the ground carries the vehicle.
     pub(crate) fn assume_ground(&mut self, odometry: &Odometry) -> Result<(), NavigatorError> {
         if !std::mem::replace(&mut self.has_ground, true) {
-            self.elevation.assume_ground(&pose(odometry), &self.assumed)?;
+            self.elevation.assume_ground(&self.pose(odometry), &self.assumed)?;
         }
         Ok(())
+    }
+
+    /// Where the vehicle is, once its sensors are corrected.
+    fn pose(&self, odometry: &Odometry) -> Pose {
+        let Odometry { position_m, attitude_rad, .. } = self.sensors.corrected(odometry);
+        let ([x_m, y_m, z_m], [roll_rad, pitch_rad, yaw_rad]) = (position_m, attitude_rad);
+        Pose { x_m, y_m, z_m, roll_rad, pitch_rad, yaw_rad }
     }
 }
 
@@ -126,10 +140,4 @@ fn assumed_ground(vehicle: &Vehicle) -> AssumedGround {
         axle_height_m: geometry.wheel_radius_m,
         height_std_m: ASSUMED_HEIGHT_STD_M,
     }
-}
-
-fn pose(odometry: &Odometry) -> Pose {
-    let [x_m, y_m, z_m] = odometry.position_m;
-    let [roll_rad, pitch_rad, yaw_rad] = odometry.attitude_rad;
-    Pose { x_m, y_m, z_m, roll_rad, pitch_rad, yaw_rad }
 }

@@ -1,9 +1,10 @@
 //! The controller as a process: a decision at every deadline, on what there is, and never a wait for the map.
 
-use bicycle::Model;
+use bicycle::{Decision, Model};
 use navigator::{Chart, Config, Destination, Pilot};
 
 use crate::RuntimeError;
+use crate::budget::Budget;
 use crate::channel::{
     Bus, COMMAND, DECISION, Inlet, MISSION, Message, ODOMETRY, Outlet, RISK, RISK_PHYSICS, STUCK,
 };
@@ -16,6 +17,9 @@ use crate::status::{Health, Meter, Role};
 
 /// Age of a scan from which on physics' younger map is preferred to a learned one [s].
 const LEARNED_AGE_MAX_S: f64 = 0.6;
+
+/// Share of the period that a decision may take; the rest is for what else the processor does.
+const BUDGET_SHARE: f64 = 0.5;
 
 /// What controls.
 pub struct ControlSetup {
@@ -46,6 +50,7 @@ pub fn run(bus: &Bus, setup: ControlSetup, is_over: &dyn Fn() -> bool) -> Result
 
 struct Control {
     pilot: Pilot,
+    budget: Budget,
     inputs: Inputs,
     commands: Outlet<Stamp, CommandRecord>,
     decisions: Outlet<Stamp, DecisionRecord>,
@@ -130,8 +135,10 @@ impl Inputs {
 
 impl Control {
     fn new(bus: &Bus, setup: ControlSetup) -> Result<Self, RuntimeError> {
-        let ControlSetup { model, config, seed, period_s: _ } = setup;
+        let ControlSetup { model, config, seed, period_s } = setup;
+        let n_max = config.controller.n_rollouts;
         Ok(Self {
+            budget: Budget::new(n_max, clock::nanoseconds(BUDGET_SHARE * period_s)),
             pilot: Pilot::new(model, &config, seed)?,
             inputs: Inputs::new(bus)?,
             commands: bus.outlet(&COMMAND, 1)?,
@@ -148,21 +155,26 @@ impl Control {
             let (map, time_to_goal) = risk_views(header, payload)?;
             Some(Chart { map, time_to_goal })
         });
-        if let Some((header, _)) = &map {
-            self.pilot.note_scan(header.stamp.valid_at_ns);
-        }
         let cycle = self.pilot.cycle();
         // Nobody has said where to: the same as knowing nothing of the ground.
         let destination = self.inputs.destination;
         let nowhere = Destination { goal_m: [0.0; 2], tolerance_m: 0.0 };
         let chart = chart.filter(|_| destination.is_some());
-        let has_chart = chart.is_some();
+        let used = map.as_ref().map(|(header, _)| header).filter(|_| chart.is_some());
+        if let Some(header) = used {
+            self.pilot.note_scan(header.stamp.valid_at_ns);
+        }
         let destination = destination.unwrap_or(nowhere);
+        let n_rollouts = self.budget.n_rollouts();
+        self.pilot.use_rollouts(n_rollouts);
+        let thinking_ns = clock::now_ns();
         let decision = self.pilot.decide(began_ns, chart, &destination);
+        if matches!(decision, Decision::Drive(_)) {
+            self.budget.learn(n_rollouts, clock::now_ns() - thinking_ns);
+        }
         let command = CommandRecord::from(&decision);
         self.commands.send_one(Stamp::default(), command, began_ns)?;
         let state = self.pilot.odometry().map(|odometry| odometry.state()).unwrap_or_default();
-        let used = map.as_ref().map(|(header, _)| header).filter(|_| has_chart);
         let record = DecisionRecord {
             command,
             cycle,
@@ -173,7 +185,7 @@ impl Control {
             author: used.map_or(0, |header| header.author),
             goal_m: destination.goal_m,
             tolerance_m: destination.tolerance_m,
-            n_rollouts: self.pilot.controller().config().n_rollouts as u64,
+            n_rollouts: self.pilot.controller().n_rollouts() as u64,
             elapsed_s: self.pilot.elapsed_s(),
             state: [state.x_m, state.y_m, state.yaw_rad, state.speed_mps, state.steering_rad],
             duration_ns: clock::now_ns() - began_ns,
@@ -199,7 +211,7 @@ impl Control {
             Health {
                 age_s: [odometry_s, learned_s, physics_s],
                 n_missed,
-                figure: pilot.controller().config().n_rollouts as f64,
+                figure: pilot.controller().n_rollouts() as f64,
                 ..Health::default()
             }
             .with(inputs.odometry.counts())

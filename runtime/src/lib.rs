@@ -4,6 +4,7 @@
 //! Every process does one of `navigator`'s parts, the same object that a closed loop in one process drives with, and
 //! tells the others what it found over [`channel`]s. Whoever runs the vehicle is one more process.
 
+pub mod budget;
 pub mod channel;
 pub mod clock;
 pub mod control;
@@ -14,8 +15,12 @@ pub mod mapping;
 pub mod message;
 pub mod payload;
 pub mod plant;
+pub mod recorder;
+pub mod replay;
 pub mod risk_maker;
+pub mod setup;
 pub mod status;
+pub mod supervisor;
 pub mod watchdog;
 
 pub use error::RuntimeError;

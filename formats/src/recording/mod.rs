@@ -3,6 +3,7 @@
 mod drive_row;
 mod grids;
 mod json;
+mod raw;
 mod read;
 mod scene;
 mod watched_file;
@@ -25,6 +26,7 @@ use traversability::RiskMapView;
 
 use drive_row::DriveLogRow;
 use json::JsonChannels;
+use raw::RawChannels;
 use watched_file::{Fault, WatchedFile};
 
 pub use read::{McapDriveLog, McapReadError, read_drive_log_mcap};
@@ -77,6 +79,7 @@ pub struct DriveRecorder {
     flushed_at_ns: Option<u64>,
     channels: Channels,
     json: JsonChannels,
+    raw: RawChannels,
 }
 
 /// Topics under Foxglove's schemas.
@@ -138,8 +141,8 @@ impl DriveRecorder {
         writer.write_metadata("surefoot", about).map_err(problem)?;
         writer.flush().map_err(problem)?;
         let channels = Channels::new(&context);
-        let json = JsonChannels::new(context);
-        Ok(Self { path: path.to_owned(), writer, fault, flushed_at_ns: None, channels, json })
+        let (json, raw) = (JsonChannels::new(Arc::clone(&context)), RawChannels::new(context));
+        Ok(Self { path: path.to_owned(), writer, fault, flushed_at_ns: None, channels, json, raw })
     }
 
     /// Where the vehicle is. Errors, here and below: [`RecordError::Write`].
@@ -205,6 +208,30 @@ impl DriveRecorder {
     pub fn drive_row(&mut self, at_ns: u64, run: &str, row: &DriveRow) -> Result<(), RecordError> {
         self.channels.drive_log.log_with_time(&DriveLogRow::new(run, row), at_ns);
         self.wrote(at_ns)
+    }
+
+    /// A message as it lies in memory; `layout` is what C says of it, asked for once per topic.
+    pub fn raw(
+        &mut self,
+        topic: &'static str,
+        layout: impl FnOnce() -> String,
+        at_ns: u64,
+        bytes: &[u8],
+    ) -> Result<(), RecordError> {
+        let logged = self.raw.log(topic, layout, at_ns, bytes);
+        logged.map_err(|problem| self.failed(problem))?;
+        self.wrote(at_ns)
+    }
+
+    /// What is needed to repeat the recorded work. Errors: also [`RecordError::NoJson`].
+    pub fn setup(&mut self, at_ns: u64, setup: &impl Serialize) -> Result<(), RecordError> {
+        self.json("/setup", at_ns, setup)
+    }
+
+    /// Hands over to the system what was recorded so far; a crash after this costs none of it.
+    pub fn flush(&mut self) -> Result<(), RecordError> {
+        self.writer.flush().map_err(|error| self.failed(error.to_string()))?;
+        self.fault.text().map_or(Ok(()), |problem| Err(self.failed(problem)))
     }
 
     /// Writes the index and closes the file. Errors: [`RecordError::Write`].

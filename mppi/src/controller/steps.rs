@@ -85,9 +85,11 @@ impl Controller {
             start,
             key,
         };
-        let machine = self.machine;
+        let (machine, n_used) = (self.machine, self.n_used);
         self.workers.run(&mut self.chunks, |index, chunk| {
-            machine.run(Sample { sampler: &sampler, index, chunk });
+            if index < n_used {
+                machine.run(Sample { sampler: &sampler, index, chunk });
+            }
         });
     }
 
@@ -157,8 +159,12 @@ impl Controller {
             prices: self.prices(),
             task,
         };
-        let machine = self.machine;
-        self.workers.run(&mut self.chunks, |_, chunk| machine.run(RollOut { scene: &scene, chunk }));
+        let (machine, n_used) = (self.machine, self.n_used);
+        self.workers.run(&mut self.chunks, |index, chunk| {
+            if index < n_used {
+                machine.run(RollOut { scene: &scene, chunk });
+            }
+        });
     }
 
     fn prices(&self) -> Prices {
@@ -175,7 +181,7 @@ impl Controller {
 
     pub(super) fn weigh(&mut self) -> WeightSummary {
         let work = Weigh {
-            chunks: &mut self.chunks,
+            chunks: &mut self.chunks[..self.n_used],
             temperature: self.config.temperature,
             last_s: self.temperature_s,
         };
@@ -186,10 +192,14 @@ impl Controller {
 
     /// The weighted mean of all rollouts becomes the plan. Chunks are added in their order, whoever computed them.
     pub(super) fn average(&mut self, summary: &WeightSummary) {
-        let machine = self.machine;
-        self.workers.run(&mut self.chunks, |_, chunk| machine.run(Accumulate { chunk }));
+        let (machine, n_used) = (self.machine, self.n_used);
+        self.workers.run(&mut self.chunks, |index, chunk| {
+            if index < n_used {
+                machine.run(Accumulate { chunk });
+            }
+        });
         self.plan.nominal.fill([0.0; 2]);
-        for chunk in self.chunks.iter().filter(|chunk| !chunk.is_negligible) {
+        for chunk in self.chunks[..n_used].iter().filter(|chunk| !chunk.is_negligible) {
             for (nominal, sum) in self.plan.nominal.iter_mut().zip(&chunk.sums) {
                 *nominal = [nominal[0] + sum[0], nominal[1] + sum[1]];
             }

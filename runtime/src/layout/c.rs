@@ -5,7 +5,7 @@ use super::{Field, RecordLayout, Scalar};
 /// A header that defines every record and asserts its size and offsets; `version` is LAYOUT_VERSION.
 pub fn c_header(layouts: &[RecordLayout], version: u32) -> String {
     let mut text = format!(
-        "/* Messages of Surefoot, layout version {version}. Made by `surefoot layout c`; do not edit. */\n\
+        "/* Messages of Surefoot, layout version {version}. Written from its types; do not edit. */\n\
          #ifndef SUREFOOT_LAYOUT_H\n#define SUREFOOT_LAYOUT_H\n\n#include <assert.h>\n#include <stddef.h>\n\
          #include <stdint.h>\n\n#define SUREFOOT_LAYOUT_VERSION {version}u\n"
     );

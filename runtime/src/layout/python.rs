@@ -5,7 +5,7 @@ use super::{Field, RecordLayout, Scalar};
 /// A module that defines every record and asserts its size and offsets; `version` is LAYOUT_VERSION.
 pub fn python_module(layouts: &[RecordLayout], version: u32) -> String {
     let mut text = format!(
-        "\"\"\"Messages of Surefoot, layout version {version}. Made by `surefoot layout python`; do not edit.\"\"\"\n\n\
+        "\"\"\"Messages of Surefoot, layout version {version}. Written from its types; do not edit.\"\"\"\n\n\
          import ctypes\n\nLAYOUT_VERSION = {version}\n"
     );
     for layout in layouts {

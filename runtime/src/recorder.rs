@@ -1,0 +1,190 @@
+//! Everything that went over the channels into a file, so that each decision can be made again.
+
+mod file;
+mod views;
+
+use std::path::PathBuf;
+
+use bytemuck::NoUninit;
+
+use crate::RuntimeError;
+use crate::channel::{
+    Bus, COMMAND, DECISION, Header, Inlet, MISSION, ODOMETRY, RISK, RISK_PHYSICS, SCAN, STUCK, SURFACE,
+};
+use crate::clock::{self, SECOND_NS};
+use crate::message::{
+    CommandRecord, DecisionRecord, MissionRecord, OdometryRecord, PointRecord, RiskHeader, ScanHeader, Stamp,
+    StuckRecord, SurfaceHeader,
+};
+use crate::setup::RecordedSetup;
+use crate::status::{Health, Meter, Role};
+use file::RotatingFile;
+use views::Views;
+
+/// Time between two looks at the channels [ns].
+const POLL_NS: u64 = SECOND_NS / 200;
+
+/// Topics of the messages as they went over the channels, by channel.
+pub mod topic {
+    /// [`crate::channel::ODOMETRY`].
+    pub const ODOMETRY: &str = "/channel/odometry";
+    /// [`crate::channel::SCAN`].
+    pub const SCAN: &str = "/channel/scan";
+    /// Headers of [`crate::channel::SURFACE`].
+    pub const SURFACE: &str = "/channel/surface";
+    /// Headers of [`crate::channel::RISK`].
+    pub const RISK: &str = "/channel/risk";
+    /// Headers of [`crate::channel::RISK_PHYSICS`].
+    pub const RISK_PHYSICS: &str = "/channel/risk_physics";
+    /// [`crate::channel::COMMAND`].
+    pub const COMMAND: &str = "/channel/command";
+    /// [`crate::channel::DECISION`].
+    pub const DECISION: &str = "/channel/decision";
+    /// [`crate::channel::STUCK`].
+    pub const STUCK: &str = "/channel/stuck";
+    /// [`crate::channel::MISSION`].
+    pub const MISSION: &str = "/channel/mission";
+    /// What is needed to repeat the run, as JSON.
+    pub const SETUP: &str = "/setup";
+}
+
+/// What records.
+pub struct RecorderSetup {
+    /// Folder of the files.
+    pub folder: PathBuf,
+    /// What is needed to repeat the run.
+    pub setup: RecordedSetup,
+    /// Size from which on the next file is begun [bytes].
+    pub file_bytes_max: u64,
+    /// Time after which the next file is begun [s].
+    pub file_time_max_s: f64,
+}
+
+/// Records until `is_over` says to end. When the disk is full it says so, once, and goes on without a recording: the
+/// vehicle drives on.
+pub fn run(
+    bus: &Bus,
+    setup: RecorderSetup,
+    is_over: &dyn Fn() -> bool,
+    warn: &mut dyn FnMut(&str),
+) -> Result<(), RuntimeError> {
+    let mut recorder = Recorder::new(bus, setup)?;
+    while !is_over() {
+        if let Err(error) = recorder.look() {
+            warn(&format!("{error}; driving on without a recording"));
+            recorder.file = None;
+        }
+        recorder.report()?;
+        clock::sleep_until(clock::now_ns() + POLL_NS);
+    }
+    recorder.file.map_or(Ok(()), |file| Ok(file.finish()?))
+}
+
+struct Recorder {
+    inlets: Inlets,
+    file: Option<RotatingFile>,
+    views: Views,
+    meter: Meter,
+}
+
+struct Inlets {
+    odometry: Inlet<Stamp, OdometryRecord>,
+    scans: Inlet<ScanHeader, PointRecord>,
+    surfaces: Inlet<SurfaceHeader, [f32; 8]>,
+    risks: [Inlet<RiskHeader, [f32; 4]>; 2],
+    stuck: Inlet<Stamp, StuckRecord>,
+    missions: Inlet<Stamp, MissionRecord>,
+    commands: Inlet<Stamp, CommandRecord>,
+    decisions: Inlet<Stamp, DecisionRecord>,
+}
+
+impl Recorder {
+    fn new(bus: &Bus, setup: RecorderSetup) -> Result<Self, RuntimeError> {
+        let inlets = Inlets {
+            odometry: bus.inlet(&ODOMETRY)?,
+            scans: bus.inlet(&SCAN)?,
+            surfaces: bus.inlet(&SURFACE)?,
+            risks: [bus.inlet(&RISK)?, bus.inlet(&RISK_PHYSICS)?],
+            stuck: bus.inlet(&STUCK)?,
+            missions: bus.inlet(&MISSION)?,
+            commands: bus.inlet(&COMMAND)?,
+            decisions: bus.inlet(&DECISION)?,
+        };
+        let meter = Meter::new(bus, Role::Recorder)?;
+        let file = Some(RotatingFile::create(setup, clock::now_ns())?);
+        Ok(Self { inlets, file, views: Views::default(), meter })
+    }
+
+    /// Takes everything from the channels, what others are made of first, and writes it.
+    fn look(&mut self) -> Result<(), RuntimeError> {
+        let Self { inlets, file: Some(file), views, meter } = self else { return Ok(()) };
+        let mut result = Ok(());
+        let mut keep = |result: &mut Result<(), RuntimeError>, written: Result<(), formats::RecordError>| {
+            meter.count(0);
+            if let (Ok(()), Err(error)) = (&result, written) {
+                *result = Err(error.into());
+            }
+        };
+        inlets.odometry.poll(|header, records| {
+            keep(&mut result, write(file, topic::ODOMETRY, header, records, OdometryRecord::layout));
+            keep(&mut result, views.odometry(file.recorder(), header, records));
+        });
+        inlets.scans.poll(|header, points| {
+            keep(&mut result, write(file, topic::SCAN, header, points, PointRecord::layout));
+            keep(&mut result, views.scan(file.recorder(), header, points));
+        });
+        inlets.surfaces.poll(|header, cells| {
+            keep(&mut result, write::<_, u8>(file, topic::SURFACE, header, &[], SurfaceHeader::layout));
+            keep(&mut result, views.surface(file.recorder(), header, cells));
+        });
+        for (inlet, name) in inlets.risks.iter_mut().zip([topic::RISK, topic::RISK_PHYSICS]) {
+            inlet.poll(|header, payload| {
+                keep(&mut result, write::<_, u8>(file, name, header, &[], RiskHeader::layout));
+                keep(&mut result, views.risk(file.recorder(), header, payload));
+            });
+        }
+        inlets.stuck.poll(|header, records| {
+            keep(&mut result, write(file, topic::STUCK, header, records, StuckRecord::layout));
+        });
+        inlets.missions.poll(|header, records| {
+            keep(&mut result, write(file, topic::MISSION, header, records, MissionRecord::layout));
+        });
+        inlets.commands.poll(|header, records| {
+            keep(&mut result, write(file, topic::COMMAND, header, records, CommandRecord::layout));
+            keep(&mut result, views.command(file.recorder(), header, records));
+        });
+        inlets.decisions.poll(|header, records| {
+            keep(&mut result, write(file, topic::DECISION, header, records, DecisionRecord::layout));
+        });
+        result?;
+        Ok(file.tend(clock::now_ns())?)
+    }
+
+    fn report(&mut self) -> Result<(), RuntimeError> {
+        let bytes = self.file.as_ref().map_or(-1.0, |file| file.bytes() as f64);
+        let Inlets { odometry, scans, surfaces, risks: [learned, physics], decisions, .. } = &self.inlets;
+        Ok(self.meter.report(clock::now_ns(), || {
+            Health { figure: bytes, ..Health::default() }
+                .with(odometry.counts())
+                .with(scans.counts())
+                .with(surfaces.counts())
+                .with(learned.counts())
+                .with(physics.counts())
+                .with(decisions.counts())
+        })?)
+    }
+}
+
+/// Header and payload as they lie in memory, one after the other.
+fn write<H: Header, T: NoUninit>(
+    file: &mut RotatingFile,
+    topic: &'static str,
+    header: &H,
+    payload: &[T],
+    layout: fn() -> crate::layout::RecordLayout,
+) -> Result<(), formats::RecordError> {
+    let mut bytes = bytemuck::bytes_of(header).to_vec();
+    bytes.extend_from_slice(bytemuck::cast_slice(payload));
+    let told = || crate::layout::c_header(&[layout()], crate::message::LAYOUT_VERSION);
+    file.recorder().raw(topic, told, header.stamp().published_at_ns, &bytes)
+}

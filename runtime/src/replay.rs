@@ -1,0 +1,216 @@
+//! Every decision of a recording, made again from what control said it used.
+
+mod maps;
+mod records;
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use evidential::Checkpoint;
+use navigator::{Belief, Chart, Destination, NavigatorError, Pilot};
+use traversability::CvarLevel;
+
+use crate::message::{CommandRecord, DecisionRecord, Source};
+use crate::payload::risk_views;
+use crate::setup::{MachineSetup, SetupError};
+use maps::{Maps, Unmade};
+pub use records::{Key, ReadError, Records};
+
+/// What a replay came to.
+#[derive(Clone, Debug, Default, PartialEq, serde::Serialize)]
+pub struct ReplayReport {
+    /// Decisions in the recording.
+    pub n_decisions: u64,
+    /// Of these, made again to the same bits.
+    pub n_identical: u64,
+    /// Of these, not made again because something that they need was not recorded.
+    pub n_unmade: u64,
+    /// Maps of the ground made again, with the recorded hash.
+    pub n_surfaces: u64,
+    /// Risk maps made again, with the recorded hash.
+    pub n_risk_maps: u64,
+    /// The first difference, if there is any.
+    pub first_difference: Option<String>,
+    /// What the recording lacks, each once.
+    pub missing: Vec<String>,
+    /// Where the recording breaks off, if it does.
+    pub ended_early: Option<String>,
+}
+
+/// Why a recording cannot be replayed at all.
+#[derive(Debug, thiserror::Error)]
+pub enum ReplayError {
+    /// It cannot be read.
+    #[error(transparent)]
+    Read(#[from] ReadError),
+    /// It does not say what was run.
+    #[error("{file}: expected a recording of `surefoot up` with its setup, found none")]
+    NoSetup {
+        /// Path of the first file.
+        file: String,
+    },
+    /// Its settings are none.
+    #[error(transparent)]
+    Setup(#[from] SetupError),
+    /// Its level or seed is none.
+    #[error("recorded {what}: expected {expected}, found {found}")]
+    Field {
+        /// Name of the field.
+        what: &'static str,
+        /// What would do.
+        expected: &'static str,
+        /// What stands there.
+        found: String,
+    },
+    /// The pipeline refused the recorded settings or maps.
+    #[error(transparent)]
+    Navigator(#[from] NavigatorError),
+}
+
+/// What a recorded method believes, with the networks that the recording names by their hash.
+pub struct Knowledge {
+    /// What learning believed.
+    pub belief: Belief,
+    /// First 8 bytes of the SHA-256 of the networks' weights; 0 = none.
+    pub checkpoint: u64,
+}
+
+impl Knowledge {
+    /// Of networks.
+    pub fn learned(checkpoint: Arc<Checkpoint>, unfamiliar: evidential::Unfamiliar, hash: u64) -> Self {
+        Self { belief: Belief::Learned { checkpoint, unfamiliar }, checkpoint: hash }
+    }
+}
+
+/// Reads recordings that follow one another.
+pub fn read(files: &[PathBuf]) -> Result<Records, ReplayError> {
+    let records = Records::read(files)?;
+    if records.setup.is_none() {
+        let file = files.first().map_or(String::new(), |file| file.display().to_string());
+        return Err(ReplayError::NoSetup { file });
+    }
+    Ok(records)
+}
+
+/// Makes every decision again.
+///
+/// # Errors
+/// What was recorded is not enough to begin. What is missing later on is part of the report.
+pub fn replay(records: &Records, knowledge: &Knowledge) -> Result<ReplayReport, ReplayError> {
+    let Some(setup) = &records.setup else { return Err(ReplayError::NoSetup { file: String::new() }) };
+    let machine = MachineSetup::read(setup)?;
+    let level = CvarLevel::new(setup.alpha).map_err(|_| ReplayError::Field {
+        what: "alpha",
+        expected: "a level in (0, 1]",
+        found: setup.alpha.to_string(),
+    })?;
+    let seed = setup.seed.parse().map_err(|_| ReplayError::Field {
+        what: "seed",
+        expected: "a whole number",
+        found: setup.seed.clone(),
+    })?;
+    let mut maps = Maps::new(records, &machine, knowledge, level)?;
+    let mut report = ReplayReport { ended_early: records.ended_early.clone(), ..ReplayReport::default() };
+    report.n_decisions = records.decisions.len() as u64;
+    let mut life: Option<Life> = None;
+    for (key, record) in &records.decisions {
+        let goes_on = life.as_ref().is_some_and(|life| life.epoch_ns == key.epoch_ns);
+        if !goes_on {
+            life = Some(Life {
+                epoch_ns: key.epoch_ns,
+                pilot: Pilot::new(machine.model.clone(), &machine.config, seed)?,
+                is_lost: false,
+            });
+        }
+        let Some(life) = &mut life else { continue };
+        life.decide(record, records, &mut maps, &mut report)?;
+    }
+    (report.n_surfaces, report.n_risk_maps) = maps.n_made();
+    report.missing.extend(maps.into_missing());
+    Ok(report)
+}
+
+/// One life of the control process.
+struct Life {
+    epoch_ns: u64,
+    pilot: Pilot,
+    /// Something that a decision was made from is missing: what its memory holds from then on is not known.
+    is_lost: bool,
+}
+
+impl Life {
+    fn decide(
+        &mut self,
+        record: &DecisionRecord,
+        records: &Records,
+        maps: &mut Maps<'_>,
+        report: &mut ReplayReport,
+    ) -> Result<(), ReplayError> {
+        if let Some(missing) = self.take_odometry(record, records) {
+            self.lose(missing, report);
+        }
+        let map = if record.risk == Source::default() { None } else { Some(maps.risk(record)?) };
+        let made = match &map {
+            None => None,
+            Some(Err(Unmade { what })) => {
+                self.lose(what.clone(), report);
+                None
+            }
+            Some(Ok(made)) => match made.as_ref() {
+                Ok(made) => Some(made),
+                Err(Unmade { what }) => {
+                    self.lose(what.clone(), report);
+                    None
+                }
+            },
+        };
+        if self.is_lost {
+            report.n_unmade += 1;
+            return Ok(());
+        }
+        let chart = made.and_then(|made| {
+            self.pilot.note_scan(made.header.stamp.valid_at_ns);
+            let (map, time_to_goal) = risk_views(&made.header, &made.payload)?;
+            Some(Chart { map, time_to_goal })
+        });
+        let destination = Destination { goal_m: record.goal_m, tolerance_m: record.tolerance_m };
+        self.pilot.use_rollouts(record.n_rollouts as usize);
+        let decision = self.pilot.decide(record.decided_at_ns, chart, &destination);
+        // Learning was told by a message of its own, which was recorded.
+        self.pilot.take_stuck();
+        let made = CommandRecord::from(&decision);
+        if bytemuck::bytes_of(&made) == bytemuck::bytes_of(&record.command) {
+            report.n_identical += 1;
+        } else {
+            report.first_difference.get_or_insert_with(|| {
+                format!("decision {}: recorded {:?}, made again {made:?}", record.cycle, record.command)
+            });
+        }
+        Ok(())
+    }
+
+    /// Shows the pilot the odometry that control took in for a decision; says what of it is missing.
+    fn take_odometry(&mut self, record: &DecisionRecord, records: &Records) -> Option<String> {
+        if record.cycle != self.pilot.cycle() {
+            return Some(format!("decisions {} to {}", self.pilot.cycle(), record.cycle));
+        }
+        let Source { epoch_ns, sequence } = record.odometry;
+        let first = (sequence + 1).checked_sub(record.n_odometry);
+        let Some(first) = first.filter(|&first| first > 0 || record.n_odometry == 0) else {
+            return Some(format!("odometry of before {sequence}, of another life of its publisher"));
+        };
+        for sequence in first..first + record.n_odometry {
+            let Some((stamp, odometry)) = records.odometry.get(&Key { epoch_ns, sequence }) else {
+                return Some(format!("odometry {sequence}"));
+            };
+            self.pilot.admit(&odometry.odometry(stamp.valid_at_ns));
+        }
+        None
+    }
+
+    fn lose(&mut self, missing: String, report: &mut ReplayReport) {
+        if !std::mem::replace(&mut self.is_lost, true) {
+            report.missing.push(missing);
+        }
+    }
+}

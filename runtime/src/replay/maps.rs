@@ -1,0 +1,230 @@
+//! Maps made again from scans, in the order in which they were made, and held against their hashes.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use navigator::{Assessor, Belief, Jump, NavigatorError, Surface, Surveyor};
+use traversability::CvarLevel;
+
+use super::records::{Key, Records};
+use super::{Knowledge, ReplayError};
+use crate::mapping::{FUSED, LEARNED, PHYSICS};
+use crate::message::{DecisionRecord, RiskHeader, SurfaceHeader};
+use crate::payload::{cell_numbers, content_hash};
+use crate::risk_maker::RiskMaker;
+use crate::setup::MachineSetup;
+
+/// Risk maps of an author that are kept: control uses the newest, or the one before.
+const KEPT: usize = 4;
+
+/// A risk map that could not be made again.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Unmade {
+    /// What is missing or differs.
+    pub what: String,
+}
+
+/// A risk map that was made again.
+pub(super) struct Made {
+    pub header: RiskHeader,
+    pub payload: Vec<[f32; 4]>,
+}
+
+/// Makes maps on demand.
+pub(super) struct Maps<'a> {
+    records: &'a Records,
+    machine: &'a MachineSetup,
+    surveyor: Option<(u64, Surveyor)>,
+    surface_at: Option<Key>,
+    authors: [Author<'a>; 2],
+    missing: Vec<String>,
+    n_surfaces: u64,
+}
+
+/// One author of risk maps.
+struct Author<'a> {
+    headers: &'a BTreeMap<Key, RiskHeader>,
+    knowledge: Knowledge,
+    number: u64,
+    level: CvarLevel,
+    maker: Option<(u64, RiskMaker)>,
+    stuck_at: Option<Key>,
+    made: BTreeMap<Key, Arc<Result<Made, Unmade>>>,
+    n_made: u64,
+}
+
+impl<'a> Maps<'a> {
+    pub fn new(
+        records: &'a Records,
+        machine: &'a MachineSetup,
+        knowledge: &Knowledge,
+        level: CvarLevel,
+    ) -> Result<Self, ReplayError> {
+        let author = |place: usize, belief: &Belief, checkpoint: u64, number: u64| Author {
+            headers: &records.risks[place],
+            knowledge: Knowledge { belief: belief.clone(), checkpoint },
+            number,
+            level,
+            maker: None,
+            stuck_at: None,
+            made: BTreeMap::new(),
+            n_made: 0,
+        };
+        Ok(Self {
+            records,
+            machine,
+            surveyor: None,
+            surface_at: None,
+            authors: [
+                author(0, &knowledge.belief, knowledge.checkpoint, LEARNED),
+                author(1, &Belief::Physics, 0, PHYSICS),
+            ],
+            missing: Vec::new(),
+            n_surfaces: 0,
+        })
+    }
+
+    /// Maps of the ground and risk maps made again with the recorded hash.
+    pub fn n_made(&self) -> (u64, u64) {
+        (self.n_surfaces, self.authors.iter().map(|author| author.n_made).sum())
+    }
+
+    pub fn into_missing(self) -> Vec<String> {
+        self.missing
+    }
+
+    /// The risk map that a decision was made on.
+    pub fn risk(
+        &mut self,
+        decision: &DecisionRecord,
+    ) -> Result<Result<Arc<Result<Made, Unmade>>, Unmade>, ReplayError> {
+        let place = usize::from(decision.author == PHYSICS);
+        let key = Key::from(decision.risk);
+        loop {
+            if let Some(made) = self.authors[place].made.get(&key) {
+                return Ok(Ok(Arc::clone(made)));
+            }
+            let Some(header) = self.authors[place].headers.get(&key) else {
+                return Ok(Err(Unmade { what: format!("risk map {}", key.sequence) }));
+            };
+            let wanted = Key::from(header.surface);
+            if self.surface_at.is_some_and(|at| at >= wanted) || !self.step()? {
+                return Ok(Err(Unmade { what: format!("map of the ground {}", wanted.sequence) }));
+            }
+        }
+    }
+
+    /// The next map of the ground, and every risk map that was made of it; false at the end.
+    fn step(&mut self) -> Result<bool, ReplayError> {
+        let after = self.surface_at;
+        let records = self.records;
+        let next = records.surfaces.iter().find(|(key, _)| after.is_none_or(|at| **key > at));
+        let Some((&key, header)) = next else { return Ok(false) };
+        if let Some(at) = after.filter(|at| at.epoch_ns == key.epoch_ns && at.sequence + 1 < key.sequence) {
+            self.missing.push(format!("maps of the ground {} to {}", at.sequence + 1, key.sequence - 1));
+        }
+        self.surface_at = Some(key);
+        let made = self.survey(key, header)?;
+        for author in &mut self.authors {
+            author.follow(header, &made, records, self.machine)?;
+        }
+        Ok(true)
+    }
+
+    fn survey(
+        &mut self,
+        key: Key,
+        header: &SurfaceHeader,
+    ) -> Result<Result<Vec<[f32; 8]>, Unmade>, ReplayError> {
+        if self.surveyor.as_ref().is_none_or(|(epoch_ns, _)| *epoch_ns != key.epoch_ns) {
+            let MachineSetup { vehicle, config, .. } = self.machine;
+            let surveyor = Surveyor::new(vehicle, config.elevation, config.guard, Surface::Sensed)?;
+            self.surveyor = Some((key.epoch_ns, surveyor));
+        }
+        let Some((_, surveyor)) = &mut self.surveyor else { return Ok(Err(Unmade { what: String::new() })) };
+        let odometry = header.odometry.odometry(header.odometry_at_ns);
+        if header.event == FUSED {
+            let Some((scan, points)) = self.records.scans.get(&Key::from(header.scan)) else {
+                let what = format!("scan {}", header.scan.sequence);
+                self.missing.push(what.clone());
+                return Ok(Err(Unmade { what }));
+            };
+            surveyor.fuse(&odometry, &scan.scan(points))?;
+        } else {
+            surveyor.follow_jump(&odometry, &Jump { step_m: header.jump_m })?;
+        }
+        let cells: Vec<[f32; 8]> = surveyor.surface().values().iter().map(cell_numbers).collect();
+        if content_hash(&cells) != header.content_hash {
+            return Ok(Err(Unmade { what: format!("map of the ground {} differs", key.sequence) }));
+        }
+        self.n_surfaces += 1;
+        Ok(Ok(cells))
+    }
+}
+
+impl Author<'_> {
+    /// Makes the risk maps that were made of this map of the ground.
+    fn follow(
+        &mut self,
+        surface: &SurfaceHeader,
+        cells: &Result<Vec<[f32; 8]>, Unmade>,
+        records: &Records,
+        machine: &MachineSetup,
+    ) -> Result<(), NavigatorError> {
+        let source = surface.stamp.source();
+        let of_this: Vec<(Key, RiskHeader)> = self
+            .headers
+            .iter()
+            .filter(|(_, header)| header.surface == source)
+            .map(|(key, header)| (*key, *header))
+            .collect();
+        for (key, header) in of_this {
+            let made = match cells {
+                Err(unmade) => Err(unmade.clone()),
+                Ok(cells) => self.make(key, &header, surface, cells, (records, machine))?,
+            };
+            self.n_made += u64::from(made.is_ok());
+            self.made.insert(key, Arc::new(made));
+            while self.made.len() > KEPT {
+                self.made.pop_first();
+            }
+        }
+        Ok(())
+    }
+
+    fn make(
+        &mut self,
+        key: Key,
+        header: &RiskHeader,
+        surface: &SurfaceHeader,
+        cells: &[[f32; 8]],
+        (records, machine): (&Records, &MachineSetup),
+    ) -> Result<Result<Made, Unmade>, NavigatorError> {
+        if self.maker.as_ref().is_none_or(|(epoch_ns, _)| *epoch_ns != key.epoch_ns) {
+            let MachineSetup { vehicle, model, config } = machine;
+            let Knowledge { belief, checkpoint } = &self.knowledge;
+            let assessor = Assessor::new(vehicle, &model.limits, config, belief, self.level)?;
+            self.maker = Some((key.epoch_ns, RiskMaker::new(assessor, self.number, *checkpoint)));
+        }
+        let Some((_, maker)) = &mut self.maker else { return Ok(Err(Unmade { what: String::new() })) };
+        maker.set_goal(header.goal_m);
+        let until = Key::from(header.stuck);
+        for (at, (stamp, stuck)) in records.stuck.range(..=until) {
+            if self.stuck_at.is_none_or(|done| *at > done) && at.sequence > 0 {
+                maker.note_stuck(stamp, stuck);
+                self.stuck_at = Some(*at);
+            }
+        }
+        let differs = || Unmade { what: format!("risk map {} differs", key.sequence) };
+        if maker.update(surface, cells)?.is_err() {
+            return Ok(Err(differs()));
+        }
+        let (Some(n), Some(writer)) = (maker.n_elements(), maker.writer()) else { return Ok(Err(differs())) };
+        let mut payload: Vec<[f32; 4]> = (0..n).map(writer).collect();
+        let made = maker.finish(&mut payload)?;
+        if made.content_hash != header.content_hash {
+            return Ok(Err(differs()));
+        }
+        Ok(Ok(Made { header: *header, payload }))
+    }
+}

@@ -1,0 +1,168 @@
+//! The messages of a recording, each under its name.
+
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::BufReader;
+use std::path::{Path, PathBuf};
+
+use bytemuck::AnyBitPattern;
+use mcap::io::MessageReader;
+use mcap::sans_io::LinearReaderOptions;
+
+use crate::channel::Header;
+use crate::message::{
+    DecisionRecord, OdometryRecord, PointRecord, RiskHeader, ScanHeader, Source, Stamp, StuckRecord,
+    SurfaceHeader,
+};
+use crate::recorder::topic;
+use crate::setup::RecordedSetup;
+
+/// Longest record that is believed: far above what recorders write.
+const RECORD_BYTES_MAX: usize = 1 << 28;
+
+/// A message, by its publisher's life and its number.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Key {
+    /// When its publisher began [ns].
+    pub epoch_ns: u64,
+    /// Its number.
+    pub sequence: u64,
+}
+
+impl From<Source> for Key {
+    fn from(Source { epoch_ns, sequence }: Source) -> Self {
+        Self { epoch_ns, sequence }
+    }
+}
+
+/// The messages that decisions are made from.
+#[derive(Debug, Default)]
+pub struct Records {
+    /// What was run.
+    pub setup: Option<RecordedSetup>,
+    /// Odometry.
+    pub odometry: BTreeMap<Key, (Stamp, OdometryRecord)>,
+    /// Scans.
+    pub scans: BTreeMap<Key, (ScanHeader, Vec<PointRecord>)>,
+    /// Headers of the maps of the ground.
+    pub surfaces: BTreeMap<Key, SurfaceHeader>,
+    /// Headers of the risk maps: learned, physics.
+    pub risks: [BTreeMap<Key, RiskHeader>; 2],
+    /// Stuck poses.
+    pub stuck: BTreeMap<Key, (Stamp, StuckRecord)>,
+    /// Decisions.
+    pub decisions: BTreeMap<Key, DecisionRecord>,
+    /// Why reading ended early, if it did.
+    pub ended_early: Option<String>,
+}
+
+/// A recording that cannot be read.
+#[derive(Debug, thiserror::Error)]
+#[error("{file}: expected a readable file, found: {source}")]
+pub struct ReadError {
+    /// Path as given.
+    pub file: String,
+    /// What the system said.
+    pub source: std::io::Error,
+}
+
+impl Records {
+    /// Reads files that follow one another. One that breaks off gives what stands before that place, and it is said.
+    pub fn read(files: &[PathBuf]) -> Result<Self, ReadError> {
+        let mut records = Self::default();
+        for path in files {
+            records.read_file(path)?;
+        }
+        Ok(records)
+    }
+
+    fn read_file(&mut self, path: &Path) -> Result<(), ReadError> {
+        let file = path.display().to_string();
+        let source = File::open(path).map_err(|source| ReadError { file: file.clone(), source })?;
+        let options = LinearReaderOptions::default()
+            .with_record_length_limit(RECORD_BYTES_MAX)
+            .with_prevalidate_chunk_crcs(true);
+        for message in MessageReader::new_with_options(BufReader::new(source), options) {
+            match message {
+                Ok(message) => {
+                    if self.take(&message.channel.topic, &message.data).is_none() {
+                        let topic = &message.channel.topic;
+                        self.ended_early = Some(format!("{file}: a message on {topic} that is none"));
+                        break;
+                    }
+                }
+                Err(error) => {
+                    self.ended_early = Some(format!("{file}: {error}"));
+                    break;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// `None` for bytes that are no message of the topic.
+    fn take(&mut self, name: &str, bytes: &[u8]) -> Option<()> {
+        match name {
+            topic::SETUP => self.setup = serde_json::from_slice(bytes).ok(),
+            topic::ODOMETRY => put(&mut self.odometry, one(bytes)?),
+            topic::STUCK => put(&mut self.stuck, one(bytes)?),
+            topic::DECISION => {
+                let (stamp, decision): (Stamp, DecisionRecord) = one(bytes)?;
+                self.decisions.insert(stamp.source().into(), decision);
+            }
+            topic::SCAN => {
+                let (header, points): (ScanHeader, Vec<PointRecord>) = split(bytes)?;
+                self.scans.insert(header.stamp.source().into(), (header, points));
+            }
+            topic::SURFACE => {
+                let (header, _): (SurfaceHeader, Vec<u8>) = split(bytes)?;
+                self.surfaces.insert(header.stamp.source().into(), header);
+            }
+            topic::RISK | topic::RISK_PHYSICS => {
+                let (header, _): (RiskHeader, Vec<u8>) = split(bytes)?;
+                let author = usize::from(name == topic::RISK_PHYSICS);
+                self.risks[author].insert(header.stamp.source().into(), header);
+            }
+            _ => {}
+        }
+        Some(())
+    }
+}
+
+fn put<T>(records: &mut BTreeMap<Key, (Stamp, T)>, (stamp, record): (Stamp, T)) {
+    records.insert(stamp.source().into(), (stamp, record));
+}
+
+fn one<T: AnyBitPattern>(bytes: &[u8]) -> Option<(Stamp, T)> {
+    let (stamp, rest) = bytes.split_at_checked(size_of::<Stamp>())?;
+    let record = bytemuck::try_pod_read_unaligned(rest).ok()?;
+    Some((bytemuck::try_pod_read_unaligned(stamp).ok()?, record))
+}
+
+fn split<H: Header, T: AnyBitPattern>(bytes: &[u8]) -> Option<(H, Vec<T>)> {
+    let (header, rest) = bytes.split_at_checked(size_of::<H>())?;
+    if !rest.len().is_multiple_of(size_of::<T>()) {
+        return None;
+    }
+    let records = rest.chunks_exact(size_of::<T>()).map(bytemuck::pod_read_unaligned).collect();
+    Some((bytemuck::try_pod_read_unaligned(header).ok()?, records))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn messages_are_read_back_as_they_were_and_garbage_is_none() {
+        let stamp = Stamp { epoch_ns: 7, sequence: 3, ..Stamp::default() };
+        let odometry = OdometryRecord { yaw_rate_radps: 0.5, ..OdometryRecord::default() };
+        let mut bytes = bytemuck::bytes_of(&stamp).to_vec();
+        bytes.extend(bytemuck::bytes_of(&odometry));
+        let mut records = Records::default();
+        assert_eq!(records.take(topic::ODOMETRY, &bytes), Some(()));
+        assert_eq!(records.odometry[&Key { epoch_ns: 7, sequence: 3 }], (stamp, odometry));
+        assert_eq!(records.take(topic::ODOMETRY, &bytes[1..]), None);
+        assert_eq!(records.take(topic::SCAN, &bytes[..9]), None);
+        assert_eq!(records.take("/pose", b"anything"), Some(()), "other topics are for people");
+    }
+}

@@ -1,0 +1,246 @@
+//! Keeps the processes of a run alive, and shows how they are doing.
+
+use std::process::{Child, Command, ExitStatus};
+
+use rustix::process::{Pid, Signal, kill_process};
+
+use crate::RuntimeError;
+use crate::channel::{Bus, Inlet, MISSION};
+use crate::clock::{self, SECOND_NS};
+use crate::message::{MissionRecord, Stamp, StatusRecord};
+use crate::status::Role;
+
+/// Restarts within [`RESTART_WINDOW_NS`] after which a process is given up, and with it the run.
+pub const RESTARTS_MAX: usize = 8;
+/// See [`RESTARTS_MAX`].
+const RESTART_WINDOW_NS: u64 = 60 * SECOND_NS;
+/// Wait before the first restart; each one that follows soon doubles it [ns].
+const BACK_OFF_NS: u64 = SECOND_NS / 5;
+/// Longest wait before a restart [ns].
+const BACK_OFF_MAX_NS: u64 = 5 * SECOND_NS;
+/// Time between two looks [ns].
+const POLL_NS: u64 = SECOND_NS / 50;
+/// Time that processes have to end when they are told to [ns].
+const PATIENCE_NS: u64 = 3 * SECOND_NS;
+
+/// How a run ended.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum RunEnd {
+    /// The vehicle's process ended of itself, with this exit code.
+    Plant(i32),
+    /// The user ended it.
+    Interrupted,
+    /// A process refused its input, or kept dying.
+    GaveUp {
+        /// Which.
+        role: Role,
+        /// Why.
+        why: String,
+    },
+}
+
+/// A process that is kept alive.
+struct Kept {
+    role: Role,
+    child: Option<Child>,
+    deaths_at_ns: Vec<u64>,
+    due_at_ns: u64,
+    status: Inlet<Stamp, StatusRecord>,
+    last: Option<(Stamp, StatusRecord)>,
+}
+
+/// The processes of a run.
+pub struct Supervisor<'a> {
+    kept: Vec<Kept>,
+    missions: Inlet<Stamp, MissionRecord>,
+    mission: Option<MissionRecord>,
+    command: &'a dyn Fn(Role) -> Command,
+}
+
+impl<'a> Supervisor<'a> {
+    /// A supervisor of these roles, each started by its command.
+    pub fn new(
+        bus: &Bus,
+        roles: &[Role],
+        command: &'a dyn Fn(Role) -> Command,
+    ) -> Result<Self, RuntimeError> {
+        let kept = |&role: &Role| {
+            let status = bus.inlet(&role.status())?;
+            Ok(Kept { role, child: None, deaths_at_ns: Vec::new(), due_at_ns: 0, status, last: None })
+        };
+        Ok(Self {
+            kept: roles.iter().map(kept).collect::<Result<_, RuntimeError>>()?,
+            missions: bus.inlet(&MISSION)?,
+            mission: None,
+            command,
+        })
+    }
+
+    /// Keeps them going until the vehicle's process ends, one cannot be kept, or `is_over`; `show` is given the state
+    /// of all once a second. Ends them all before it returns.
+    pub fn run(
+        &mut self,
+        is_over: &dyn Fn() -> bool,
+        show: &mut dyn FnMut(&[StatusLine], Option<&MissionRecord>),
+    ) -> RunEnd {
+        let mut shown_at_ns = clock::now_ns();
+        let end = loop {
+            let now_ns = clock::now_ns();
+            if is_over() {
+                break RunEnd::Interrupted;
+            }
+            if let Some(end) = self.kept.iter_mut().find_map(|kept| kept.tend(now_ns, self.command)) {
+                break end;
+            }
+            self.listen();
+            if now_ns.saturating_sub(shown_at_ns) >= SECOND_NS {
+                shown_at_ns = now_ns;
+                show(&self.lines(now_ns), self.mission.as_ref());
+            }
+            clock::sleep_until(now_ns + POLL_NS);
+        };
+        self.end_all();
+        self.listen();
+        end
+    }
+
+    /// What the vehicle's process said last.
+    pub fn mission(&self) -> Option<&MissionRecord> {
+        self.mission.as_ref()
+    }
+
+    fn listen(&mut self) {
+        let mission = &mut self.mission;
+        self.missions.poll(|_, missions| *mission = missions.first().copied().or(*mission));
+        for kept in &mut self.kept {
+            let last = &mut kept.last;
+            kept.status.poll(|stamp, records| {
+                *last = records.first().map(|record| (*stamp, *record)).or(*last);
+            });
+        }
+    }
+
+    fn lines(&self, now_ns: u64) -> Vec<StatusLine> {
+        let line = |kept: &Kept| StatusLine {
+            role: kept.role,
+            process: kept.child.as_ref().map(Child::id),
+            n_restarts: kept.deaths_at_ns.len(),
+            status: kept.last.map(|(stamp, status)| (clock::age_s(now_ns, stamp.published_at_ns), status)),
+        };
+        self.kept.iter().map(line).collect()
+    }
+
+    fn end_all(&mut self) {
+        let running = || clock::now_ns();
+        let until_ns = running() + PATIENCE_NS;
+        self.kept.iter_mut().for_each(|kept| kept.signal(Signal::TERM));
+        while self.kept.iter_mut().any(Kept::is_running) && clock::now_ns() < until_ns {
+            clock::sleep_until(clock::now_ns() + POLL_NS / 4);
+        }
+        for kept in &mut self.kept {
+            kept.signal(Signal::KILL);
+            if let Some(child) = &mut kept.child {
+                // It has been killed; how it ended is of no interest any more.
+                drop(child.wait());
+            }
+        }
+    }
+}
+
+impl Kept {
+    /// Starts it when it is due, and looks whether it still runs.
+    fn tend(&mut self, now_ns: u64, command: &dyn Fn(Role) -> Command) -> Option<RunEnd> {
+        let Some(child) = &mut self.child else {
+            if now_ns < self.due_at_ns {
+                return None;
+            }
+            return match command(self.role).spawn() {
+                Ok(child) => {
+                    self.child = Some(child);
+                    None
+                }
+                Err(error) => Some(RunEnd::GaveUp { role: self.role, why: error.to_string() }),
+            };
+        };
+        match child.try_wait() {
+            Ok(None) => None,
+            Ok(Some(status)) => self.bury(status, now_ns),
+            Err(error) => Some(RunEnd::GaveUp { role: self.role, why: error.to_string() }),
+        }
+    }
+
+    fn bury(&mut self, status: ExitStatus, now_ns: u64) -> Option<RunEnd> {
+        self.child = None;
+        match status.code() {
+            Some(code @ (0 | 1)) if self.role == Role::Plant => return Some(RunEnd::Plant(code)),
+            // What was refused once is refused again.
+            Some(2) => {
+                return Some(RunEnd::GaveUp { role: self.role, why: "it refused its input".to_owned() });
+            }
+            _ => {}
+        }
+        self.deaths_at_ns.push(now_ns);
+        let recent = |at_ns: &&u64| now_ns.saturating_sub(**at_ns) < RESTART_WINDOW_NS;
+        let n_recent = self.deaths_at_ns.iter().filter(recent).count();
+        if n_recent > RESTARTS_MAX {
+            let why = format!("it ended {n_recent} times within a minute, the last time by {status}");
+            return Some(RunEnd::GaveUp { role: self.role, why });
+        }
+        self.due_at_ns = now_ns + (BACK_OFF_NS << (n_recent - 1).min(16)).min(BACK_OFF_MAX_NS);
+        None
+    }
+
+    fn signal(&mut self, signal: Signal) {
+        let process = self.child.as_ref().and_then(|child| i32::try_from(child.id()).ok());
+        if let Some(process) = process.and_then(Pid::from_raw).filter(|_| self.is_running()) {
+            // It may end by itself just now, which is what is wanted.
+            kill_process(process, signal).unwrap_or_default();
+        }
+    }
+
+    fn is_running(&mut self) -> bool {
+        self.child.as_mut().is_some_and(|child| matches!(child.try_wait(), Ok(None)))
+    }
+}
+
+/// How one process is doing.
+#[derive(Clone, Copy, Debug)]
+pub struct StatusLine {
+    /// Its role.
+    pub role: Role,
+    /// Its process, while it runs.
+    pub process: Option<u32>,
+    /// How often it had to be restarted.
+    pub n_restarts: usize,
+    /// Age of its last status [s], and that.
+    pub status: Option<(f64, StatusRecord)>,
+}
+
+impl std::fmt::Display for StatusLine {
+    fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let inputs: &[&str] = match self.role {
+            Role::Plant => &["command"],
+            Role::Mapping => &["odometry", "scan"],
+            Role::Learning => &["surface"],
+            Role::Control => &["odometry", "learned map", "physics map"],
+            Role::Recorder => &[],
+        };
+        write!(formatter, "{:9}", self.role.name())?;
+        let Some((age_s, status)) = self.status.filter(|_| self.process.is_some()) else {
+            return write!(formatter, " not heard of yet, restarts {}", self.n_restarts);
+        };
+        if age_s > 2.0 {
+            return write!(formatter, " silent for {age_s:.1} s, restarts {}", self.n_restarts);
+        }
+        let [median_ms, largest_ms] = status.lateness_s.map(|lateness_s| 1e3 * lateness_s);
+        write!(formatter, " {:5.1} Hz  late {median_ms:.1}, {largest_ms:.1} ms", status.rate_hz)?;
+        for (name, age_s) in inputs.iter().zip(status.age_s).filter(|(_, age_s)| *age_s >= 0.0) {
+            write!(formatter, "  {name} {:.0} ms", 1e3 * age_s)?;
+        }
+        write!(
+            formatter,
+            "  missed {}  lost {}  refused {}  restarts {}",
+            status.n_missed, status.n_lost, status.n_refused, self.n_restarts
+        )
+    }
+}
