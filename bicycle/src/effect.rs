@@ -170,6 +170,11 @@ impl Effect {
         self.stages().contains(&Stage::Command)
     }
 
+    /// Whether it changes what the sensors say.
+    pub fn acts_on_sensors(&self) -> bool {
+        self.stages().contains(&Stage::Sensors)
+    }
+
     /// Refuses parameters outside their bounds.
     pub fn validate(&self) -> Result<(), EffectError> {
         let Description { id, parameters, .. } = self.description();

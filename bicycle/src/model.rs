@@ -253,18 +253,49 @@ impl Stepper {
         let lanes = state.x.0;
         let reached_speed = state.speed;
         self.actuate(state, asked);
-        let (sine, cosine) = state.turns.sin_cos_turns();
         let tangent = state.steering.tan();
         let per_wheelbase = Real::constant(lanes, self.per_wheelbase);
+        let turning = |speed: Real<L>| speed * per_wheelbase * tangent;
+        self.move_body(state, [reached_speed, asked[0], tangent], turning, ground)
+    }
+
+    /// [`Stepper::follow`] for a skid-steered vehicle: the second of what is asked is a yaw rate [rad/s], which is
+    /// reached at once and at any speed.
+    #[inline(always)]
+    pub fn follow_yaw_rate<L: Lanes>(
+        &self,
+        state: &mut LaneState<L>,
+        asked: [Real<L>; 2],
+        ground: &GroundSample<Real<L>>,
+    ) -> Rates<L> {
+        let straight = state.x.0.real(0.0);
+        let reached_speed = state.speed;
+        self.actuate(state, [asked[0], straight]);
+        self.move_body(state, [reached_speed, asked[0], straight], |_| asked[1], ground)
+    }
+
+    /// Moves a body whose actuators have acted: `speeds_and_tangent` are the speed before, the speed asked for and the
+    /// tangent of the steering angle; `turning` gives the yaw rate at a speed.
+    #[inline(always)]
+    fn move_body<L: Lanes>(
+        &self,
+        state: &mut LaneState<L>,
+        speeds_and_tangent: [Real<L>; 3],
+        turning: impl Fn(Real<L>) -> Real<L>,
+        ground: &GroundSample<Real<L>>,
+    ) -> Rates<L> {
+        let lanes = state.x.0;
+        let [reached_speed, asked_speed, steering_tangent] = speeds_and_tangent;
+        let (sine, cosine) = state.turns.sin_cos_turns();
         let mut side_acceleration = lanes.real(0.0);
         if self.effects.drive() {
             let mut driving = Driving {
                 acceleration: (state.speed - reached_speed) * Real::constant(lanes, self.per_step),
                 side_acceleration,
-                asked_speed: asked[0],
+                asked_speed,
                 speed: reached_speed,
-                steering_tangent: tangent,
-                yaw_rate: reached_speed * per_wheelbase * tangent,
+                steering_tangent,
+                yaw_rate: turning(reached_speed),
                 heading: [sine, cosine],
                 ground: *ground,
             };
@@ -273,7 +304,7 @@ impl Stepper {
             state.speed = driving.acceleration.mul_add(step, reached_speed);
             side_acceleration = driving.side_acceleration;
         }
-        let yaw_rate = state.speed * per_wheelbase * tangent;
+        let yaw_rate = turning(state.speed);
         let acceleration = (state.speed - reached_speed) * Real::constant(lanes, self.per_step);
         let lateral = lanes.real(0.0);
         let mut moving = Moving { forward: state.speed, lateral, yaw_rate, side_acceleration, acceleration };

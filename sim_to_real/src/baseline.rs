@@ -2,7 +2,7 @@
 //! nominal drive shows against the others.
 
 use crate::calibration::calibrated;
-use crate::causes::Trial;
+use crate::causes::{Explanation, Trial};
 use crate::comparison::{Comparison, Yardstick, root_mean_square};
 use crate::conditions::StartRecord;
 use crate::drive::{Drive, DriveError};
@@ -13,6 +13,7 @@ use crate::machine::Machine;
 use crate::residual_table::residual_cells;
 use bicycle::{DriveLog, Effect};
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 
 /// Why a diagnosis cannot begin.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -58,7 +59,9 @@ pub(crate) struct Null {
     pub(crate) error: f64,
     /// Mean robust loss.
     pub(crate) loss: f64,
-    /// Largest logarithmic gain in loss that one effect brought where there was none.
+    /// Largest logarithmic gain in loss that each effect brought where there was none.
+    pub(crate) gains: BTreeMap<String, f64>,
+    /// The largest of them.
     pub(crate) gain_of_one: f64,
     /// The same for a second effect.
     pub(crate) gain_of_two: f64,
@@ -117,6 +120,7 @@ pub(crate) fn drives_of(
 struct LeftOut {
     residuals: Vec<f32>,
     gains: [f64; 2],
+    gain_by_id: BTreeMap<String, f64>,
     starts: Vec<StartRecord>,
 }
 
@@ -130,8 +134,19 @@ impl LeftOut {
         let two = pair.map_or(one, |pair| pair.loss);
         let residuals = Comparison::new(wheelbase_m, vec![drive], yardstick).residuals(effects);
         let starts = StartRecord::of(&[drive], &residuals);
-        Self { residuals, gains: [(before / one).ln(), (one / two).ln()], starts }
+        let gain = |single: &Explanation| (single.ids()[0].to_owned(), (before / single.loss).ln());
+        let gain_by_id = singles.iter().map(gain).collect();
+        Self { residuals, gains: [(before / one).ln(), (one / two).ln()], gain_by_id, starts }
     }
+}
+
+fn largest_by_id(left_out: &[LeftOut]) -> BTreeMap<String, f64> {
+    let mut largest = BTreeMap::new();
+    for (id, &gain) in left_out.iter().flat_map(|one| &one.gain_by_id) {
+        let so_far = largest.entry(id.clone()).or_insert(0.0_f64);
+        *so_far = so_far.max(gain);
+    }
+    largest
 }
 
 impl Null {
@@ -147,6 +162,7 @@ impl Null {
         Self {
             error: median(&root_mean_square),
             loss: median(&mean_loss),
+            gains: largest_by_id(left_out),
             gain_of_one: largest(0),
             gain_of_two: largest(1),
             cells: residual_cells(&residuals, &residuals, None),

@@ -15,10 +15,6 @@ pub(crate) struct Explanation {
 }
 
 impl Explanation {
-    pub(crate) fn loss(&self) -> f64 {
-        self.loss
-    }
-
     pub(crate) fn ids(&self) -> Vec<&'static str> {
         self.causes.iter().map(|cause| cause.description().id).collect()
     }
@@ -31,7 +27,7 @@ pub(crate) fn candidates() -> impl Iterator<Item = &'static Description> {
 
 /// The baseline with causes added, each in its place between command and sensor. What changes the command stands
 /// before the calibrated actuators, which then follow the changed command.
-pub(crate) fn composed(baseline: &[Effect], causes: &[Effect]) -> Vec<Effect> {
+pub fn composed(baseline: &[Effect], causes: &[Effect]) -> Vec<Effect> {
     let (on_command, other): (Vec<Effect>, Vec<Effect>) =
         causes.iter().partition(|cause| cause.acts_on_command());
     let mut effects = Vec::with_capacity(baseline.len() + causes.len());

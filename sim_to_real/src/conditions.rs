@@ -1,17 +1,21 @@
 //! Where the residual lies: under which conditions it is large, beyond what it is there between nominal drives.
 
 use crate::answer::{Condition, Place};
-use crate::drive::{Drive, N_STEPS, STEP_S, VX, WZ, X, Y, YAW};
+use crate::comparison::root_mean_square;
+use crate::drive::{Drive, HORIZONS, STEP_S, VX, WZ, X, Y, YAW};
 use crate::findings::{ConditionBin, ConditionTable, GroundResidual};
 use crate::rollout::{N_QUANTITIES, PER_START};
 use serde::{Deserialize, Serialize};
 
 /// Bins of a condition, each with as many rollouts as the next.
 const N_BINS: usize = 8;
-/// How far before a rollout's start a change of the command still acts [s].
-const BEFORE_S: f64 = 0.5;
+/// Horizons at which the residual is laid out over the conditions, as places in [`HORIZONS`]: long enough for a motion to
+/// show, short enough for the conditions to be one.
+const LAID_OUT: [usize; 2] = [1, 2];
+/// A change of the command counts from this long before the rollout, for steering and for speed [s].
+const BEFORE_S: [f64; 2] = [0.2, 0.5];
 
-/// The conditions that are a number, in the order of [`StartRecord::values`].
+/// The conditions that are a number, in the order of [`Window::values`].
 pub(crate) const MEASURED: [Condition; 9] = [
     Condition::Speed,
     Condition::Steering,
@@ -28,71 +32,70 @@ pub(crate) const MEASURED: [Condition; 9] = [
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct StartRecord {
-    /// Values of the [`MEASURED`] conditions, each the mean over the rollout or the largest change.
-    pub(crate) values: [f64; MEASURED.len()],
     /// East, north [m].
     pub(crate) position_m: [f64; 2],
-    /// Mean residual of each quantity over the horizons, in standard deviations.
-    pub(crate) residual: [f64; N_QUANTITIES],
     /// Mean squared residual, in variances.
     pub(crate) mean_square: f64,
+    /// From the start to each horizon that is laid out.
+    pub(crate) windows: [Window; LAID_OUT.len()],
+}
+
+/// What a rollout met until a horizon, and how far it was off there.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct Window {
+    /// Values of the [`MEASURED`] conditions: means, and changes with their sign.
+    pub(crate) values: [f64; MEASURED.len()],
+    /// Residual of each quantity, in standard deviations.
+    pub(crate) residual: [f64; N_QUANTITIES],
 }
 
 impl StartRecord {
     /// One record per start of every drive, in the order of the residuals.
     pub(crate) fn of(drives: &[&Drive], residuals: &[f32]) -> Vec<Self> {
         let starts = drives.iter().flat_map(|drive| drive.starts.iter().map(move |&start| (*drive, start)));
-        starts
-            .zip(residuals.chunks(PER_START))
-            .map(|((drive, start), own)| Self::new(drive, start, own))
-            .collect()
+        let records = starts.zip(residuals.chunks(PER_START));
+        records.map(|((drive, start), own)| Self::new(drive, start, own)).collect()
     }
 
     fn new(drive: &Drive, start: usize, residuals: &[f32]) -> Self {
-        let horizons = (PER_START / N_QUANTITIES) as f64;
-        let residual = std::array::from_fn(|quantity| {
-            let own = residuals.iter().skip(quantity).step_by(N_QUANTITIES);
-            own.map(|value| f64::from(*value)).sum::<f64>() / horizons
-        });
-        let squares: f64 = residuals.iter().map(|value| f64::from(*value).powi(2)).sum();
+        let window = |horizon: usize| Window {
+            values: values(drive, start, HORIZONS[horizon]),
+            residual: std::array::from_fn(|quantity| f64::from(residuals[horizon * N_QUANTITIES + quantity])),
+        };
         Self {
-            values: values(drive, start),
             position_m: [drive.smooth[X][start], drive.smooth[Y][start]],
-            residual,
-            mean_square: squares / PER_START as f64,
+            mean_square: root_mean_square(residuals).powi(2),
+            windows: LAID_OUT.map(window),
         }
     }
 }
 
-fn values(drive: &Drive, start: usize) -> [f64; MEASURED.len()] {
-    let rows = start..start + N_STEPS;
-    let n = N_STEPS as f64;
-    let mean = |of: &dyn Fn(usize) -> f64| rows.clone().map(of).sum::<f64>() / n;
-    let earlier = start.saturating_sub((BEFORE_S / STEP_S) as usize);
-    let spread = |of: &dyn Fn(usize) -> f64| {
-        let (low, high) = (earlier..start + N_STEPS)
-            .map(of)
-            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)));
-        high - low
-    };
+fn values(drive: &Drive, start: usize, steps: usize) -> [f64; MEASURED.len()] {
+    let end = start + steps;
+    let mean = |of: &dyn Fn(usize) -> f64| (start..end).map(of).sum::<f64>() / steps as f64;
     let smooth = |quantity: usize| move |row: usize| drive.smooth[quantity][row];
-    let slope = |left: bool| {
+    let steering = |row: usize| f64::from(drive.commands[row].steering_rad);
+    let speed = |row: usize| f64::from(drive.commands[row].speed_mps);
+    let earlier = BEFORE_S.map(|before_s| start.saturating_sub((before_s / STEP_S) as usize));
+    let slope = |[ahead, left]: [f64; 2]| {
         move |row: usize| {
             let (sine, cosine) = drive.smooth[YAW][row].sin_cos();
             let [east, north] = [0, 1].map(|axis| f64::from(drive.gradient[axis][row]));
-            if left { north * cosine - east * sine } else { east * cosine + north * sine }
+            ahead * (east * cosine + north * sine) + left * (north * cosine - east * sine)
         }
     };
+    let yaw = drive.smooth[YAW][start];
     [
         mean(&smooth(VX)),
-        mean(&|row| f64::from(drive.commands[row].steering_rad)),
-        spread(&|row| f64::from(drive.commands[row].steering_rad)),
-        spread(&|row| f64::from(drive.commands[row].speed_mps)),
+        mean(&steering),
+        steering(end) - steering(earlier[0]),
+        speed(end) - speed(earlier[1]),
         mean(&|row| drive.smooth[VX][row] * drive.smooth[WZ][row]),
-        mean(&slope(false)),
-        mean(&slope(true)),
+        mean(&slope([1.0, 0.0])),
+        mean(&slope([0.0, 1.0])),
         mean(&|row| f64::from(drive.class[row])),
-        drive.smooth[YAW][start].sin().atan2(drive.smooth[YAW][start].cos()),
+        yaw.sin().atan2(yaw.cos()),
     ]
 }
 
@@ -112,15 +115,15 @@ pub(crate) fn places(tables: &[ConditionTable]) -> Vec<Place> {
 }
 
 fn condition_table(place: usize, real: &[StartRecord], null: &[StartRecord]) -> Option<ConditionTable> {
-    let edges = quantiles(real.iter().map(|record| record.values[place]).collect());
+    let edges = quantiles(windows(real).map(|window| window.values[place]).collect());
     if edges.len() < 3 {
         return None;
     }
     let null_share = explained(place, null, &edges);
-    let bins = edges.windows(2).enumerate().map(|(i, edge)| {
+    let bins = edges.windows(2).enumerate().map(|(bin, edge)| {
         let inside = |records: &[StartRecord]| {
-            let own = records.iter().filter(|record| bin_of(record.values[place], &edges) == i);
-            own.map(|record| record.mean_square).collect::<Vec<f64>>()
+            let own = windows(records).filter(|window| bin_of(window.values[place], &edges) == bin);
+            own.map(|window| mean(&window.residual.map(|value| value * value))).collect::<Vec<f64>>()
         };
         let (own, nominal) = (inside(real), inside(null));
         ConditionBin {
@@ -139,16 +142,15 @@ fn condition_table(place: usize, real: &[StartRecord], null: &[StartRecord]) -> 
     })
 }
 
-/// The share of the squared residual that a constant offset makes.
+fn windows(records: &[StartRecord]) -> impl Iterator<Item = &Window> {
+    records.iter().flat_map(|record| &record.windows)
+}
+
+/// The share of the squared residual that its mean makes.
 fn constant_table(real: &[StartRecord], null: &[StartRecord]) -> ConditionTable {
     let share = |records: &[StartRecord]| {
-        let offset = |quantity: usize| {
-            let values: Vec<f64> = records.iter().map(|record| record.residual[quantity]).collect();
-            mean(&values).powi(2)
-        };
-        let squares: Vec<f64> =
-            records.iter().flat_map(|record| record.residual.map(|value| value * value)).collect();
-        (0..N_QUANTITIES).map(offset).sum::<f64>() / (mean(&squares) * N_QUANTITIES as f64)
+        let all: Vec<&Window> = windows(records).collect();
+        mean_squares(&all) / squares(&all).max(f64::MIN_POSITIVE)
     };
     let null_share = share(null);
     ConditionTable {
@@ -159,34 +161,28 @@ fn constant_table(real: &[StartRecord], null: &[StartRecord]) -> ConditionTable 
     }
 }
 
-/// Part of the variance of the residuals that bins explain, freed of what so many bins explain of noise: signed
-/// residuals of every quantity, and their squares.
+/// The share of the squared residual that the means of bins make beyond the mean of all.
 fn explained(place: usize, records: &[StartRecord], edges: &[f64]) -> f64 {
-    let quantities = (0..N_QUANTITIES)
-        .map(|quantity| variance_shares(place, records, edges, |record| record.residual[quantity]))
-        .fold([0.0; 2], |sum, [between, total]| [sum[0] + between, sum[1] + total]);
-    quantities[0] / quantities[1].max(1e-12)
+    let all: Vec<&Window> = windows(records).collect();
+    let of_bin = |bin: usize| {
+        let inside = all.iter().filter(|window| bin_of(window.values[place], edges) == bin);
+        mean_squares(&inside.copied().collect::<Vec<&Window>>())
+    };
+    let between = (0..edges.len() - 1).map(of_bin).sum::<f64>() - mean_squares(&all);
+    between / squares(&all).max(f64::MIN_POSITIVE)
 }
 
-/// Variance between bins, less that of as many bins of noise, and in all.
-fn variance_shares(
-    place: usize,
-    records: &[StartRecord],
-    edges: &[f64],
-    of: impl Fn(&StartRecord) -> f64,
-) -> [f64; 2] {
-    let all: Vec<f64> = records.iter().map(&of).collect();
-    let centre = mean(&all);
-    let total: f64 = all.iter().map(|value| (value - centre).powi(2)).sum();
-    let mut between = 0.0;
-    for bin in 0..edges.len() - 1 {
-        let own: Vec<f64> =
-            records.iter().filter(|record| bin_of(record.values[place], edges) == bin).map(&of).collect();
-        if !own.is_empty() {
-            between += own.len() as f64 * (mean(&own) - centre).powi(2);
-        }
-    }
-    [between, total]
+/// Number of windows times the squared mean residual, over all quantities.
+fn mean_squares(windows: &[&Window]) -> f64 {
+    let sums = windows.iter().fold([0.0; N_QUANTITIES], |sums, window| {
+        std::array::from_fn(|quantity| sums[quantity] + window.residual[quantity])
+    });
+    sums.iter().map(|sum| sum * sum).sum::<f64>() / windows.len().max(1) as f64
+}
+
+/// Squared residuals over all windows and quantities.
+fn squares(windows: &[&Window]) -> f64 {
+    windows.iter().flat_map(|window| window.residual).map(|value| value * value).sum()
 }
 
 /// Residuals over the ground.

@@ -1,7 +1,7 @@
 //! Intervals of the announced parameters, by leaving out one stretch of the real drives after the other.
 
 use crate::answer::{Estimate, NamedEffect};
-use crate::calibration::{coordinate, value_at, with_values};
+use crate::calibration::{coordinate, is_limit, value_at, with_values};
 use crate::causes::Trial;
 use crate::least_squares::Linearised;
 use bicycle::Effect;
@@ -10,8 +10,10 @@ use bicycle::Effect;
 const N_STRETCHES: usize = 10;
 /// Half the width of a 90 % interval in standard errors of a jackknife over ten stretches (Student, 9 degrees).
 const STUDENT_90: f64 = 1.833;
-/// What the calibrated model's own error adds, in changes of the parameter that matter.
+/// What the calibrated model's own error adds, in changes of the parameter that matter,
 const MODEL_ERROR: f64 = 0.06;
+/// and what the difference between the machine's effect and the catalogue's formula adds, in distances from no effect.
+const FORM_ERROR: f64 = 0.08;
 
 /// The effects with their parameters and 90 % intervals.
 pub(crate) fn named_effects(trial: &Trial<'_>, causes: &[Effect]) -> Vec<NamedEffect> {
@@ -25,7 +27,9 @@ pub(crate) fn named_effects(trial: &Trial<'_>, causes: &[Effect]) -> Vec<NamedEf
     let linearised = Linearised::at(&centre, &places, |values| trial.residuals(&with_values(causes, values)));
     let errors = linearised.jackknife(N_STRETCHES);
     let mut estimates = parameters.iter().zip(&centre).zip(errors).map(|((parameter, centre), error)| {
-        let half = STUDENT_90 * error.hypot(MODEL_ERROR * centre.scale);
+        let size = if is_limit(parameter) { 1.0 } else { centre.start - parameter.neutral };
+        let half =
+            (STUDENT_90 * error).hypot(STUDENT_90 * MODEL_ERROR * centre.scale).hypot(FORM_ERROR * size);
         let at = |place: f64| value_at(parameter, place);
         let (low, high) = (at(centre.start - half), at(centre.start + half));
         (parameter.name.to_owned(), Estimate { value: at(centre.start), low, high })

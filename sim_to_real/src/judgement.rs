@@ -6,24 +6,24 @@ use crate::baseline::Null;
 use crate::causes::{Explanation, candidates};
 use bicycle::Effect;
 
-/// Logarithmic gain that the first effect must bring, at least.
-const PRICE_OF_ONE: f64 = 0.17;
-/// The same in gains of the null.
-const NULLS_OF_ONE: f64 = 1.4;
-/// Logarithmic gain that the second effect must bring, at least.
-const PRICE_OF_TWO: f64 = 0.30;
-/// The same in gains of the null.
-const NULLS_OF_TWO: f64 = 2.0;
+/// Logarithmic gain that an effect must bring beyond what it brings between nominal drives.
+const PRICE_OF_ONE: f64 = 0.105;
+/// The same for a second effect, which a wrong shape of the first one invites.
+const PRICE_OF_TWO: f64 = 0.24;
+/// The same for a second effect in the sensors, which no wrong shape of a motion looks like.
+const PRICE_OF_A_SECOND_SENSOR: f64 = 0.15;
 /// Difference in energy that makes one explanation e times as probable as another.
 const TEMPERATURE: f64 = 0.035;
 /// Explanations this much less probable than the best are told apart from it.
 const TOLD_APART: f64 = 0.05;
-/// What is left is unknown when it exceeds this many floors and
-const UNKNOWN_IN_FLOORS: f64 = 1.9;
-/// this share of the gap, both as errors.
-const UNKNOWN_SHARE: f64 = 0.2;
-/// Less of the gap than this is not worth a name.
-const WORTH_A_NAME: f64 = 0.35;
+/// What is left is unknown when its error exceeds this many floors and
+const UNKNOWN_IN_FLOORS: f64 = 1.55;
+/// this share of the gap.
+const UNKNOWN_SHARE: f64 = 0.35;
+/// An unknown rest beside less than this part of the squared gap makes a name worthless.
+const WORTH_A_NAME: f64 = 0.25;
+/// The loss that a drive may have at best, in losses of the null.
+const LEAST_LOSS: f64 = 0.65;
 
 /// All explanations that were tried, singles and pairs best first.
 pub(crate) struct Weighed {
@@ -41,28 +41,32 @@ pub(crate) struct Judgement {
     pub(crate) debug: Vec<(Vec<String>, Vec<f64>, f64)>,
 }
 
-/// Prices of effects for a vehicle with this null.
-fn prices(null: &Null) -> [f64; 2] {
-    [
-        PRICE_OF_ONE.max(NULLS_OF_ONE * null.gain_of_one.min(2.0 * PRICE_OF_ONE)),
-        PRICE_OF_TWO.max(NULLS_OF_TWO * null.gain_of_two.min(PRICE_OF_TWO)),
-    ]
+/// What an explanation must gain to be believed.
+fn price(explanation: &Explanation, null: &Null) -> f64 {
+    let own = |id: &&str| null.gains.get(*id).copied().unwrap_or(0.0);
+    let nulls: f64 = explanation.ids().iter().map(own).sum();
+    let has_sensor = explanation.causes.iter().any(Effect::acts_on_sensors);
+    nulls
+        + match explanation.causes.len() {
+            0 => 0.0,
+            1 => PRICE_OF_ONE,
+            _ if has_sensor => PRICE_OF_ONE + PRICE_OF_A_SECOND_SENSOR,
+            _ => PRICE_OF_ONE + PRICE_OF_TWO,
+        }
 }
 
 impl Weighed {
     /// Whether what the best single leaves is more than a pair's price above what could be left at best.
     pub(crate) fn may_hold_pairs(&self, null: &Null) -> bool {
-        let [_, price] = prices(null);
-        self.singles.first().is_some_and(|single| (single.loss / (0.6 * null.loss)).ln() > price)
+        let least = LEAST_LOSS * null.loss;
+        self.singles.first().is_some_and(|single| (single.loss / least).ln() > PRICE_OF_A_SECOND_SENSOR)
     }
 
     pub(crate) fn judge(&self, null: &Null) -> Judgement {
-        let [one, two] = prices(null);
-        let priced =
-            |price: f64| move |explanation| (f64::ln(Explanation::loss(explanation)) + price, explanation);
-        let mut all: Vec<(f64, &Explanation)> = vec![priced(0.0)(&self.none)];
-        all.extend(self.singles.iter().map(priced(one)));
-        all.extend(self.pairs.iter().map(priced(one + two)));
+        let explanations = std::iter::once(&self.none).chain(&self.singles).chain(&self.pairs);
+        let mut all: Vec<(f64, &Explanation)> = explanations
+            .map(|explanation| (explanation.loss.ln() + price(explanation, null), explanation))
+            .collect();
         all.sort_by(|a, b| a.0.total_cmp(&b.0));
         let best = all[0].1;
         let (verdict, announced) = self.verdict(best, null);
@@ -72,8 +76,8 @@ impl Weighed {
             ranking: ranking(&all),
             credible_set: self.credible_set(best),
             debug: std::iter::once(&self.none)
-                .chain(self.singles.iter().take(6))
-                .chain(self.pairs.iter().take(4))
+                .chain(self.singles.iter())
+                .chain(self.pairs.iter())
                 .map(|e| {
                     (
                         e.ids().iter().map(|x| x.to_string()).collect(),
