@@ -61,6 +61,7 @@ macro_rules! catalogue {
             id: $name::ID,
             meaning: $name::MEANING,
             role: $name::ROLE,
+            cause: $name::CAUSE,
             parameters: $name::PARAMETERS,
         },)*];
 
@@ -146,6 +147,7 @@ catalogue! {
     accel_limit::AccelLimit,
     speed_loop::SpeedLoop,
     drive_limit::DriveLimit,
+    drive_force_limit::DriveForceLimit,
     mass::Mass,
     rolling_drag::RollingDrag,
     quad_drag::QuadDrag,

@@ -31,8 +31,11 @@ pub struct Estimate {
 /// An announced effect.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct NamedEffect {
-    /// Id of the catalogue.
+    /// Name of the cause.
     pub id: String,
+    /// Id of the catalogue's effect that fits best, where the cause has several forms and it is not the first.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub form: Option<String>,
     /// Parameters by name.
     pub parameters: BTreeMap<String, Estimate>,
 }

@@ -35,7 +35,7 @@ pub(crate) fn calibrated(wheelbase_m: f64, drives: &[&Drive]) -> (Vec<Effect>, Y
     let mut yardstick = Yardstick::rough();
     for _ in 0..3 {
         let comparison = Comparison::new(wheelbase_m, drives.to_vec(), &yardstick);
-        effects = refined(&comparison, &effects);
+        effects = refined(&comparison, &with_limits_tried(&comparison, effects));
         yardstick = Yardstick::of(&comparison.residuals(&effects), &yardstick);
     }
     (effects, yardstick)
@@ -43,6 +43,27 @@ pub(crate) fn calibrated(wheelbase_m: f64, drives: &[&Drive]) -> (Vec<Effect>, Y
 
 fn ordinary() -> Vec<Effect> {
     ORDINARY.iter().filter_map(|&(id, values)| Effect::from_values(id, values)).collect()
+}
+
+/// Limits that nothing reached leave no slope to follow: each is tried at every value of the catalogue.
+fn with_limits_tried(comparison: &Comparison<'_>, mut effects: Vec<Effect>) -> Vec<Effect> {
+    let mut least = comparison.loss(&effects);
+    for place in 0..effects.len() {
+        let description = effects[place].description();
+        for (which, parameter) in description.parameters.iter().enumerate().filter(|(_, p)| is_limit(p)) {
+            for &value in parameter.tried {
+                let mut values = effects[place].values();
+                values[which] = value;
+                let mut changed = effects.clone();
+                changed[place] = Effect::from_values(description.id, values).unwrap_or(effects[place]);
+                let loss = comparison.loss(&changed);
+                if loss < least {
+                    (least, effects) = (loss, changed);
+                }
+            }
+        }
+    }
+    effects
 }
 
 /// All parameters of all effects fitted together.
@@ -103,9 +124,4 @@ pub(crate) fn with_values(effects: &[Effect], coordinates: &[f64]) -> Vec<Effect
             Effect::from_values(description.id, values).unwrap_or(*effect)
         })
         .collect()
-}
-
-/// Whether the catalogue holds an effect of this id.
-pub(crate) fn is_known(id: &str) -> bool {
-    CATALOGUE.iter().any(|description| description.id == id)
 }

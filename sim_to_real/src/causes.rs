@@ -15,8 +15,9 @@ pub(crate) struct Explanation {
 }
 
 impl Explanation {
+    /// Names of the causes; two forms of one cause share a name.
     pub(crate) fn ids(&self) -> Vec<&'static str> {
-        self.causes.iter().map(|cause| cause.description().id).collect()
+        self.causes.iter().map(|cause| cause.description().cause).collect()
     }
 }
 

@@ -12,7 +12,18 @@ pub(crate) fn single_explanations(trial: &Trial<'_>) -> Vec<Explanation> {
     let alone = |description| trial.with_one_more(&[], description);
     let mut singles: Vec<Explanation> = candidates().filter_map(alone).collect();
     singles.sort_by(|a, b| a.loss.total_cmp(&b.loss));
-    singles
+    best_forms(singles)
+}
+
+/// Of several forms of one cause, the best.
+fn best_forms(sorted: Vec<Explanation>) -> Vec<Explanation> {
+    let mut best: Vec<Explanation> = Vec::with_capacity(sorted.len());
+    for explanation in sorted {
+        if best.iter().all(|other| other.ids() != explanation.ids()) {
+            best.push(explanation);
+        }
+    }
+    best
 }
 
 /// The best pair that holds one of the best singles.
@@ -41,6 +52,6 @@ pub(crate) fn pairs(trial: &Trial<'_>, singles: &[Explanation]) -> Vec<Explanati
 /// An explanation with every other effect added.
 pub(crate) fn with_a_second(trial: &Trial<'_>, first: &Explanation) -> Vec<Explanation> {
     let known = first.ids();
-    let others = candidates().filter(|description| !known.contains(&description.id));
+    let others = candidates().filter(|description| !known.contains(&description.cause));
     others.filter_map(|description| trial.with_one_more(&first.causes, description)).collect()
 }

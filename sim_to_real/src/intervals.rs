@@ -37,7 +37,8 @@ pub(crate) fn named_effects(trial: &Trial<'_>, causes: &[Effect]) -> Vec<NamedEf
     let named = |cause: &Effect| {
         let description = cause.description();
         let own = estimates.by_ref().take(description.parameters.len()).collect();
-        NamedEffect { id: description.id.to_owned(), parameters: own }
+        let form = (description.id != description.cause).then(|| description.id.to_owned());
+        NamedEffect { id: description.cause.to_owned(), form, parameters: own }
     };
     causes.iter().map(named).collect()
 }

@@ -127,6 +127,7 @@ fn ranking(all: &[(f64, &Explanation)]) -> Vec<Ranked> {
         holds.map(|(energy, _)| weight(*energy)).sum::<f64>() / total
     };
     let mut ranking: Vec<Ranked> = candidates()
+        .filter(|description| description.id == description.cause)
         .map(|description| Ranked { id: description.id.to_owned(), score: of(description.id) })
         .collect();
     ranking.sort_by(|a, b| b.score.total_cmp(&a.score));

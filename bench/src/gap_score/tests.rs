@@ -19,7 +19,7 @@ fn label(kind: GapKind, effects: &[&str], injection: serde_json::Value) -> GapLa
 }
 
 fn answer(verdict: Verdict, announced: &[&str], ranking: &[(&str, f64)]) -> Answer {
-    let named = |id: &&str| NamedEffect { id: (*id).to_owned(), parameters: BTreeMap::new() };
+    let named = |id: &&str| NamedEffect { id: (*id).to_owned(), form: None, parameters: BTreeMap::new() };
     Answer {
         case: "c".to_owned(),
         verdict,
@@ -132,7 +132,7 @@ fn announced(id: &str, parameters: &[(&str, [f64; 3])]) -> NamedEffect {
     let estimates = parameters.iter().map(|(name, [low, value, high])| {
         ((*name).to_owned(), Estimate { value: *value, low: *low, high: *high })
     });
-    NamedEffect { id: id.to_owned(), parameters: estimates.collect() }
+    NamedEffect { id: id.to_owned(), form: None, parameters: estimates.collect() }
 }
 
 #[test]

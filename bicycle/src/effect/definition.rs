@@ -39,6 +39,8 @@ pub struct Description {
     pub meaning: &'static str,
     /// What it is to a diagnosis.
     pub role: Role,
+    /// Name of the cause that it is a form of: its own, where it is the only form.
+    pub cause: &'static str,
     /// Its parameters.
     pub parameters: &'static [Parameter],
 }
@@ -153,6 +155,7 @@ pub(crate) trait Definition: Values {
     const ID: &'static str;
     const MEANING: &'static str;
     const ROLE: Role = Role::Cause;
+    const CAUSE: &'static str = Self::ID;
     const STAGES: &'static [Stage];
     /// Whether it reads the gradient or the class of the ground.
     const USES_GROUND: bool = false;

@@ -7,9 +7,9 @@ parameters! {
     /// What drive and brakes can do.
     DriveLimit {
         /// Largest acceleration A [m/s2].
-        acceleration_mps2 in "m/s2": 0.05 to 50.0, neutral 50.0, tried [1.0, 2.0, 4.0];
+        acceleration_mps2 in "m/s2": 0.05 to 50.0, neutral 50.0, tried [1.0, 1.5, 2.0, 2.7, 3.5, 4.5, 6.0];
         /// Largest deceleration B [m/s2].
-        deceleration_mps2 in "m/s2": 0.05 to 50.0, neutral 50.0, tried [1.0, 2.0, 4.0];
+        deceleration_mps2 in "m/s2": 0.05 to 50.0, neutral 50.0, tried [1.0, 1.5, 2.0, 2.7, 3.5, 4.5, 6.0];
     }
 }
 

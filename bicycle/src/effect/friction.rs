@@ -10,7 +10,7 @@ parameters! {
         /// Friction coefficient M [-].
         mu in "-": 0.02 to 10.0, neutral 10.0, tried [0.2, 0.3, 0.4, 0.55, 0.8];
         /// Share D of the weight on driven wheels [-].
-        driven_share in "-": 0.2 to 1.0, neutral 1.0, tried [0.5, 1.0];
+        driven_share in "-": 0.35 to 1.0, neutral 1.0, tried [0.5, 1.0];
         /// Product of the axles' distances from the centre of gravity over the squared radius of gyration, N [-].
         agility in "-": 0.3 to 10.0, neutral 10.0, tried [1.0, 3.0];
     }

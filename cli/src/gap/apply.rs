@@ -44,7 +44,7 @@ fn effects(answer: &Answer) -> Result<Vec<Effect>, String> {
 }
 
 fn effect(named: &NamedEffect) -> Result<Effect, String> {
-    let id = named.id.as_str();
+    let id = named.form.as_deref().unwrap_or(&named.id);
     let description = CATALOGUE.iter().find(|description| description.id == id);
     let Some(description) = description else {
         let known: Vec<_> = CATALOGUE.iter().map(|description| description.id).collect();

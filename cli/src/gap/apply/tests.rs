@@ -7,7 +7,7 @@ use super::*;
 fn named(id: &str, parameters: &[(&str, f64)]) -> NamedEffect {
     let estimate = |value: f64| Estimate { value, low: value, high: value };
     let parameters = parameters.iter().map(|(name, value)| ((*name).to_owned(), estimate(*value))).collect();
-    NamedEffect { id: id.to_owned(), parameters }
+    NamedEffect { id: id.to_owned(), form: None, parameters }
 }
 
 fn answer(verdict: Verdict, effects: Vec<NamedEffect>) -> Answer {
@@ -69,7 +69,7 @@ fn effects_that_no_model_can_hold_are_refused_by_name() {
     let refused = |named: NamedEffect| effects(&answer(Verdict::Effects, vec![named])).unwrap_err();
     let told = refused(named("steer_magic", &[]));
     assert!(told.contains("expected one of ") && told.contains("found 'steer_magic'"), "{told}");
-    let told = refused(NamedEffect { id: "steer_lag".to_owned(), parameters: BTreeMap::new() });
+    let told = refused(NamedEffect { id: "steer_lag".to_owned(), form: None, parameters: BTreeMap::new() });
     assert_eq!(told, "effects: steer_lag: expected parameter time_constant_s, found none");
     let told = refused(named("steer_lag", &[("time_constant_s", 1e6)]));
     assert!(told.starts_with("effect steer_lag: time_constant_s: expected "), "{told}");

@@ -18,7 +18,7 @@ pub(crate) fn answer() -> Answer {
     Answer {
         case: "steering <late>".to_owned(),
         verdict: Verdict::Effects,
-        effects: vec![NamedEffect { id: "steer_lag".to_owned(), parameters }],
+        effects: vec![NamedEffect { id: "steer_lag".to_owned(), form: None, parameters }],
         ranking: ranking.map(ranked).to_vec(),
         credible_set: vec!["steer_lag".to_owned(), "steer_delay".to_owned()],
         places: vec![Place { condition: Condition::SteeringChange, share: 0.61 }],
