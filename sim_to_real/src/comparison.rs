@@ -26,7 +26,8 @@ impl<'a> Comparison<'a> {
         Self { wheelbase_m, drives, measured, per_sigma }
     }
 
-    /// Foretold less measured, in standard deviations: drive by drive, start by start, [`PER_START`] numbers each.
+    /// Foretold less measured, in standard deviations: drive by drive, start by start, [`PER_START`] numbers each;
+    /// exactly 0 where nothing was measured.
     pub(crate) fn residuals(&self, effects: &[Effect]) -> Vec<f32> {
         let simulator = Simulator::new(self.wheelbase_m, effects);
         let mut residuals = Vec::with_capacity(self.measured.iter().map(Vec::len).sum());
@@ -35,7 +36,11 @@ impl<'a> Comparison<'a> {
             let starts = predicted.chunks(PER_START).zip(measured.chunks(PER_START));
             residuals.extend(starts.flat_map(|(predicted, measured)| {
                 let both = predicted.iter().zip(measured).zip(&self.per_sigma);
-                both.map(|((predicted, measured), per_sigma)| (predicted - measured) * per_sigma)
+                both.map(
+                    |((predicted, measured), per_sigma)| {
+                        if measured.is_nan() { 0.0 } else { (predicted - measured) * per_sigma }
+                    },
+                )
             }));
         }
         residuals
@@ -47,13 +52,18 @@ impl<'a> Comparison<'a> {
     }
 }
 
-/// Root mean square.
+/// Root mean square of what was measured: a residual of exactly 0 stands for nothing measured. Without any, 0.
 pub(crate) fn root_mean_square(residuals: &[f32]) -> f64 {
     let sum: f64 = residuals.iter().map(|r| f64::from(*r) * f64::from(*r)).sum();
-    (sum / residuals.len() as f64).sqrt()
+    (sum / n_measured(residuals).max(1) as f64).sqrt()
 }
 
-/// What was measured after every start, [`PER_START`] numbers each.
+/// Number of residuals that something was measured for.
+pub(crate) fn n_measured(residuals: &[f32]) -> usize {
+    residuals.iter().filter(|residual| **residual != 0.0).count()
+}
+
+/// What was measured after every start, [`PER_START`] numbers each; NaN what was not.
 fn outcomes(drive: &Drive) -> Vec<f32> {
     let at = |&start: &usize| HORIZONS.iter().flat_map(move |&steps| drive.outcome(start, steps));
     drive.starts.iter().flat_map(at).map(|value| value as f32).collect()
@@ -69,7 +79,8 @@ impl Yardstick {
     pub(crate) fn of(residuals: &[f32], unit: &Self) -> Self {
         let spread = |place: usize| {
             let values: Vec<f32> = residuals.chunks(PER_START).map(|start| start[place]).collect();
-            unit.0[place] * root_mean_square(&values).max(1e-6)
+            let size = if n_measured(&values) == 0 { 1.0 } else { root_mean_square(&values).max(1e-6) };
+            unit.0[place] * size
         };
         Self((0..PER_START).map(spread).collect())
     }

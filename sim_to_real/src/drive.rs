@@ -1,34 +1,42 @@
-//! A drive made ready for comparison with rollouts: an even time axis, commands as they were held, smooth states to
+//! A drive made ready for comparison with rollouts: an even time axis, inputs as they were held, smooth states to
 //! start from, and the ground on the way.
 
-use crate::machine::{GroundMap, Machine};
-use crate::smoothing::smoothed;
-use bicycle::{Column, Command, Run};
-use std::f64::consts::TAU;
+use crate::evidence::{Evidence, SpeedInput};
+use crate::ground::ground_on_the_way;
+use crate::machine::Machine;
+use crate::signals::{Signals, summed};
+use bicycle::{Command, Run};
 
 /// Time step of every comparison [s].
 pub(crate) const STEP_S: f64 = 0.02;
 /// Steps between the starts of rollouts.
 const STRIDE: usize = 10;
-/// What the actuators did before a drive's first row is not known for this long [s].
+/// What the actuators did before a drive's first row is not known for this long [s],
 const SETTLING_S: f64 = 1.5;
+/// of a short run for this share of it.
+const SETTLING_SHARE: f64 = 0.2;
 /// Horizons at which a rollout is compared, in steps.
 pub(crate) const HORIZONS: [usize; 4] = [15, 30, 60, 100];
 /// Steps of a rollout.
 pub(crate) const N_STEPS: usize = HORIZONS[3];
+/// Runs with room for this many steps after the settling time are compared at all horizons from every start; rollouts
+/// of shorter ones end with the run.
+const LONG: usize = N_STEPS + STRIDE;
+/// The shortest run [s].
+const SHORTEST_S: f64 = 1.0;
 
 /// Why a run cannot be compared.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum DriveError {
-    /// A column is needed and absent.
-    #[error("run '{run}': expected the column {column}, found none")]
+    /// Nothing tells the speed or the turning that were asked for.
+    #[error("run '{run}': expected the column {column} or one that stands in for it, found none")]
     Missing {
         /// Run.
         run: String,
-        /// Column.
+        /// Column that would serve best.
         column: &'static str,
     },
-    /// Nothing is left after the settling time and one rollout.
+    /// Too short for a rollout after the settling time.
     #[error("run '{run}': expected at least {needed_s:.1} s, found {found_s:.1} s")]
     Short {
         /// Run.
@@ -38,18 +46,29 @@ pub enum DriveError {
         /// Found [s].
         found_s: f64,
     },
+    /// Inputs or measurements are missing everywhere for as long as a rollout takes.
+    #[error("run '{run}': expected inputs and measurements without holes for {needed_s:.1} s, found none")]
+    Holes {
+        /// Run.
+        run: String,
+        /// Needed [s].
+        needed_s: f64,
+    },
 }
 
-/// One run, every [`STEP_S`].
+/// One run, every [`STEP_S`]. A short one goes on after its end with states held and nothing measured, so that every
+/// rollout has room.
 #[derive(Clone, Debug)]
 pub(crate) struct Drive {
     pub(crate) name: String,
     /// Time of the first row in the log [s].
     pub(crate) time_s: f64,
+    pub(crate) evidence: Evidence,
+    /// Speed [m/s] or acceleration [m/s2], and angle [rad] or yaw rate [rad/s], as the evidence says.
     pub(crate) commands: Vec<Command>,
-    /// Measured: east, north [m], yaw without jumps [rad], forward speed [m/s], yaw rate [rad/s].
+    /// Measured: east, north [m], yaw without jumps [rad], forward speed [m/s], yaw rate [rad/s]; NaN where not.
     pub(crate) measured: [Vec<f64>; 5],
-    /// The same, smoothed, to start from.
+    /// The same, smoothed and never missing, to start from.
     pub(crate) smooth: [Vec<f64>; 5],
     /// Rise per metre east and north.
     pub(crate) gradient: [Vec<f32>; 2],
@@ -70,46 +89,47 @@ pub(crate) const WZ: usize = 4;
 impl Drive {
     pub(crate) fn of(run: &Run<'_>, machine: &Machine) -> Result<Self, DriveError> {
         let name = run.name().to_owned();
-        let time_s = run.time_s();
-        let needed_s = SETTLING_S + (N_STEPS + STRIDE) as f64 * STEP_S;
-        let found_s = time_s[time_s.len() - 1] - time_s[0];
-        if found_s < needed_s {
-            return Err(DriveError::Short { run: name, needed_s, found_s });
+        let missing = |column| DriveError::Missing { run: name.clone(), column };
+        let evidence = Evidence::of(run, machine).map_err(missing)?;
+        let span = Span::of(run)?;
+        let signals = Signals::new(run, span.n_rows);
+        let mut measured = signals.measured(evidence);
+        let smooth = signals.smooth(evidence, &measured);
+        let inputs = signals.inputs(evidence, &smooth[VX]);
+        let starts = span.whole_starts(&inputs, &measured);
+        if starts.is_empty() {
+            return Err(DriveError::Holes { run: name, needed_s: (span.settled + N_STEPS) as f64 * STEP_S });
         }
-        let n = (found_s / STEP_S + 1e-6).floor() as usize + 1;
-        let read = |column: Column| {
-            let values =
-                run.column(column).ok_or(DriveError::Missing { run: name.clone(), column: column.name() })?;
-            Ok(Axis { time_s, n }.interpolated(values, column == Column::Yaw))
-        };
-        let held = |column: Column| {
-            let values =
-                run.column(column).ok_or(DriveError::Missing { run: name.clone(), column: column.name() })?;
-            Ok(Axis { time_s, n }.held(values))
-        };
-        let (speeds, steerings) = (held(Column::CmdSpeed)?, held(Column::CmdSteer)?);
-        let command = |(&speed, &steering): (&f64, &f64)| Command {
-            speed_mps: speed as f32,
-            steering_rad: steering as f32,
-        };
-        let measured =
-            [read(Column::X)?, read(Column::Y)?, read(Column::Yaw)?, read(Column::Vx)?, read(Column::Wz)?];
-        let smooth = measured.each_ref().map(|values| smoothed(values));
-        let attitude = [run.column(Column::Roll), run.column(Column::Pitch)]
-            .map(|values| values.map(|values| Axis { time_s, n }.interpolated(values, false)));
-        let (gradient, class) = ground_on_the_way(&smooth, attitude, machine);
-        let settled = (SETTLING_S / STEP_S) as usize;
-        Ok(Self {
+        if evidence.speed_input == SpeedInput::Measured {
+            // What drives the model is no test of it.
+            measured[VX].fill(f64::NAN);
+        }
+        let (gradient, class) = ground_on_the_way(&smooth, signals.attitude(), machine);
+        let mut drive = Self {
             name,
-            time_s: time_s[0],
-            commands: speeds.iter().zip(&steerings).map(command).collect(),
+            time_s: run.time_s()[0],
+            evidence,
+            commands: commands(&inputs),
             travelled: [VX, WZ].map(|quantity| summed(&smooth[quantity])),
             measured,
             smooth,
             gradient,
             class,
-            starts: (settled..n - N_STEPS).step_by(STRIDE).collect(),
-        })
+            starts,
+        };
+        drive.extend_to(span.end + N_STEPS);
+        Ok(drive)
+    }
+
+    /// Goes on to so many rows, if there are fewer.
+    fn extend_to(&mut self, n: usize) {
+        if self.commands.len() >= n {
+            return;
+        }
+        self.measured.iter_mut().for_each(|values| values.resize(n, f64::NAN));
+        self.smooth.iter_mut().chain(&mut self.travelled).for_each(|values| hold_last(values, n));
+        self.gradient.iter_mut().chain([&mut self.class]).for_each(|values| hold_last(values, n));
+        hold_last(&mut self.commands, n);
     }
 
     /// Twice the same drive, with the earlier and with the later half of its starts.
@@ -118,7 +138,13 @@ impl Drive {
         [earlier, later].map(|starts| Self { starts: starts.to_vec(), ..self.clone() }).to_vec()
     }
 
-    /// Displacement along and across the heading at `start`, turn, speed and yaw rate, measured `steps` later.
+    /// Whether anything was measured at a row.
+    pub(crate) fn measures(&self, row: usize) -> bool {
+        self.measured.iter().any(|values| !values[row].is_nan())
+    }
+
+    /// Displacement along and across the heading at `start`, turn, speed and yaw rate, measured `steps` later; NaN what
+    /// was not measured.
     pub(crate) fn outcome(&self, start: usize, steps: usize) -> [f64; 5] {
         let [x, y, yaw, vx, wz] = &self.measured;
         let [x0, y0, yaw0, ..] = self.smooth.each_ref().map(|values| values[start]);
@@ -129,139 +155,69 @@ impl Drive {
     }
 }
 
-fn summed(rates: &[f64]) -> Vec<f64> {
-    let mut sum = 0.0;
-    let mut sums = Vec::with_capacity(rates.len());
-    for pair in rates.windows(2) {
-        sums.push(sum);
-        sum += 0.5 * (pair[0] + pair[1]) * STEP_S;
-    }
-    sums.push(sum);
-    sums
+/// The rows of a run from which rollouts may start.
+struct Span {
+    n_rows: usize,
+    /// Rows left out at the beginning.
+    settled: usize,
+    /// The first row from which no rollout may start.
+    end: usize,
 }
 
-/// A log's time axis, and the number of even steps over it.
-#[derive(Clone, Copy)]
-struct Axis<'a> {
-    time_s: &'a [f64],
-    n: usize,
-}
-
-impl Axis<'_> {
-    /// For each even step the last row at or before it.
-    fn rows(self) -> impl Iterator<Item = (f64, usize)> {
-        let mut row = 0;
-        (0..self.n).map(move |k| {
-            let now_s = self.time_s[0] + k as f64 * STEP_S;
-            while row + 1 < self.time_s.len() && self.time_s[row + 1] <= now_s + 1e-6 {
-                row += 1;
-            }
-            (now_s, row)
+impl Span {
+    fn of(run: &Run<'_>) -> Result<Self, DriveError> {
+        let time_s = run.time_s();
+        let found_s = time_s[time_s.len() - 1] - time_s[0];
+        if found_s < SHORTEST_S {
+            return Err(DriveError::Short { run: run.name().to_owned(), needed_s: SHORTEST_S, found_s });
+        }
+        let n_rows = (found_s / STEP_S + 1e-6).floor() as usize + 1;
+        let settled = (SETTLING_S / STEP_S) as usize;
+        Ok(if found_s >= SETTLING_S + LONG as f64 * STEP_S {
+            Self { n_rows, settled, end: n_rows - N_STEPS }
+        } else {
+            let settled = settled.min((SETTLING_SHARE * n_rows as f64) as usize);
+            Self { n_rows, settled, end: n_rows - HORIZONS[0] }
         })
     }
 
-    fn held(self, values: &[f64]) -> Vec<f64> {
-        self.rows().map(|(_, row)| values[row]).collect()
-    }
-
-    /// Linear between rows; an angle takes the short way round and is freed of jumps.
-    fn interpolated(self, values: &[f64], is_angle: bool) -> Vec<f64> {
-        let continuous = if is_angle { unwrapped(values) } else { values.to_vec() };
-        let between = |(now_s, row): (f64, usize)| match self.time_s.get(row + 1) {
-            None => continuous[row],
-            Some(next_s) => {
-                let share = (now_s - self.time_s[row]) / (next_s - self.time_s[row]);
-                continuous[row] + share.clamp(0.0, 1.0) * (continuous[row + 1] - continuous[row])
-            }
+    /// Every [`STRIDE`] rows, where what a rollout starts from was measured and no input is missing around it.
+    fn whole_starts(&self, inputs: &[Vec<f64>; 2], measured: &[Vec<f64>; 5]) -> Vec<usize> {
+        let mut missing_before = vec![0_u32; self.n_rows + 1];
+        for row in 0..self.n_rows {
+            let is_missing = inputs.iter().any(|input| input[row].is_nan());
+            missing_before[row + 1] = missing_before[row] + u32::from(is_missing);
+        }
+        let is_measured = |quantity: &usize| measured[*quantity].iter().any(|value| !value.is_nan());
+        let needed: Vec<usize> = [X, Y, YAW, VX].into_iter().filter(is_measured).collect();
+        let is_whole = |start: &usize| {
+            let (from, to) = (start.saturating_sub(self.settled), (start + N_STEPS).min(self.n_rows));
+            missing_before[from] == missing_before[to]
+                && needed.iter().all(|&quantity| !measured[quantity][*start].is_nan())
         };
-        self.rows().map(between).collect()
+        (self.settled..self.end).step_by(STRIDE).filter(is_whole).collect()
     }
 }
 
-fn unwrapped(angles: &[f64]) -> Vec<f64> {
-    let mut turns = 0.0;
-    let mut before = angles[0];
-    let mut continuous = Vec::with_capacity(angles.len());
-    for &angle in angles {
-        turns -= ((angle - before) / TAU).round();
-        before = angle;
-        continuous.push(angle + turns * TAU);
-    }
-    continuous
-}
-
-type GroundOnTheWay = ([Vec<f32>; 2], Vec<f32>);
-
-/// From the map under the measured positions; without a map from the measured attitude; without both, level.
-fn ground_on_the_way(
-    smooth: &[Vec<f64>; 5],
-    attitude: [Option<Vec<f64>>; 2],
-    machine: &Machine,
-) -> GroundOnTheWay {
-    let n = smooth[X].len();
-    let mut gradient = [vec![0.0; n], vec![0.0; n]];
-    let mut class = vec![0.0; n];
-    let attitude = attitude.map(|values| values.map(|values| smoothed(&values)));
-    for row in 0..n {
-        let yaw = smooth[YAW][row];
-        let slope = match (&machine.ground, &attitude) {
-            (Some(ground), _) => {
-                let position = [smooth[X][row], smooth[Y][row]];
-                class[row] = f32::from(ground.class_at(position));
-                ground.slope(position, yaw, machine.wheelbase_m)
-            }
-            (None, [Some(roll), Some(pitch)]) => [-pitch[row].tan(), roll[row].tan()],
-            _ => [0.0; 2],
-        };
-        let (sine, cosine) = yaw.sin_cos();
-        gradient[0][row] = (slope[0] * cosine - slope[1] * sine) as f32;
-        gradient[1][row] = (slope[0] * sine + slope[1] * cosine) as f32;
-    }
-    (gradient, class)
-}
-
-impl GroundMap {
-    fn node(&self, east: usize, north: usize) -> usize {
-        east * self.n_nodes[1] + north
-    }
-
-    /// Fractional node, kept within the map.
-    fn place(&self, position_m: [f64; 2]) -> [f64; 2] {
-        std::array::from_fn(|axis| {
-            let place = (position_m[axis] - self.origin_m[axis]) / self.resolution_m;
-            place.clamp(0.0, (self.n_nodes[axis] - 1) as f64)
-        })
-    }
-
-    /// Height by bilinear interpolation; beyond the map, of its border [m].
-    pub(crate) fn height_at(&self, position_m: [f64; 2]) -> f64 {
-        let [east, north] = self.place(position_m);
-        let [i, j] =
-            [(east, 0), (north, 1)].map(|(place, axis)| (place as usize).min(self.n_nodes[axis] - 2));
-        let (u, v) = (east - i as f64, north - j as f64);
-        let height = |i, j| f64::from(self.height_m[self.node(i, j)]);
-        (1.0 - u) * ((1.0 - v) * height(i, j) + v * height(i, j + 1))
-            + u * ((1.0 - v) * height(i + 1, j) + v * height(i + 1, j + 1))
-    }
-
-    /// Class of the nearest node.
-    pub(crate) fn class_at(&self, position_m: [f64; 2]) -> u8 {
-        let [east, north] = self.place(position_m).map(|place| place.round() as usize);
-        self.class[self.node(east, north)]
-    }
-
-    /// Rise per metre ahead and to the left, between the axles and over half a wheelbase across.
-    fn slope(&self, rear_m: [f64; 2], yaw_rad: f64, wheelbase_m: f64) -> [f64; 2] {
-        let (sine, cosine) = yaw_rad.sin_cos();
-        let at = |ahead: f64, left: f64| {
-            self.height_at([
-                rear_m[0] + ahead * cosine - left * sine,
-                rear_m[1] + ahead * sine + left * cosine,
-            ])
-        };
-        let (length, half_width) = (wheelbase_m, 0.25 * wheelbase_m);
-        let ahead = (at(length, 0.0) - at(0.0, 0.0)) / length;
-        let left = (at(0.5 * length, half_width) - at(0.5 * length, -half_width)) / (2.0 * half_width);
-        [ahead, left]
+fn hold_last<T: Clone>(values: &mut Vec<T>, n: usize) {
+    if let Some(last) = values.last().cloned() {
+        values.resize(n, last);
     }
 }
+
+/// Commands of every step; a missing one is the one before.
+fn commands([speeds, turns]: &[Vec<f64>; 2]) -> Vec<Command> {
+    let mut before = [0.0; 2];
+    let command = |(&speed, &turn): (&f64, &f64)| {
+        for (before, now) in before.iter_mut().zip([speed, turn]) {
+            *before = if now.is_nan() { *before } else { now };
+        }
+        Command { speed_mps: before[0] as f32, steering_rad: before[1] as f32 }
+    };
+    speeds.iter().zip(turns).map(command).collect()
+}
+
+#[cfg(test)]
+pub(crate) mod testing;
+#[cfg(test)]
+mod tests;

@@ -8,8 +8,10 @@ mod comparison;
 mod conditions;
 mod diagnosis;
 mod drive;
+mod evidence;
 mod explanation;
 mod findings;
+mod ground;
 mod intervals;
 mod judgement;
 mod least_squares;
@@ -18,6 +20,7 @@ mod residual_table;
 mod rollout;
 pub mod scratch_api;
 mod screening;
+mod signals;
 mod smoothing;
 mod verification;
 

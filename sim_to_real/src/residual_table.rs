@@ -1,6 +1,6 @@
 //! Residuals by quantity and horizon.
 
-use crate::comparison::root_mean_square;
+use crate::comparison::{n_measured, root_mean_square};
 use crate::drive::{HORIZONS, STEP_S};
 use crate::findings::{ResidualCell, ResidualState};
 use crate::rollout::{N_QUANTITIES, PER_START};
@@ -13,22 +13,33 @@ const STATES: [ResidualState; N_QUANTITIES] = [
     ResidualState::YawRate,
 ];
 
-/// One cell per quantity and horizon; without a null, `before` stands for the floor.
+/// One cell per quantity and horizon that was measured; without a null, `before` stands for the floor.
 pub(crate) fn residual_cells(
     before: &[f32],
     after: &[f32],
     null: Option<&[ResidualCell]>,
 ) -> Vec<ResidualCell> {
-    let size = |residuals: &[f32], place: usize| {
-        let values: Vec<f32> = residuals.chunks(PER_START).map(|start| start[place]).collect();
-        root_mean_square(&values)
+    let at = |residuals: &[f32], place: usize| -> Vec<f32> {
+        residuals.chunks(PER_START).map(|start| start[place]).collect()
     };
-    let cell = |place: usize| ResidualCell {
-        state: STATES[place % N_QUANTITIES],
-        horizon_s: HORIZONS[place / N_QUANTITIES] as f64 * STEP_S,
-        before: size(before, place),
-        after: size(after, place),
-        floor: null.map_or_else(|| size(before, place), |cells| cells[place].floor),
+    let cell = |place: usize| {
+        let own = at(before, place);
+        let (state, horizon_s) =
+            (STATES[place % N_QUANTITIES], HORIZONS[place / N_QUANTITIES] as f64 * STEP_S);
+        let nominal = |cells: &[ResidualCell]| {
+            cells
+                .iter()
+                .find(|cell| cell.state == state && cell.horizon_s == horizon_s)
+                .map(|cell| cell.floor)
+        };
+        let size = root_mean_square(&own);
+        (n_measured(&own) > 0).then(|| ResidualCell {
+            state,
+            horizon_s,
+            before: size,
+            after: root_mean_square(&at(after, place)),
+            floor: null.and_then(nominal).unwrap_or(size),
+        })
     };
-    (0..PER_START).map(cell).collect()
+    (0..PER_START).filter_map(cell).collect()
 }

@@ -1,6 +1,7 @@
 //! Rollouts of a model from the measured states of a drive, sixteen or eight at a time, against what was measured.
 
 use crate::drive::{Drive, HORIZONS, N_STEPS, STEP_S, VX, YAW};
+use crate::evidence::{SpeedInput, SpeedSource};
 use bicycle::effect::Effect;
 use bicycle::lanes::{Lanes, Portable, Real, Scalar};
 use bicycle::{GroundSample, LaneState, Limits, Model, SensorModel, Stepper};
@@ -45,7 +46,7 @@ impl Simulator {
         On(Portable, roll_out).call()
     }
 
-    /// What the commands ask of the actuators, over the whole drive: speed and steering angle.
+    /// What the commands ask of the actuators, over the whole drive: speed and steering angle, or what stands for them.
     fn asked(&self, drive: &Drive) -> Vec<[f32; 2]> {
         let mut memory = vec![0.0; self.stepper.n_slots()];
         self.stepper.settle(drive.commands[0], &mut memory);
@@ -160,13 +161,22 @@ impl RollOut<'_> {
             speed: real(origin.map(|origin| origin.speed_mps)),
             steering: zero,
         };
+        let evidence = self.drive.evidence;
         let mut turned = zero;
         let mut way: Way = [[[0.0; WIDEST]; 3]; N_STEPS + 1];
         let mut next_horizon = 0;
         for step in 0..N_STEPS {
-            let asked = [0, 1].map(|channel| real(rows.map(|row| self.asked[row + step][channel])));
+            let mut asked = [0, 1].map(|channel| real(rows.map(|row| self.asked[row + step][channel])));
+            if evidence.speed_input == SpeedInput::CommandedAcceleration {
+                asked[0] = asked[0].mul_add(lanes.real(STEP_S), state.speed);
+            }
             let ground = self.ground(lanes, rows.map(|row| row + step));
-            let rates = self.simulator.stepper.follow(&mut state, asked, &ground);
+            let stepper = &self.simulator.stepper;
+            let rates = if evidence.is_skid_steered() {
+                stepper.follow_yaw_rate(&mut state, asked, &ground)
+            } else {
+                stepper.follow(&mut state, asked, &ground)
+            };
             turned = rates.yaw_rate.mul_add(lanes.real(STEP_S), turned);
             way[step + 1] = [state.x, state.y, turned].map(|value| L::unpack(value.1));
             if step + 1 == HORIZONS[next_horizon] {
@@ -201,9 +211,13 @@ impl RollOut<'_> {
         let seen_yaw_rad = heading_rad - sensors.yaw_offset_rad;
         let (sine, cosine) = (seen_yaw_rad + 0.5 * turn_rad).sin_cos();
         let turns = (seen_yaw_rad + turn_rad) / TAU;
+        let speed_mps = match self.drive.evidence.speed_source {
+            SpeedSource::Command => self.asked[row][0],
+            _ => (self.drive.smooth[VX][row] / sensors.velocity_ratio) as f32,
+        };
         Origin {
             turns: (turns - turns.round()) as f32,
-            speed_mps: (self.drive.smooth[VX][row] / sensors.velocity_ratio) as f32,
+            speed_mps,
             seen_m: [-way_m * cosine, -way_m * sine],
             turn_rad,
             heading: heading_rad.sin_cos(),

@@ -3,7 +3,7 @@
 use crate::answer::{Answer, BeforeAfter};
 use crate::baseline::{Baseline, GapError, drives_of};
 use crate::causes::composed;
-use crate::comparison::root_mean_square;
+use crate::comparison::{n_measured, root_mean_square};
 use crate::diagnosis::Diagnosis;
 use crate::drive::{Drive, HORIZONS, STEP_S, X, Y, YAW};
 use crate::findings::{Prediction, PredictionModel, ResidualCell};
@@ -25,8 +25,8 @@ pub struct Verification {
     pub errors: [f64; 2],
     /// Closed part of the gap with its 90 % interval over stretches of the drives; absent where there is no gap.
     pub closed: Option<[f64; 3]>,
-    /// Root mean square distance after two seconds, before and after [m].
-    pub position_error_2s_m: BeforeAfter,
+    /// Root mean square distance after two seconds, before and after; absent where no position was measured then [m].
+    pub position_error_2s_m: Option<BeforeAfter>,
     /// Residuals by quantity and horizon.
     pub residuals: Vec<ResidualCell>,
     /// Every rollout of both models.
@@ -55,23 +55,27 @@ pub fn verify(
         let [low, high] = closed_interval(baseline, &before, &after);
         [closed, low.min(closed), high.max(closed)]
     });
-    let sigma = &baseline.yardstick.0;
-    let distance = |residuals: &[f32]| {
-        let last = PER_START - N_QUANTITIES;
-        let square = |start: &[f32]| {
-            (f64::from(start[last]) * sigma[last]).powi(2)
-                + (f64::from(start[last + 1]) * sigma[last + 1]).powi(2)
-        };
-        let n = (residuals.len() / PER_START) as f64;
-        (residuals.chunks(PER_START).map(square).sum::<f64>() / n).sqrt()
-    };
     Ok(Verification {
         errors,
         closed,
-        position_error_2s_m: BeforeAfter { before: distance(&before), after: distance(&after) },
+        position_error_2s_m: position_error(baseline, &before)
+            .zip(position_error(baseline, &after))
+            .map(|(before, after)| BeforeAfter { before, after }),
         residuals: residual_cells(&before, &after, Some(&baseline.null.cells)),
         predictions: predictions(baseline, &drives, diagnosis.effects()),
     })
+}
+
+/// Root mean square distance at the last horizon, over the rollouts that have a measured position there [m].
+fn position_error(baseline: &Baseline, residuals: &[f32]) -> Option<f64> {
+    let last = PER_START - N_QUANTITIES;
+    let square = |start: &[f32]| {
+        let [along, across] =
+            [last, last + 1].map(|place| f64::from(start[place]) * baseline.yardstick.0[place]);
+        (start[last] != 0.0 || start[last + 1] != 0.0).then(|| along * along + across * across)
+    };
+    let squares: Vec<f64> = residuals.chunks(PER_START).filter_map(square).collect();
+    (!squares.is_empty()).then(|| (squares.iter().sum::<f64>() / squares.len() as f64).sqrt())
 }
 
 /// Ends of the 90 % interval of the closed part, over stretches of the drives drawn with replacement.
@@ -80,7 +84,7 @@ fn closed_interval(baseline: &Baseline, before: &[f32], after: &[f32]) -> [f64; 
         before.chunks(STRETCH * PER_START).zip(after.chunks(STRETCH * PER_START)).collect();
     let sums = stretches.iter().map(|(before, after)| {
         let square = |values: &[f32]| values.iter().map(|value| f64::from(*value).powi(2)).sum::<f64>();
-        [square(before), square(after), before.len() as f64]
+        [square(before), square(after), n_measured(before) as f64]
     });
     let sums: Vec<[f64; 3]> = sums.collect();
     let mut random = Xoshiro256PlusPlus::seed_from_u64(0);
@@ -107,8 +111,10 @@ fn predictions(baseline: &Baseline, drives: &[Drive], causes: &[Effect]) -> Vec<
         for (log, drive) in drives.iter().enumerate() {
             let predicted = simulator.predict(drive);
             for (&start, outcomes) in drive.starts.iter().zip(predicted.chunks(PER_START)) {
+                let ends_within = |(_, steps): &(&[f32], usize)| drive.measures(start + steps);
                 let of = |(outcome, steps)| prediction(drive, (log, start), steps, (model, outcome));
-                predictions.extend(outcomes.chunks(N_QUANTITIES).zip(HORIZONS).map(of));
+                let horizons = outcomes.chunks(N_QUANTITIES).zip(HORIZONS);
+                predictions.extend(horizons.filter(ends_within).map(of));
             }
         }
     }
@@ -145,7 +151,7 @@ impl Verification {
         shrink.closed = self.closed.map(|closed| closed[0]);
         shrink.closed_low = self.closed.map(|closed| closed[1]);
         shrink.closed_high = self.closed.map(|closed| closed[2]);
-        shrink.position_error_2s_m = Some(self.position_error_2s_m);
+        shrink.position_error_2s_m = self.position_error_2s_m;
         answer
     }
 }
