@@ -34,6 +34,7 @@ pub fn screen(machine: &Machine, log: &DriveLog) -> Vec<Suspicion> {
     if found.is_empty() {
         found.extend(continuity::breaks(&runs, machine));
         found.extend(excitation::frozen(&runs));
+        found.extend(excitation::stalled(&runs));
         found.extend(excitation::beyond(&runs, machine));
     }
     found.sort_by_key(Suspicion::gravity);

@@ -4,6 +4,7 @@ use bicycle::Column;
 
 use super::Machine;
 use super::signals::{Signal, Signals};
+use super::statistics::quantile;
 use super::suspicion::Suspicion;
 
 /// Way that is a drive, in wheelbases.
@@ -11,6 +12,11 @@ const WAY_MIN_WHEELBASES: f64 = 2.0;
 /// A value that repeats exactly for this long is no measurement [s], if the vehicle moved this far meanwhile [m].
 const HOLD_S: f64 = 1.0;
 const HOLD_WAY_M: f64 = 1.0;
+/// Driven over commanded speed above which the vehicle moves, and below which it stands.
+const MOVES_SHARE: f64 = 0.5;
+const STANDS_SHARE: f64 = 0.03;
+/// A drive that stands for this long is stuck and not slow [s].
+const STALL_S: f64 = 3.0;
 /// Commands may exceed the description by rounding only.
 const LIMIT_MARGIN: f64 = 1.05;
 /// Share of positions that may lie beside the map.
@@ -59,6 +65,39 @@ fn longest_hold(run: &Signals<'_>, column: Column) -> Option<Suspicion> {
     let is_frozen = hold_s > HOLD_S && way_m > HOLD_WAY_M && steers;
     let (value, place, speed_mps) = (values[start], run.place(start), way_m / hold_s);
     is_frozen.then(|| Suspicion::Frozen { column: column.name(), value, place, hold_s, speed_mps })
+}
+
+/// Stretches in which the vehicle stands although it is asked for a speed at which it moves elsewhere.
+pub(super) fn stalled(runs: &[Signals<'_>]) -> Option<Suspicion> {
+    let rows = runs.iter().filter_map(|run| Some((run.commanded_speed?.values, run.speed?.values)));
+    let pairs = rows.flat_map(|(asked, driven)| asked.iter().zip(driven));
+    let moved = pairs.filter(|(asked, driven)| driven.abs() > MOVES_SHARE * asked.abs() && asked.abs() > 0.0);
+    let moves_mps = quantile(moved.map(|(asked, _)| asked.abs()).collect(), 0.25);
+    let stall = |run: &Signals<'_>| {
+        let (asked, driven) = (run.commanded_speed?.values, run.speed?.values);
+        let stands =
+            |row: usize| asked[row].abs() > moves_mps && driven[row].abs() < STANDS_SHARE * asked[row].abs();
+        let (start, end) = longest_stretch(run.n(), stands)?;
+        let length_s = run.time_s[end] - run.time_s[start];
+        let (place, asked_mps) = (run.place(start), asked[start]);
+        (length_s > STALL_S).then_some(Suspicion::Stalled { place, length_s, asked_mps })
+    };
+    runs.iter().find_map(stall)
+}
+
+/// First and last row of the longest stretch of rows that `is_in`.
+fn longest_stretch(n: usize, is_in: impl Fn(usize) -> bool) -> Option<(usize, usize)> {
+    let mut longest: Option<(usize, usize)> = None;
+    let mut start = None;
+    for row in 0..n {
+        start = if is_in(row) { start.or(Some(row)) } else { None };
+        if let Some(start) = start
+            && longest.is_none_or(|(from, to)| row - start > to - from)
+        {
+            longest = Some((start, row));
+        }
+    }
+    longest
 }
 
 /// Commands and places that the vehicle's description does not allow.

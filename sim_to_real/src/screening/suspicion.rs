@@ -203,6 +203,19 @@ pub enum Suspicion {
         /// Mean speed meanwhile [m/s].
         speed_mps: f64,
     },
+    /// The vehicle is stuck.
+    #[error(
+        "the vehicle stands for {length_s:.1} s from {place} on although {asked_mps:.2} m/s are commanded: stuck? A diagnosis \
+         takes it for a weak drive"
+    )]
+    Stalled {
+        /// First row.
+        place: Place,
+        /// How long [s].
+        length_s: f64,
+        /// Commanded speed [m/s].
+        asked_mps: f64,
+    },
     /// More than the vehicle's description allows.
     #[error(
         "{column}: expected at most {limit:.3} as the vehicle's description says, found {found:.3} in {place}"
@@ -286,6 +299,7 @@ impl Suspicion {
             | Self::Reset { .. }
             | Self::YawLeap { .. }
             | Self::Frozen { .. }
+            | Self::Stalled { .. }
             | Self::BeyondLimit { .. }
             | Self::OffMap { .. }
             | Self::LittleSteering { .. }

@@ -320,6 +320,30 @@ fn frozen_measurements_are_told() {
 }
 
 #[test]
+fn a_vehicle_that_is_stuck_is_told_but_not_one_that_slow_commands_do_not_move() {
+    let still = |row: &DriveRow| {
+        [Column::X, Column::Y, Column::Yaw, Column::Z]
+            .iter()
+            .fold(*row, |row, column| row.with(*column, f64::NAN))
+    };
+    let stands = |row: &DriveRow, is_standing: bool| {
+        if is_standing { row.with(Column::Vx, 0.01 * row.time_s.sin()).with(Column::Wz, 0.0) } else { *row }
+    };
+    let stuck = rows(1000).iter().map(|row| stands(&still(row), row.time_s > 15.0)).collect::<Vec<_>>();
+    let told = told(&log(&stuck));
+    // 15 s is row 751, the first to stand is the next; up to row 1000 that makes 248 steps.
+    assert!(
+        told.starts_with("the vehicle stands for 5.0 s from row 752 (t = 15.02 s) on although "),
+        "{told}"
+    );
+    let slow = rows(1000)
+        .iter()
+        .map(|row| stands(&still(row), row.value(Column::CmdSpeed) < 3.6))
+        .collect::<Vec<_>>();
+    assert_eq!(screen(&machine(), &log(&slow)), []);
+}
+
+#[test]
 fn what_the_description_does_not_allow_is_told() {
     let narrow = Machine { steering_max_rad: 0.2, ..machine() };
     let found = screen(&narrow, &log(&rows(1000)));
