@@ -4,7 +4,7 @@ use crate::comparison::{Comparison, Yardstick};
 use crate::drive::Drive;
 use crate::least_squares::{Coordinate, fit};
 use bicycle::Effect;
-use bicycle::effect::{CATALOGUE, Parameter};
+use bicycle::effect::Parameter;
 
 /// What every machine has a little of, in order of action, with the values that the fit starts from.
 const ORDINARY: [(&str, [f64; 4]); 17] = [

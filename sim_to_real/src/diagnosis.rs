@@ -12,6 +12,7 @@ use crate::intervals::named_effects;
 use crate::judgement::{Judgement, Weighed};
 use crate::machine::Machine;
 use crate::residual_table::residual_cells;
+use crate::without_simulator::of_evidence;
 use bicycle::{DriveLog, Effect};
 
 /// What the real drives alone have shown.
@@ -23,13 +24,13 @@ pub struct Diagnosis {
     pub findings: Findings,
     /// Error of the calibrated nominal model and of the repaired one on the real drives, in standard deviations.
     pub errors: [f64; 2],
-    pub debug: Vec<(Vec<String>, Vec<f64>, f64)>,
     pub(crate) effects: Vec<Effect>,
     pub(crate) verdict: Verdict,
     pub(crate) ranking: Vec<Ranked>,
     pub(crate) credible_set: Vec<String>,
     pub(crate) predicted_closed: Option<f64>,
     pub(crate) floor: f64,
+    pub(crate) notes: Vec<String>,
 }
 
 /// Metric of [`Shrink`].
@@ -64,12 +65,12 @@ pub fn diagnose(baseline: &Baseline, machine: &Machine, real: &[DriveLog]) -> Re
         findings,
         errors: [root_mean_square(&before), root_mean_square(&after)],
         predicted_closed: predicted_closed(baseline, &drives, &causes),
-        debug: judgement.debug,
         effects: causes,
         verdict: judgement.verdict,
         ranking: judgement.ranking,
         credible_set: judgement.credible_set,
         floor: baseline.null.error,
+        notes: of_evidence(&all),
     })
 }
 
@@ -141,7 +142,7 @@ impl Diagnosis {
                 learned_bound_closed: None,
                 position_error_2s_m: None,
             },
-            advice: Vec::new(),
+            advice: self.notes.clone(),
         }
     }
 }

@@ -16,6 +16,8 @@ const PRICE_OF_A_SECOND_SENSOR: f64 = 0.15;
 const TEMPERATURE: f64 = 0.035;
 /// Explanations this much less probable than the best are told apart from it.
 const TOLD_APART: f64 = 0.05;
+/// Where the data tell nothing apart, this many names are enough to say so.
+const MOST_NAMES: usize = 6;
 /// What is left is unknown when its error exceeds this many floors and
 const UNKNOWN_IN_FLOORS: f64 = 1.55;
 /// this share of the gap.
@@ -38,7 +40,6 @@ pub(crate) struct Judgement {
     pub(crate) announced: Vec<Effect>,
     pub(crate) ranking: Vec<Ranked>,
     pub(crate) credible_set: Vec<String>,
-    pub(crate) debug: Vec<(Vec<String>, Vec<f64>, f64)>,
 }
 
 /// What an explanation must gain to be believed.
@@ -70,23 +71,8 @@ impl Weighed {
         all.sort_by(|a, b| a.0.total_cmp(&b.0));
         let best = all[0].1;
         let (verdict, announced) = self.verdict(best, null);
-        Judgement {
-            verdict,
-            announced,
-            ranking: ranking(&all),
-            credible_set: self.credible_set(best),
-            debug: std::iter::once(&self.none)
-                .chain(self.singles.iter())
-                .chain(self.pairs.iter())
-                .map(|e| {
-                    (
-                        e.ids().iter().map(|x| x.to_string()).collect(),
-                        e.causes.iter().map(|c| c.values()[0]).collect(),
-                        e.loss,
-                    )
-                })
-                .collect(),
-        }
+        let credible_set = self.credible_set(best);
+        Judgement { verdict, announced, ranking: ranking(&all), credible_set }
     }
 
     fn verdict(&self, best: &Explanation, null: &Null) -> (Verdict, Vec<Effect>) {
@@ -113,6 +99,7 @@ impl Weighed {
             _ => near.flat_map(Explanation::ids).map(str::to_owned).collect(),
         };
         ids.dedup();
+        ids.truncate(MOST_NAMES);
         ids
     }
 }
