@@ -62,6 +62,11 @@ pub enum Deviation {
         /// By this [s].
         added_s: f64,
     },
+    /// The motor controller smooths the speed command.
+    ThrottleSmoothing {
+        /// Time constant [s].
+        time_s: f64,
+    },
     /// Speed commands wait longer on their way.
     MotorDelay {
         /// By this [s].
@@ -240,6 +245,7 @@ impl Deviation {
                 ("tyre_stiffness", vec![("front", front, 0.05, 5.0), ("rear", rear, 0.05, 5.0)])
             }
             Self::MotorResponse { added_s } => ("motor_response", vec![("added_s", added_s, 0.0, 5.0)]),
+            Self::ThrottleSmoothing { time_s } => ("throttle_smoothing", vec![("time_s", time_s, 0.0, 5.0)]),
             Self::MotorDelay { added_s } => ("motor_delay", vec![("added_s", added_s, 0.0, 5.0)]),
             Self::MotorRamp { acceleration_mps2 } => {
                 ("motor_ramp", vec![("acceleration_mps2", acceleration_mps2, 1e-3, 1e3)])

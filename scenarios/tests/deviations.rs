@@ -170,6 +170,21 @@ fn a_slower_motor_follows_the_ramp_by_its_response() {
 }
 
 #[test]
+fn a_smoothed_throttle_reaches_1_minus_1_over_e_after_its_time_and_keeps_its_force() {
+    let mut vehicle = prompt(machine());
+    vehicle.tyre.rolling_resistance = 0.0;
+    vehicle.wheel.spin_inertia_kgm2 = 0.1;
+    let deviations = [Deviation::MotorDroop, Deviation::ThrottleSmoothing { time_s: 0.6 }];
+    let mut plant = on(level(firm()), &vehicle, &deviations);
+    drive(&mut plant, 1.0, 0.0, 0.6);
+    near(forward_mps(&plant), 1.0 - (-1.0f64).exp(), 0.03);
+    // A slope costs what it costs without the smoothing.
+    let smooth = Some(Deviation::ThrottleSmoothing { time_s: 0.6 });
+    let [sound, smooth] = [None, smooth].map(|smooth| drooping_mps(incline(0.1, firm()), smooth, 3.0));
+    near(smooth, sound, 1e-3);
+}
+
+#[test]
 fn ramp_and_torque_limit_the_acceleration() {
     let mut plant = on_level(&[Deviation::MotorRamp { acceleration_mps2: 0.5 }]);
     drive(&mut plant, 4.0, 0.0, 2.0);

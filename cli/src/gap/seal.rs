@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 
 use formats::{DriveLogFile, GapCase, GapGround, GapKind, GapLabel, GapNoise, GapVehicle};
-use scenarios::{Amount, DrawnCase, Style, TestDriveError, TestMachine, seed_of, test_drive};
+use scenarios::{Amount, Deviation, DrawnCase, Style, TestDriveError, TestMachine, seed_of, test_drive};
 use terrain::TerrainClass;
 
 use super::workers::{Bar, work};
@@ -14,8 +14,8 @@ use crate::{UsageError, WorkFailed};
 
 /// Kinds of machines that others are drawn around.
 const BASES: [&str; 4] = ["rc_car", "pietra_full_size", "buggy_fifth", "sedan"];
-/// Name of the plant in labels.
-const PLANT: &str = "surefoot";
+/// Names of the plant in labels: with a speed controller that has an integral, and without.
+const PLANTS: [&str; 2] = ["surefoot", "surefoot_droop"];
 /// Cases for each machine, about.
 const CASES_PER_MACHINE: usize = 10;
 /// Machines and faults with which nobody stays on the wheels are drawn again, at most so often.
@@ -131,7 +131,7 @@ impl Places {
                 write_drive(&folder.join(file), log)?;
             }
             formats::write_gap_case(&folder, &filed(&name, &machine.vehicle.name))?;
-            return Ok((name, labelled(&case, &machine.vehicle.name)));
+            return Ok((name, labelled(&case, machine)));
         }
         Err(WorkFailed(format!("{name}: expected a fault that can be driven with, found none")).into())
     }
@@ -235,10 +235,11 @@ fn filed(name: &str, vehicle: &str) -> GapCase {
     }
 }
 
-fn labelled(case: &DrawnCase, vehicle: &str) -> GapLabel {
+fn labelled(case: &DrawnCase, machine: &TestMachine) -> GapLabel {
+    let droops = machine.peculiarities.contains(&Deviation::MotorDroop);
     GapLabel {
-        vehicle: vehicle.to_owned(),
-        plant: PLANT.to_owned(),
+        vehicle: machine.vehicle.name.clone(),
+        plant: PLANTS[usize::from(droops)].to_owned(),
         kind: match case.amount {
             Amount::None => GapKind::None,
             Amount::Single => GapKind::Single,

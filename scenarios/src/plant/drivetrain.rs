@@ -52,6 +52,9 @@ pub(crate) struct Drivetrain {
     /// Growth of the integral over what the servo is tuned to [-].
     integral_share: f64,
     dead_band_mps: f64,
+    smoothing_s: f64,
+    /// The command behind the smoothing.
+    smoothed_mps: f64,
     sag_per_s: f64,
     /// Voltage of the battery over that at the start [-].
     voltage: f64,
@@ -83,6 +86,8 @@ impl Drivetrain {
             brake_nm: 0.0,
             integral_share: 1.0,
             dead_band_mps: 0.0,
+            smoothing_s: 0.0,
+            smoothed_mps: 0.0,
             sag_per_s: 0.0,
             voltage: 1.0,
         }
@@ -94,6 +99,7 @@ impl Drivetrain {
             match *deviation {
                 Deviation::MotorDroop => self.integral_share = 0.0,
                 Deviation::MotorDeadBand { speed_mps } => self.dead_band_mps += speed_mps,
+                Deviation::ThrottleSmoothing { time_s } => self.smoothing_s += time_s,
                 Deviation::BatterySag { per_s } => self.sag_per_s += per_s,
                 _ => {}
             }
@@ -120,8 +126,13 @@ impl Drivetrain {
         })
     }
 
-    /// What is left of a command behind the dead band and under the battery's voltage, which falls while driving.
+    /// What is left of a command behind smoothing and dead band and under the battery's voltage, which falls while
+    /// driving.
     fn understood_mps(&mut self, commanded_mps: f64, step_s: f64) -> f64 {
+        let change_mps = (commanded_mps - self.smoothed_mps) * step_s / (self.smoothing_s + step_s);
+        self.smoothed_mps =
+            if self.smoothing_s > 0.0 { self.smoothed_mps + change_mps } else { commanded_mps };
+        let commanded_mps = self.smoothed_mps;
         if commanded_mps.abs() < self.dead_band_mps.max(PARKING_SPEED_MPS) {
             return 0.0;
         }

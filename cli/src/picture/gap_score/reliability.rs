@@ -31,7 +31,6 @@ pub(super) fn page(calibration: &Calibration, title: &str) -> Option<Canvas> {
     let perfect = Stroke { colour: Rgb::INK_SOFT, width: 2.0, dash: "8 6" };
     canvas.line(axes.place(0.0, 0.0), axes.place(1.0, 1.0), perfect);
     let points: Vec<_> = calibration.bins.iter().map(|bin| axes.place(bin.mean_score, bin.share)).collect();
-    canvas.polyline(&points, Stroke::solid(Rgb::ROLL, 2.0));
     for (bin, &point) in calibration.bins.iter().zip(&points) {
         let n_true = (bin.share * bin.n as f64).round() as usize;
         let [low, high] = bench::navigation::wilson_interval(n_true, bin.n);
