@@ -81,7 +81,7 @@ pub const ODOMETRY: Channel<Stamp, OdometryRecord> = Channel {
 /// What the range sensor sees: whoever runs the vehicle.
 pub const SCAN: Channel<ScanHeader, PointRecord> = Channel {
     name: "scan",
-    depth: 4,
+    depth: 2,
     n_readers: 4,
     silence_ns: 1000 * MILLISECOND_NS,
     check: payload::check_scan,

@@ -73,7 +73,8 @@ impl Learning {
     fn look(&mut self) -> Result<(), RuntimeError> {
         let maker = &mut self.maker;
         self.missions.poll(|_, missions| missions.iter().for_each(|mission| maker.set_goal(mission.goal_m)));
-        if let Some(surface) = self.surfaces.newest() {
+        // What is judged is sent, so that whoever has the messages knows all that was judged.
+        if let Some(surface) = self.surfaces.newest().filter(|_| maker.has_goal()) {
             let began_ns = clock::now_ns();
             let header = surface.user_header();
             self.stuck.poll(|stamp, stuck| stuck.iter().for_each(|stuck| maker.note_stuck(stamp, stuck)));

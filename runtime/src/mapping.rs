@@ -235,7 +235,7 @@ impl Fallback {
 
     fn is_needed(&self) -> bool {
         let heard_at_ns = self.learned.heard_at_ns().unwrap_or(self.began_ns);
-        clock::now_ns().saturating_sub(heard_at_ns) > LEARNING_SILENCE_NS
+        self.maker.has_goal() && clock::now_ns().saturating_sub(heard_at_ns) > LEARNING_SILENCE_NS
     }
 
     fn speak(&mut self, header: &SurfaceHeader, cells: &[[f32; 8]]) -> Result<(), RuntimeError> {

@@ -11,7 +11,7 @@ use crate::status::{Health, Meter, Role};
 use crate::watchdog::Watchdog;
 
 /// Returns of a sweep at the most.
-pub const POINTS_MAX: usize = 1 << 17;
+pub const POINTS_MAX: usize = 1 << 16;
 /// Odometry and commands per second [Hz].
 const RATE_HZ: f64 = 50.0;
 /// Sweeps of the range sensor per second [Hz].

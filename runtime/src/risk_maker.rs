@@ -40,6 +40,11 @@ impl RiskMaker {
         self.goal_m = Some(goal_m);
     }
 
+    /// Whether it has been said where to: before, no surface is worth judging.
+    pub fn has_goal(&self) -> bool {
+        self.goal_m.is_some()
+    }
+
     /// Remembers where the vehicle got stuck.
     pub fn note_stuck(&mut self, stamp: &Stamp, stuck: &StuckRecord) {
         self.stuck = stamp.source();

@@ -131,8 +131,7 @@ impl<'a> Supervisor<'a> {
     }
 
     fn end_all(&mut self) {
-        let running = || clock::now_ns();
-        let until_ns = running() + PATIENCE_NS;
+        let until_ns = clock::now_ns() + PATIENCE_NS;
         self.kept.iter_mut().for_each(|kept| kept.signal(Signal::TERM));
         while self.kept.iter_mut().any(Kept::is_running) && clock::now_ns() < until_ns {
             clock::sleep_until(clock::now_ns() + POLL_NS / 4);

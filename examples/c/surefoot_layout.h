@@ -1,0 +1,298 @@
+/* Messages of Surefoot, layout version 1. Written from its types; do not edit. */
+#ifndef SUREFOOT_LAYOUT_H
+#define SUREFOOT_LAYOUT_H
+
+#include <assert.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#define SUREFOOT_LAYOUT_VERSION 1u
+
+/* First field of every header: whose message it is, and of when. Known to the channels as surefoot.Stamp. */
+typedef struct SurefootStamp {
+    /* Version of the layouts, LAYOUT_VERSION. */
+    uint32_t layout_version;
+    /* Zero. */
+    uint32_t reserved;
+    /* When the publishing process began, which tells one life of it from the next [ns]. */
+    uint64_t epoch_ns;
+    /* Counts the messages of one publisher on one channel from 1. */
+    uint64_t sequence;
+    /* When what it says was true, monotonic [ns]. */
+    uint64_t valid_at_ns;
+    /* When it was sent, monotonic [ns]. */
+    uint64_t published_at_ns;
+} SurefootStamp;
+static_assert(sizeof(SurefootStamp) == 40, "Stamp");
+static_assert(offsetof(SurefootStamp, layout_version) == 0, "Stamp.layout_version");
+static_assert(offsetof(SurefootStamp, reserved) == 4, "Stamp.reserved");
+static_assert(offsetof(SurefootStamp, epoch_ns) == 8, "Stamp.epoch_ns");
+static_assert(offsetof(SurefootStamp, sequence) == 16, "Stamp.sequence");
+static_assert(offsetof(SurefootStamp, valid_at_ns) == 24, "Stamp.valid_at_ns");
+static_assert(offsetof(SurefootStamp, published_at_ns) == 32, "Stamp.published_at_ns");
+
+/* A message that another one was made from. Known to the channels as surefoot.Source. */
+typedef struct SurefootSource {
+    /* When its publisher began [ns]; 0 = none. */
+    uint64_t epoch_ns;
+    /* Its sequence number. */
+    uint64_t sequence;
+} SurefootSource;
+static_assert(sizeof(SurefootSource) == 16, "Source");
+static_assert(offsetof(SurefootSource, epoch_ns) == 0, "Source.epoch_ns");
+static_assert(offsetof(SurefootSource, sequence) == 8, "Source.sequence");
+
+/* Where the cells of a map lie: square, row-major from the south-west corner. Known to the channels as surefoot.Grid. */
+typedef struct SurefootGrid {
+    /* Edge of a cell [m]. */
+    double resolution_m;
+    /* Lattice column and row of the first cell; its south-west corner is origin x resolution_m. */
+    int64_t origin[2];
+    /* Rows, northwards. */
+    uint64_t n_rows;
+    /* Columns, eastwards. */
+    uint64_t n_cols;
+} SurefootGrid;
+static_assert(sizeof(SurefootGrid) == 40, "Grid");
+static_assert(offsetof(SurefootGrid, resolution_m) == 0, "Grid.resolution_m");
+static_assert(offsetof(SurefootGrid, origin) == 8, "Grid.origin");
+static_assert(offsetof(SurefootGrid, n_rows) == 24, "Grid.n_rows");
+static_assert(offsetof(SurefootGrid, n_cols) == 32, "Grid.n_cols");
+
+/* Where the vehicle is and how it moves, at stamp.valid_at_ns. Known to the channels as surefoot.Odometry. */
+typedef struct SurefootOdometryRecord {
+    /* Rear axle's centre in the map frame: east, north, up [m]. */
+    double position_m[3];
+    /* Roll, pitch, yaw [rad]. */
+    double attitude_rad[3];
+    /* Forward and leftward velocity in the body frame [m/s]. */
+    double velocity_mps[2];
+    /* Yaw rate [rad/s]. */
+    double yaw_rate_radps;
+    /* Mean circumferential speed of the driven wheels [m/s]. */
+    double wheel_speed_mps;
+    /* Measured angle of the front wheels, left positive [rad]. */
+    double steering_rad;
+} SurefootOdometryRecord;
+static_assert(sizeof(SurefootOdometryRecord) == 88, "OdometryRecord");
+static_assert(offsetof(SurefootOdometryRecord, position_m) == 0, "OdometryRecord.position_m");
+static_assert(offsetof(SurefootOdometryRecord, attitude_rad) == 24, "OdometryRecord.attitude_rad");
+static_assert(offsetof(SurefootOdometryRecord, velocity_mps) == 48, "OdometryRecord.velocity_mps");
+static_assert(offsetof(SurefootOdometryRecord, yaw_rate_radps) == 64, "OdometryRecord.yaw_rate_radps");
+static_assert(offsetof(SurefootOdometryRecord, wheel_speed_mps) == 72, "OdometryRecord.wheel_speed_mps");
+static_assert(offsetof(SurefootOdometryRecord, steering_rad) == 80, "OdometryRecord.steering_rad");
+
+/* Header of a sweep of the range sensor; the payload is one PointRecord per return. Known to the channels as surefoot.ScanHeader. */
+typedef struct SurefootScanHeader {
+    /* Whose and of when. */
+    SurefootStamp stamp;
+    /* Where the rays start, in the body frame [m]. */
+    float origin_m[3];
+    /* Zero. */
+    uint32_t reserved;
+} SurefootScanHeader;
+static_assert(sizeof(SurefootScanHeader) == 56, "ScanHeader");
+static_assert(offsetof(SurefootScanHeader, stamp) == 0, "ScanHeader.stamp");
+static_assert(offsetof(SurefootScanHeader, origin_m) == 40, "ScanHeader.origin_m");
+static_assert(offsetof(SurefootScanHeader, reserved) == 52, "ScanHeader.reserved");
+
+/* One return of the range sensor. Known to the channels as surefoot.Point. */
+typedef struct SurefootPointRecord {
+    /* Place in the body frame [m]. */
+    float position_m[3];
+    /* What it is: 0 open, 1 loose, 2 vegetation, 3 obstacle. */
+    uint32_t class_number;
+} SurefootPointRecord;
+static_assert(sizeof(SurefootPointRecord) == 16, "PointRecord");
+static_assert(offsetof(SurefootPointRecord, position_m) == 0, "PointRecord.position_m");
+static_assert(offsetof(SurefootPointRecord, class_number) == 12, "PointRecord.class_number");
+
+/* Header of the map of the ground; the payload is eight numbers per cell, see docs/runtime.md. Known to the channels as surefoot.SurfaceHeader. */
+typedef struct SurefootSurfaceHeader {
+    /* Whose and of when: valid_at_ns is that of the scan. */
+    SurefootStamp stamp;
+    /* Where the cells lie. */
+    SurefootGrid grid;
+    /* The scan that was fused last. */
+    SurefootSource scan;
+    /* The odometry that it was fused at. */
+    SurefootOdometryRecord odometry;
+    /* When that was measured [ns]. */
+    uint64_t odometry_at_ns;
+    /* What happened since the last message: 1 = a scan was fused, 2 = the localisation jumped. */
+    uint64_t event;
+    /* The jump, if that is what happened: east, north, up [m]. */
+    double jump_m[3];
+    /* All jumps so far together [m]. */
+    double shift_m[3];
+    /* XXH3 of the payload. */
+    uint64_t content_hash;
+} SurefootSurfaceHeader;
+static_assert(sizeof(SurefootSurfaceHeader) == 256, "SurfaceHeader");
+static_assert(offsetof(SurefootSurfaceHeader, stamp) == 0, "SurfaceHeader.stamp");
+static_assert(offsetof(SurefootSurfaceHeader, grid) == 40, "SurfaceHeader.grid");
+static_assert(offsetof(SurefootSurfaceHeader, scan) == 80, "SurfaceHeader.scan");
+static_assert(offsetof(SurefootSurfaceHeader, odometry) == 96, "SurfaceHeader.odometry");
+static_assert(offsetof(SurefootSurfaceHeader, odometry_at_ns) == 184, "SurfaceHeader.odometry_at_ns");
+static_assert(offsetof(SurefootSurfaceHeader, event) == 192, "SurfaceHeader.event");
+static_assert(offsetof(SurefootSurfaceHeader, jump_m) == 200, "SurfaceHeader.jump_m");
+static_assert(offsetof(SurefootSurfaceHeader, shift_m) == 224, "SurfaceHeader.shift_m");
+static_assert(offsetof(SurefootSurfaceHeader, content_hash) == 248, "SurfaceHeader.content_hash");
+
+/* Header of a risk map; the payload is risks, grounds and times to the goal, see docs/runtime.md. Known to the channels as surefoot.RiskHeader. */
+typedef struct SurefootRiskHeader {
+    /* Whose and of when: valid_at_ns is that of the scan. */
+    SurefootStamp stamp;
+    /* Where the cells lie. */
+    SurefootGrid grid;
+    /* Yaw bins; bin k is centred at (k + 1/2) 2 pi / n_yaws. */
+    uint64_t n_yaws;
+    /* Who judged the ground: 1 = what was learned, 2 = physics alone. */
+    uint64_t author;
+    /* The map of the ground that was judged. */
+    SurefootSource surface;
+    /* Stuck poses that it takes into account. */
+    SurefootSource stuck;
+    /* Where the time to the goal leads [m]. */
+    double goal_m[2];
+    /* First 8 bytes of the SHA-256 of the networks' weights; 0 = none. */
+    uint64_t checkpoint;
+    /* XXH3 of the payload. */
+    uint64_t content_hash;
+} SurefootRiskHeader;
+static_assert(sizeof(SurefootRiskHeader) == 160, "RiskHeader");
+static_assert(offsetof(SurefootRiskHeader, stamp) == 0, "RiskHeader.stamp");
+static_assert(offsetof(SurefootRiskHeader, grid) == 40, "RiskHeader.grid");
+static_assert(offsetof(SurefootRiskHeader, n_yaws) == 80, "RiskHeader.n_yaws");
+static_assert(offsetof(SurefootRiskHeader, author) == 88, "RiskHeader.author");
+static_assert(offsetof(SurefootRiskHeader, surface) == 96, "RiskHeader.surface");
+static_assert(offsetof(SurefootRiskHeader, stuck) == 112, "RiskHeader.stuck");
+static_assert(offsetof(SurefootRiskHeader, goal_m) == 128, "RiskHeader.goal_m");
+static_assert(offsetof(SurefootRiskHeader, checkpoint) == 144, "RiskHeader.checkpoint");
+static_assert(offsetof(SurefootRiskHeader, content_hash) == 152, "RiskHeader.content_hash");
+
+/* What the vehicle shall do. Known to the channels as surefoot.Command. */
+typedef struct SurefootCommandRecord {
+    /* Forward speed, negative in reverse [m/s]. */
+    float speed_mps;
+    /* Angle of the front wheels, left positive [rad]. */
+    float steering_rad;
+    /* 1 = drive, 2 = hold, 3 = stop; the command counts only when driving. */
+    uint32_t decision;
+    /* Why, when it is not driving; see docs/runtime.md. */
+    uint32_t reason;
+} SurefootCommandRecord;
+static_assert(sizeof(SurefootCommandRecord) == 16, "CommandRecord");
+static_assert(offsetof(SurefootCommandRecord, speed_mps) == 0, "CommandRecord.speed_mps");
+static_assert(offsetof(SurefootCommandRecord, steering_rad) == 4, "CommandRecord.steering_rad");
+static_assert(offsetof(SurefootCommandRecord, decision) == 8, "CommandRecord.decision");
+static_assert(offsetof(SurefootCommandRecord, reason) == 12, "CommandRecord.reason");
+
+/* A decision with all that it was made from. Known to the channels as surefoot.DecisionRecord. */
+typedef struct SurefootDecisionRecord {
+    /* What was decided. */
+    SurefootCommandRecord command;
+    /* Number of the decision since the process began. */
+    uint64_t cycle;
+    /* When it was made [ns]. */
+    uint64_t decided_at_ns;
+    /* The odometry that was taken in last. */
+    SurefootSource odometry;
+    /* How many were taken in since the decision before, without a gap up to the last. */
+    uint64_t n_odometry;
+    /* The risk map; none when there was none. */
+    SurefootSource risk;
+    /* Who made that map: 0 = none, 1 = what was learned, 2 = physics alone. */
+    uint64_t author;
+    /* Where to go [m]. */
+    double goal_m[2];
+    /* How near counts as there [m]. */
+    double tolerance_m;
+    /* Futures that were sampled. */
+    uint64_t n_rollouts;
+    /* Time since the decision before [s]. */
+    double elapsed_s;
+    /* State that it was made for: x, y [m], yaw [rad], speed [m/s], steering [rad]. */
+    double state[5];
+    /* Time that the decision took [ns]. */
+    uint64_t duration_ns;
+    /* By how much the cycle began after its deadline [ns]. */
+    uint64_t lateness_ns;
+} SurefootDecisionRecord;
+static_assert(sizeof(SurefootDecisionRecord) == 176, "DecisionRecord");
+static_assert(offsetof(SurefootDecisionRecord, command) == 0, "DecisionRecord.command");
+static_assert(offsetof(SurefootDecisionRecord, cycle) == 16, "DecisionRecord.cycle");
+static_assert(offsetof(SurefootDecisionRecord, decided_at_ns) == 24, "DecisionRecord.decided_at_ns");
+static_assert(offsetof(SurefootDecisionRecord, odometry) == 32, "DecisionRecord.odometry");
+static_assert(offsetof(SurefootDecisionRecord, n_odometry) == 48, "DecisionRecord.n_odometry");
+static_assert(offsetof(SurefootDecisionRecord, risk) == 56, "DecisionRecord.risk");
+static_assert(offsetof(SurefootDecisionRecord, author) == 72, "DecisionRecord.author");
+static_assert(offsetof(SurefootDecisionRecord, goal_m) == 80, "DecisionRecord.goal_m");
+static_assert(offsetof(SurefootDecisionRecord, tolerance_m) == 96, "DecisionRecord.tolerance_m");
+static_assert(offsetof(SurefootDecisionRecord, n_rollouts) == 104, "DecisionRecord.n_rollouts");
+static_assert(offsetof(SurefootDecisionRecord, elapsed_s) == 112, "DecisionRecord.elapsed_s");
+static_assert(offsetof(SurefootDecisionRecord, state) == 120, "DecisionRecord.state");
+static_assert(offsetof(SurefootDecisionRecord, duration_ns) == 160, "DecisionRecord.duration_ns");
+static_assert(offsetof(SurefootDecisionRecord, lateness_ns) == 168, "DecisionRecord.lateness_ns");
+
+/* Where the vehicle got stuck. Known to the channels as surefoot.Stuck. */
+typedef struct SurefootStuckRecord {
+    /* Rear axle's centre [m]. */
+    double position_m[2];
+    /* Heading [rad]. */
+    double yaw_rad;
+} SurefootStuckRecord;
+static_assert(sizeof(SurefootStuckRecord) == 24, "StuckRecord");
+static_assert(offsetof(SurefootStuckRecord, position_m) == 0, "StuckRecord.position_m");
+static_assert(offsetof(SurefootStuckRecord, yaw_rad) == 16, "StuckRecord.yaw_rad");
+
+/* Where to go; whoever runs the vehicle says so once a second. Known to the channels as surefoot.Mission. */
+typedef struct SurefootMissionRecord {
+    /* The place in the map frame [m]. */
+    double goal_m[2];
+    /* How near counts as there [m]. */
+    double tolerance_m;
+    /* Time since the vehicle began [s]. */
+    double time_s;
+    /* 0 = under way, else how it ended; see docs/runtime.md. */
+    uint64_t outcome;
+} SurefootMissionRecord;
+static_assert(sizeof(SurefootMissionRecord) == 40, "MissionRecord");
+static_assert(offsetof(SurefootMissionRecord, goal_m) == 0, "MissionRecord.goal_m");
+static_assert(offsetof(SurefootMissionRecord, tolerance_m) == 16, "MissionRecord.tolerance_m");
+static_assert(offsetof(SurefootMissionRecord, time_s) == 24, "MissionRecord.time_s");
+static_assert(offsetof(SurefootMissionRecord, outcome) == 32, "MissionRecord.outcome");
+
+/* How a process is doing, twice a second. Known to the channels as surefoot.Status. */
+typedef struct SurefootStatusRecord {
+    /* 1 plant, 2 mapping, 3 learning, 4 control, 5 recorder. */
+    uint64_t role;
+    /* Process id. */
+    uint64_t process;
+    /* Cycles or messages a second since the last status [Hz]. */
+    double rate_hz;
+    /* Median and largest lateness since the last status [s]. */
+    double lateness_s[2];
+    /* Age of up to three inputs when they were last used [s]; negative = none yet. */
+    double age_s[3];
+    /* Deadlines missed since the process began. */
+    uint64_t n_missed;
+    /* Messages lost on the way, by gaps in their numbers. */
+    uint64_t n_lost;
+    /* Messages refused. */
+    uint64_t n_refused;
+    /* Figure of the role's own: futures sampled, points mapped, recorded bytes. */
+    double figure;
+} SurefootStatusRecord;
+static_assert(sizeof(SurefootStatusRecord) == 96, "StatusRecord");
+static_assert(offsetof(SurefootStatusRecord, role) == 0, "StatusRecord.role");
+static_assert(offsetof(SurefootStatusRecord, process) == 8, "StatusRecord.process");
+static_assert(offsetof(SurefootStatusRecord, rate_hz) == 16, "StatusRecord.rate_hz");
+static_assert(offsetof(SurefootStatusRecord, lateness_s) == 24, "StatusRecord.lateness_s");
+static_assert(offsetof(SurefootStatusRecord, age_s) == 40, "StatusRecord.age_s");
+static_assert(offsetof(SurefootStatusRecord, n_missed) == 64, "StatusRecord.n_missed");
+static_assert(offsetof(SurefootStatusRecord, n_lost) == 72, "StatusRecord.n_lost");
+static_assert(offsetof(SurefootStatusRecord, n_refused) == 80, "StatusRecord.n_refused");
+static_assert(offsetof(SurefootStatusRecord, figure) == 88, "StatusRecord.figure");
+
+#endif

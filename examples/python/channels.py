@@ -1,0 +1,114 @@
+"""Surefoot's channels for Python: the same records in the same shared memory, through PyPI `iceoryx2==0.10.0`.
+
+What a channel keeps, and how many may use it, must be what `runtime/src/channel.rs` says; the first process to open a
+channel decides.
+"""
+
+import ctypes
+import time
+
+import iceoryx2 as iox2
+import surefoot_layout as layout
+
+PUBLISHERS_MAX = 4
+
+
+class Quad(ctypes.Structure):
+    """Element of a risk map's payload."""
+
+    _fields_ = [("values", ctypes.c_float * 4)]
+
+    @staticmethod
+    def type_name() -> str:
+        return "[f32; 4]"
+
+
+# Name: header, element, depth, readers.
+CHANNELS = {
+    "odometry": (layout.Stamp, layout.OdometryRecord, 32, 6),
+    "scan": (layout.ScanHeader, layout.PointRecord, 2, 4),
+    "risk": (layout.RiskHeader, Quad, 1, 4),
+    "command": (layout.Stamp, layout.CommandRecord, 4, 6),
+    "mission": (layout.Stamp, layout.MissionRecord, 2, 6),
+}
+
+
+def now_ns() -> int:
+    """The clock of all processes."""
+    return time.clock_gettime_ns(time.CLOCK_MONOTONIC)
+
+
+class Bus:
+    """A process among the others of its run."""
+
+    def __init__(self, run: str) -> None:
+        iox2.set_log_level(iox2.LogLevel.Fatal)
+        config = iox2.config.default()
+        config.global_cfg.prefix = iox2.FileName.new(f"surefoot_{run}_")
+        config.global_cfg.root_path = iox2.Path.new(f"/tmp/surefoot/{run}")
+        builder = iox2.NodeBuilder.new().config(config)
+        self.node = builder.signal_handling_mode(iox2.SignalHandlingMode.Disabled).create(iox2.ServiceType.Ipc)
+        self.epoch_ns = now_ns()
+
+    def service(self, name: str):
+        """The channel of this name."""
+        header, element, depth, n_readers = CHANNELS[name]
+        return (
+            self.node.service_builder(iox2.ServiceName.new(name))
+            .publish_subscribe(iox2.Slice[element])
+            .user_header(header)
+            .max_publishers(PUBLISHERS_MAX)
+            .max_subscribers(n_readers)
+            .subscriber_max_buffer_size(depth)
+            .subscriber_max_borrowed_samples(depth + 1)
+            .history_size(0)
+            .enable_safe_overflow(True)
+            .open_or_create()
+        )
+
+
+class Outlet:
+    """The way into a channel."""
+
+    def __init__(self, bus: Bus, name: str, n_max: int = 1) -> None:
+        factory = bus.service(name).publisher_builder().initial_max_slice_len(n_max).max_loaned_samples(1)
+        self.publisher = factory.create()
+        self.epoch_ns = bus.epoch_ns
+        self.n_sent = 0
+
+    def send(self, valid_at_ns: int, records, **header_fields) -> None:
+        """Writes records where their readers will read them, stamps them and hands them over.
+
+        `records` is a ctypes array; it is copied once, into the loaned memory.
+        """
+        sample = self.publisher.loan_slice_uninit(len(records))
+        ctypes.memmove(sample.payload_ptr, records, ctypes.sizeof(records))
+        header = sample.user_header().contents
+        for name, value in header_fields.items():
+            setattr(header, name, value)
+        stamp = header if isinstance(header, layout.Stamp) else header.stamp
+        self.n_sent += 1
+        stamp.layout_version = layout.LAYOUT_VERSION
+        stamp.reserved = 0
+        stamp.epoch_ns = self.epoch_ns
+        stamp.sequence = self.n_sent
+        stamp.valid_at_ns = valid_at_ns
+        stamp.published_at_ns = now_ns()
+        sample.assume_init().send()
+
+
+class Inlet:
+    """The way out of a channel."""
+
+    def __init__(self, bus: Bus, name: str) -> None:
+        self.subscriber = bus.service(name).subscriber_builder().create()
+
+    def newest(self):
+        """The newest waiting message of our layout: its header and its payload where they lie; None without one."""
+        newest = None
+        while (sample := self.subscriber.receive()) is not None:
+            header = sample.user_header().contents
+            stamp = header if isinstance(header, layout.Stamp) else header.stamp
+            if stamp.layout_version == layout.LAYOUT_VERSION:
+                newest = (sample, header, sample.payload())
+        return newest

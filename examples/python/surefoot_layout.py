@@ -1,0 +1,409 @@
+"""Messages of Surefoot, layout version 1. Written from its types; do not edit."""
+
+import ctypes
+
+LAYOUT_VERSION = 1
+
+
+class Stamp(ctypes.Structure):
+    """First field of every header: whose message it is, and of when."""
+
+    _fields_ = [
+        # Version of the layouts, LAYOUT_VERSION.
+        ("layout_version", ctypes.c_uint32),
+        # Zero.
+        ("reserved", ctypes.c_uint32),
+        # When the publishing process began, which tells one life of it from the next [ns].
+        ("epoch_ns", ctypes.c_uint64),
+        # Counts the messages of one publisher on one channel from 1.
+        ("sequence", ctypes.c_uint64),
+        # When what it says was true, monotonic [ns].
+        ("valid_at_ns", ctypes.c_uint64),
+        # When it was sent, monotonic [ns].
+        ("published_at_ns", ctypes.c_uint64),
+    ]
+
+    @staticmethod
+    def type_name() -> str:
+        return "surefoot.Stamp"
+
+
+assert ctypes.sizeof(Stamp) == 40
+assert Stamp.layout_version.offset == 0
+assert Stamp.reserved.offset == 4
+assert Stamp.epoch_ns.offset == 8
+assert Stamp.sequence.offset == 16
+assert Stamp.valid_at_ns.offset == 24
+assert Stamp.published_at_ns.offset == 32
+
+
+class Source(ctypes.Structure):
+    """A message that another one was made from."""
+
+    _fields_ = [
+        # When its publisher began [ns]; 0 = none.
+        ("epoch_ns", ctypes.c_uint64),
+        # Its sequence number.
+        ("sequence", ctypes.c_uint64),
+    ]
+
+    @staticmethod
+    def type_name() -> str:
+        return "surefoot.Source"
+
+
+assert ctypes.sizeof(Source) == 16
+assert Source.epoch_ns.offset == 0
+assert Source.sequence.offset == 8
+
+
+class Grid(ctypes.Structure):
+    """Where the cells of a map lie: square, row-major from the south-west corner."""
+
+    _fields_ = [
+        # Edge of a cell [m].
+        ("resolution_m", ctypes.c_double),
+        # Lattice column and row of the first cell; its south-west corner is origin x resolution_m.
+        ("origin", ctypes.c_int64 * 2),
+        # Rows, northwards.
+        ("n_rows", ctypes.c_uint64),
+        # Columns, eastwards.
+        ("n_cols", ctypes.c_uint64),
+    ]
+
+    @staticmethod
+    def type_name() -> str:
+        return "surefoot.Grid"
+
+
+assert ctypes.sizeof(Grid) == 40
+assert Grid.resolution_m.offset == 0
+assert Grid.origin.offset == 8
+assert Grid.n_rows.offset == 24
+assert Grid.n_cols.offset == 32
+
+
+class OdometryRecord(ctypes.Structure):
+    """Where the vehicle is and how it moves, at stamp.valid_at_ns."""
+
+    _fields_ = [
+        # Rear axle's centre in the map frame: east, north, up [m].
+        ("position_m", ctypes.c_double * 3),
+        # Roll, pitch, yaw [rad].
+        ("attitude_rad", ctypes.c_double * 3),
+        # Forward and leftward velocity in the body frame [m/s].
+        ("velocity_mps", ctypes.c_double * 2),
+        # Yaw rate [rad/s].
+        ("yaw_rate_radps", ctypes.c_double),
+        # Mean circumferential speed of the driven wheels [m/s].
+        ("wheel_speed_mps", ctypes.c_double),
+        # Measured angle of the front wheels, left positive [rad].
+        ("steering_rad", ctypes.c_double),
+    ]
+
+    @staticmethod
+    def type_name() -> str:
+        return "surefoot.Odometry"
+
+
+assert ctypes.sizeof(OdometryRecord) == 88
+assert OdometryRecord.position_m.offset == 0
+assert OdometryRecord.attitude_rad.offset == 24
+assert OdometryRecord.velocity_mps.offset == 48
+assert OdometryRecord.yaw_rate_radps.offset == 64
+assert OdometryRecord.wheel_speed_mps.offset == 72
+assert OdometryRecord.steering_rad.offset == 80
+
+
+class ScanHeader(ctypes.Structure):
+    """Header of a sweep of the range sensor; the payload is one PointRecord per return."""
+
+    _fields_ = [
+        # Whose and of when.
+        ("stamp", Stamp),
+        # Where the rays start, in the body frame [m].
+        ("origin_m", ctypes.c_float * 3),
+        # Zero.
+        ("reserved", ctypes.c_uint32),
+    ]
+
+    @staticmethod
+    def type_name() -> str:
+        return "surefoot.ScanHeader"
+
+
+assert ctypes.sizeof(ScanHeader) == 56
+assert ScanHeader.stamp.offset == 0
+assert ScanHeader.origin_m.offset == 40
+assert ScanHeader.reserved.offset == 52
+
+
+class PointRecord(ctypes.Structure):
+    """One return of the range sensor."""
+
+    _fields_ = [
+        # Place in the body frame [m].
+        ("position_m", ctypes.c_float * 3),
+        # What it is: 0 open, 1 loose, 2 vegetation, 3 obstacle.
+        ("class_number", ctypes.c_uint32),
+    ]
+
+    @staticmethod
+    def type_name() -> str:
+        return "surefoot.Point"
+
+
+assert ctypes.sizeof(PointRecord) == 16
+assert PointRecord.position_m.offset == 0
+assert PointRecord.class_number.offset == 12
+
+
+class SurfaceHeader(ctypes.Structure):
+    """Header of the map of the ground; the payload is eight numbers per cell, see docs/runtime.md."""
+
+    _fields_ = [
+        # Whose and of when: valid_at_ns is that of the scan.
+        ("stamp", Stamp),
+        # Where the cells lie.
+        ("grid", Grid),
+        # The scan that was fused last.
+        ("scan", Source),
+        # The odometry that it was fused at.
+        ("odometry", OdometryRecord),
+        # When that was measured [ns].
+        ("odometry_at_ns", ctypes.c_uint64),
+        # What happened since the last message: 1 = a scan was fused, 2 = the localisation jumped.
+        ("event", ctypes.c_uint64),
+        # The jump, if that is what happened: east, north, up [m].
+        ("jump_m", ctypes.c_double * 3),
+        # All jumps so far together [m].
+        ("shift_m", ctypes.c_double * 3),
+        # XXH3 of the payload.
+        ("content_hash", ctypes.c_uint64),
+    ]
+
+    @staticmethod
+    def type_name() -> str:
+        return "surefoot.SurfaceHeader"
+
+
+assert ctypes.sizeof(SurfaceHeader) == 256
+assert SurfaceHeader.stamp.offset == 0
+assert SurfaceHeader.grid.offset == 40
+assert SurfaceHeader.scan.offset == 80
+assert SurfaceHeader.odometry.offset == 96
+assert SurfaceHeader.odometry_at_ns.offset == 184
+assert SurfaceHeader.event.offset == 192
+assert SurfaceHeader.jump_m.offset == 200
+assert SurfaceHeader.shift_m.offset == 224
+assert SurfaceHeader.content_hash.offset == 248
+
+
+class RiskHeader(ctypes.Structure):
+    """Header of a risk map; the payload is risks, grounds and times to the goal, see docs/runtime.md."""
+
+    _fields_ = [
+        # Whose and of when: valid_at_ns is that of the scan.
+        ("stamp", Stamp),
+        # Where the cells lie.
+        ("grid", Grid),
+        # Yaw bins; bin k is centred at (k + 1/2) 2 pi / n_yaws.
+        ("n_yaws", ctypes.c_uint64),
+        # Who judged the ground: 1 = what was learned, 2 = physics alone.
+        ("author", ctypes.c_uint64),
+        # The map of the ground that was judged.
+        ("surface", Source),
+        # Stuck poses that it takes into account.
+        ("stuck", Source),
+        # Where the time to the goal leads [m].
+        ("goal_m", ctypes.c_double * 2),
+        # First 8 bytes of the SHA-256 of the networks' weights; 0 = none.
+        ("checkpoint", ctypes.c_uint64),
+        # XXH3 of the payload.
+        ("content_hash", ctypes.c_uint64),
+    ]
+
+    @staticmethod
+    def type_name() -> str:
+        return "surefoot.RiskHeader"
+
+
+assert ctypes.sizeof(RiskHeader) == 160
+assert RiskHeader.stamp.offset == 0
+assert RiskHeader.grid.offset == 40
+assert RiskHeader.n_yaws.offset == 80
+assert RiskHeader.author.offset == 88
+assert RiskHeader.surface.offset == 96
+assert RiskHeader.stuck.offset == 112
+assert RiskHeader.goal_m.offset == 128
+assert RiskHeader.checkpoint.offset == 144
+assert RiskHeader.content_hash.offset == 152
+
+
+class CommandRecord(ctypes.Structure):
+    """What the vehicle shall do."""
+
+    _fields_ = [
+        # Forward speed, negative in reverse [m/s].
+        ("speed_mps", ctypes.c_float),
+        # Angle of the front wheels, left positive [rad].
+        ("steering_rad", ctypes.c_float),
+        # 1 = drive, 2 = hold, 3 = stop; the command counts only when driving.
+        ("decision", ctypes.c_uint32),
+        # Why, when it is not driving; see docs/runtime.md.
+        ("reason", ctypes.c_uint32),
+    ]
+
+    @staticmethod
+    def type_name() -> str:
+        return "surefoot.Command"
+
+
+assert ctypes.sizeof(CommandRecord) == 16
+assert CommandRecord.speed_mps.offset == 0
+assert CommandRecord.steering_rad.offset == 4
+assert CommandRecord.decision.offset == 8
+assert CommandRecord.reason.offset == 12
+
+
+class DecisionRecord(ctypes.Structure):
+    """A decision with all that it was made from."""
+
+    _fields_ = [
+        # What was decided.
+        ("command", CommandRecord),
+        # Number of the decision since the process began.
+        ("cycle", ctypes.c_uint64),
+        # When it was made [ns].
+        ("decided_at_ns", ctypes.c_uint64),
+        # The odometry that was taken in last.
+        ("odometry", Source),
+        # How many were taken in since the decision before, without a gap up to the last.
+        ("n_odometry", ctypes.c_uint64),
+        # The risk map; none when there was none.
+        ("risk", Source),
+        # Who made that map: 0 = none, 1 = what was learned, 2 = physics alone.
+        ("author", ctypes.c_uint64),
+        # Where to go [m].
+        ("goal_m", ctypes.c_double * 2),
+        # How near counts as there [m].
+        ("tolerance_m", ctypes.c_double),
+        # Futures that were sampled.
+        ("n_rollouts", ctypes.c_uint64),
+        # Time since the decision before [s].
+        ("elapsed_s", ctypes.c_double),
+        # State that it was made for: x, y [m], yaw [rad], speed [m/s], steering [rad].
+        ("state", ctypes.c_double * 5),
+        # Time that the decision took [ns].
+        ("duration_ns", ctypes.c_uint64),
+        # By how much the cycle began after its deadline [ns].
+        ("lateness_ns", ctypes.c_uint64),
+    ]
+
+    @staticmethod
+    def type_name() -> str:
+        return "surefoot.DecisionRecord"
+
+
+assert ctypes.sizeof(DecisionRecord) == 176
+assert DecisionRecord.command.offset == 0
+assert DecisionRecord.cycle.offset == 16
+assert DecisionRecord.decided_at_ns.offset == 24
+assert DecisionRecord.odometry.offset == 32
+assert DecisionRecord.n_odometry.offset == 48
+assert DecisionRecord.risk.offset == 56
+assert DecisionRecord.author.offset == 72
+assert DecisionRecord.goal_m.offset == 80
+assert DecisionRecord.tolerance_m.offset == 96
+assert DecisionRecord.n_rollouts.offset == 104
+assert DecisionRecord.elapsed_s.offset == 112
+assert DecisionRecord.state.offset == 120
+assert DecisionRecord.duration_ns.offset == 160
+assert DecisionRecord.lateness_ns.offset == 168
+
+
+class StuckRecord(ctypes.Structure):
+    """Where the vehicle got stuck."""
+
+    _fields_ = [
+        # Rear axle's centre [m].
+        ("position_m", ctypes.c_double * 2),
+        # Heading [rad].
+        ("yaw_rad", ctypes.c_double),
+    ]
+
+    @staticmethod
+    def type_name() -> str:
+        return "surefoot.Stuck"
+
+
+assert ctypes.sizeof(StuckRecord) == 24
+assert StuckRecord.position_m.offset == 0
+assert StuckRecord.yaw_rad.offset == 16
+
+
+class MissionRecord(ctypes.Structure):
+    """Where to go; whoever runs the vehicle says so once a second."""
+
+    _fields_ = [
+        # The place in the map frame [m].
+        ("goal_m", ctypes.c_double * 2),
+        # How near counts as there [m].
+        ("tolerance_m", ctypes.c_double),
+        # Time since the vehicle began [s].
+        ("time_s", ctypes.c_double),
+        # 0 = under way, else how it ended; see docs/runtime.md.
+        ("outcome", ctypes.c_uint64),
+    ]
+
+    @staticmethod
+    def type_name() -> str:
+        return "surefoot.Mission"
+
+
+assert ctypes.sizeof(MissionRecord) == 40
+assert MissionRecord.goal_m.offset == 0
+assert MissionRecord.tolerance_m.offset == 16
+assert MissionRecord.time_s.offset == 24
+assert MissionRecord.outcome.offset == 32
+
+
+class StatusRecord(ctypes.Structure):
+    """How a process is doing, twice a second."""
+
+    _fields_ = [
+        # 1 plant, 2 mapping, 3 learning, 4 control, 5 recorder.
+        ("role", ctypes.c_uint64),
+        # Process id.
+        ("process", ctypes.c_uint64),
+        # Cycles or messages a second since the last status [Hz].
+        ("rate_hz", ctypes.c_double),
+        # Median and largest lateness since the last status [s].
+        ("lateness_s", ctypes.c_double * 2),
+        # Age of up to three inputs when they were last used [s]; negative = none yet.
+        ("age_s", ctypes.c_double * 3),
+        # Deadlines missed since the process began.
+        ("n_missed", ctypes.c_uint64),
+        # Messages lost on the way, by gaps in their numbers.
+        ("n_lost", ctypes.c_uint64),
+        # Messages refused.
+        ("n_refused", ctypes.c_uint64),
+        # Figure of the role's own: futures sampled, points mapped, recorded bytes.
+        ("figure", ctypes.c_double),
+    ]
+
+    @staticmethod
+    def type_name() -> str:
+        return "surefoot.Status"
+
+
+assert ctypes.sizeof(StatusRecord) == 96
+assert StatusRecord.role.offset == 0
+assert StatusRecord.process.offset == 8
+assert StatusRecord.rate_hz.offset == 16
+assert StatusRecord.lateness_s.offset == 24
+assert StatusRecord.age_s.offset == 40
+assert StatusRecord.n_missed.offset == 64
+assert StatusRecord.n_lost.offset == 72
+assert StatusRecord.n_refused.offset == 80
+assert StatusRecord.figure.offset == 88

@@ -1,0 +1,89 @@
+//! What a channel promises, within one process: no copy, gaps counted, one publisher.
+
+use runtime::channel::{Bus, ODOMETRY, RISK, Refusal};
+use runtime::message::{Grid, OdometryRecord, RiskHeader, Stamp};
+use runtime::payload::{RiskParts, risk_views};
+use terrain::GridGeometry;
+use traversability::{Risk, RiskMap};
+
+use crate::fixture::Run;
+
+#[test]
+fn a_risk_map_is_written_once_and_read_where_it_was_written() {
+    let run = Run::new();
+    let bus = Bus::join(&run.name).unwrap();
+    let geometry = GridGeometry { resolution_m: 0.2, origin: [-4, 9], n_rows: 30, n_cols: 40 };
+    let map = RiskMap::constant(geometry, 16, Risk::NONE);
+    let (known, parts) = (map.view(), RiskParts::new(&geometry, 16));
+    let mut inlet = bus.inlet(&RISK).unwrap();
+    let mut outlet = bus.outlet(&RISK, parts.n_elements()).unwrap();
+    let mut n_written = vec![0u8; parts.n_elements()];
+    let mut loan = outlet
+        .write(parts.n_elements(), |place| {
+            n_written[place] += 1;
+            parts.element(&known, place)
+        })
+        .unwrap();
+    assert!(n_written.iter().all(|n| *n == 1), "every element is written once");
+    *loan.header_mut() =
+        RiskHeader { grid: Grid::from(&geometry), n_yaws: 16, author: 1, ..RiskHeader::default() };
+    // The reader maps the same memory at another address: a change after the last write shows in both.
+    let marked = parts.risks_mut(loan.payload_mut());
+    marked[777].pitch_rad = 0.25;
+    outlet.send(loan, 1).unwrap();
+    let message = inlet.newest().unwrap();
+    let (view, _) = risk_views(message.user_header(), message.payload()).unwrap();
+    assert_eq!(
+        view.risks.as_ptr().cast(),
+        message.payload().as_ptr(),
+        "the view is borrowed from the message"
+    );
+    assert_eq!((view.risks[777].pitch_rad, view.risks[0]), (0.25, known.risks[0]));
+    assert_eq!(view.ground, known.ground);
+}
+
+#[test]
+fn messages_that_were_dropped_are_counted() {
+    let run = Run::new();
+    let bus = Bus::join(&run.name).unwrap();
+    let mut inlet = bus.inlet(&ODOMETRY).unwrap();
+    let mut outlet = bus.outlet(&ODOMETRY, 1).unwrap();
+    let n_sent = ODOMETRY.depth as u64 + 5;
+    let mut send = |n: u64| {
+        for at_ns in 1..=n {
+            outlet.send_one(Stamp::default(), OdometryRecord::default(), at_ns).unwrap();
+        }
+    };
+    send(1);
+    inlet.poll(|_, _| ());
+    send(n_sent);
+    let mut sequences = Vec::new();
+    inlet.poll(|stamp, _| sequences.push(stamp.sequence));
+    assert_eq!(sequences, (7..=n_sent + 1).collect::<Vec<_>>(), "the youngest, in their order");
+    assert_eq!((inlet.counts().lost, inlet.counts().received), (5, 1 + ODOMETRY.depth as u64));
+}
+
+#[test]
+fn a_second_publisher_is_not_heard_while_the_first_is() {
+    let run = Run::new();
+    let (first, second) = (Bus::join(&run.name).unwrap(), Bus::join(&run.name).unwrap());
+    let mut inlet = first.inlet(&ODOMETRY).unwrap();
+    let [mut one, mut other] = [&first, &second].map(|bus| bus.outlet(&ODOMETRY, 1).unwrap());
+    let record = |x_m: f64| OdometryRecord { position_m: [x_m, 0.0, 0.0], ..OdometryRecord::default() };
+    let mut heard = || {
+        let mut heard = Vec::new();
+        inlet.poll(|_, records| heard.push(records[0].position_m[0]));
+        heard
+    };
+    for at_ns in 1..=3 {
+        one.send_one(Stamp::default(), record(1.0), at_ns).unwrap();
+        assert_eq!(heard(), [1.0]);
+        other.send_one(Stamp::default(), record(2.0), at_ns).unwrap();
+        assert!(heard().is_empty(), "whoever came first");
+    }
+    drop(one);
+    std::thread::sleep(std::time::Duration::from_nanos(ODOMETRY.silence_ns + 1_000_000));
+    other.send_one(Stamp::default(), record(2.0), 4).unwrap();
+    assert_eq!(heard(), [2.0], "silence gives the channel to the next");
+    assert_eq!(inlet.counts().of(Refusal::OtherPublisher), 3);
+}

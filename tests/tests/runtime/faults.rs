@@ -1,0 +1,172 @@
+//! Processes that are killed, stopped and joined by others from outside, and what becomes of the drive.
+
+use bicycle::{Decision, StopReason};
+use runtime::channel::{Bus, COMMAND, DECISION, Inlet, ODOMETRY};
+use runtime::message::{CommandRecord, DecisionRecord, OdometryRecord, Stamp};
+use runtime::replay::{self, Knowledge};
+use runtime::status::Role;
+use rustix::process::Signal;
+
+use crate::fixture::{Run, eventually};
+
+/// Longest that a machine under load may need for anything here [s].
+const LIMIT_S: f64 = 60.0;
+
+/// Watches a run over its channels, as a stranger would.
+struct Witness {
+    _bus: Bus,
+    odometry: Inlet<Stamp, OdometryRecord>,
+    decisions: Inlet<Stamp, DecisionRecord>,
+    last: Option<OdometryRecord>,
+    decision: Option<(Stamp, DecisionRecord)>,
+}
+
+impl Witness {
+    fn new(run: &Run) -> Self {
+        let bus = Bus::join(&run.name).unwrap();
+        let (odometry, decisions) = (bus.inlet(&ODOMETRY).unwrap(), bus.inlet(&DECISION).unwrap());
+        Self { _bus: bus, odometry, decisions, last: None, decision: None }
+    }
+
+    fn look(&mut self) {
+        let (last, decision) = (&mut self.last, &mut self.decision);
+        self.odometry.poll(|_, records| *last = Some(records[0]));
+        self.decisions.poll(|stamp, records| *decision = Some((*stamp, records[0])));
+    }
+
+    /// Milliseconds until this holds; panics when it never does.
+    fn until(&mut self, what: &str, mut holds: impl FnMut(&Self) -> bool) -> f64 {
+        let found = eventually(LIMIT_S, || {
+            self.look();
+            holds(self).then_some(())
+        });
+        let (took, ()) =
+            found.unwrap_or_else(|| panic!("{what}: not within {LIMIT_S} s; {:?}", self.decision));
+        1e3 * took.as_secs_f64()
+    }
+
+    fn speed_mps(&self) -> f64 {
+        self.last.map_or(0.0, |odometry| odometry.velocity_mps[0].hypot(odometry.velocity_mps[1]))
+    }
+
+    fn decided(&self) -> Option<Decision> {
+        self.decision.and_then(|(_, record)| record.command.decision())
+    }
+
+    fn until_driving(&mut self, why: &str) -> f64 {
+        self.until(why, |witness| {
+            witness.speed_mps() > 0.3 && matches!(witness.decided(), Some(Decision::Drive(_)))
+        })
+    }
+
+    fn until_standing(&mut self, why: &str) -> f64 {
+        self.until(why, |witness| witness.speed_mps() < 0.08)
+    }
+}
+
+const PLANNERS: [Role; 3] = [Role::Mapping, Role::Learning, Role::Control];
+
+#[test]
+fn every_process_may_fail_and_the_vehicle_is_safe() {
+    let mut run = Run::new();
+    // In no sensible order: each finds the others.
+    run.start_all(&[Role::Control, Role::Recorder, Role::Mapping, Role::Plant, Role::Learning]);
+    let mut witness = Witness::new(&run);
+    let mut table = Vec::new();
+    witness.until_driving("all processes up");
+
+    run.kill(Role::Control);
+    table.push(("control killed: stands", witness.until_standing("without control")));
+    run.start(Role::Control);
+    table.push(("control restarted: drives", witness.until_driving("with control again")));
+
+    run.kill(Role::Learning);
+    let took = witness.until("physics takes over", |witness| {
+        witness.decision.is_some_and(|(_, record)| record.author == 2)
+    });
+    table.push(("learning killed: physics judges", took));
+    witness.until_driving("on physics alone");
+    run.start(Role::Learning);
+    let took = witness
+        .until("learning is back", |witness| witness.decision.is_some_and(|(_, record)| record.author == 1));
+    table.push(("learning restarted: it judges", took));
+
+    run.signal(Role::Mapping, Signal::STOP);
+    let took = witness.until("old scans stop it", |witness| {
+        witness.decided() == Some(Decision::Stop(StopReason::StaleScan))
+    });
+    table.push(("mapping stopped: stop is decided", took));
+    table.push(("mapping stopped: stands", witness.until_standing("without maps")));
+    run.signal(Role::Mapping, Signal::CONT);
+    table.push(("mapping goes on: drives", witness.until_driving("with maps again")));
+
+    run.signal(Role::Control, Signal::STOP);
+    table.push(("control stopped: stands", witness.until_standing("control does not answer")));
+    run.signal(Role::Control, Signal::CONT);
+    table.push(("control goes on: drives", witness.until_driving("control answers again")));
+
+    run.signal(Role::Plant, Signal::STOP);
+    let took = witness.until("old odometry stops it", |witness| {
+        witness.decided() == Some(Decision::Stop(StopReason::StaleOdometry))
+    });
+    table.push(("odometry ends: stop is decided", took));
+    run.signal(Role::Plant, Signal::CONT);
+    witness.until_driving("odometry goes on");
+
+    for (fault, ms) in &table {
+        println!("{fault:36} {ms:7.0} ms");
+    }
+    // The recorder outlived them all, and what it kept of the last control's life can be decided again.
+    run.end();
+    let files = run.recordings();
+    let records = replay::read(&files).unwrap();
+    assert_eq!(records.ended_early, None);
+    let knowledge = Knowledge { belief: navigator::Belief::Physics, checkpoint: 0 };
+    let report = replay::replay(&records, &knowledge).unwrap();
+    assert_eq!(report.first_difference, None, "{report:?}");
+    assert!(report.n_identical > 50, "{report:?}");
+}
+
+#[test]
+fn a_second_control_never_takes_the_wheel() {
+    let mut run = Run::new();
+    run.start(Role::Plant);
+    run.start_all(&PLANNERS);
+    let mut witness = Witness::new(&run);
+    witness.until_driving("all processes up");
+    // A second one that tells the vehicle to stop, ten times as often.
+    let other = Bus::join(&run.name).unwrap();
+    let mut commands = other.outlet(&COMMAND, 1).unwrap();
+    let stop = CommandRecord::from(&Decision::Stop(StopReason::OutsideMap));
+    let from_m = witness.last.unwrap().position_m;
+    witness.until("it drives on", |witness| {
+        commands.send_one(Stamp::default(), stop, runtime::clock::now_ns()).unwrap();
+        let to_m = witness.last.unwrap().position_m;
+        (to_m[0] - from_m[0]).hypot(to_m[1] - from_m[1]) > 1.0
+    });
+    run.end();
+}
+
+#[test]
+fn everything_killed_at_once_begins_again_without_cleaning_and_leaves_nothing_behind() {
+    let mut run = Run::new();
+    let mut counts = Vec::new();
+    for _ in 0..4 {
+        run.start(Role::Plant);
+        run.start_all(&PLANNERS);
+        {
+            let mut witness = Witness::new(&run);
+            witness.until("a decision", |witness| witness.decision.is_some());
+        }
+        [Role::Plant, Role::Mapping, Role::Learning, Role::Control].map(|role| run.kill(role));
+        counts.push(run.shared_memory().len());
+    }
+    let bus = Bus::join(&run.name).unwrap();
+    bus.clear_dead();
+    drop(bus);
+    // The first time not everything was open yet.
+    assert!(counts[3] <= counts[1].max(counts[2]), "leftovers of dead processes add up: {counts:?}");
+    let left = run.shared_memory();
+    let is_common = |file: &std::path::PathBuf| file.to_string_lossy().ends_with(".global_mgmt");
+    assert!(left.len() <= 1 && left.iter().all(is_common), "but for the run's own page: {left:?}");
+}

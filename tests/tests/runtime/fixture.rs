@@ -1,0 +1,220 @@
+//! Processes of a run under test: this program itself, told by its environment which part to be.
+
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::sync::atomic::{AtomicU32, Ordering};
+use std::time::{Duration, Instant};
+
+use bicycle::{Model, Vehicle};
+use navigator::{Belief, Config};
+use runtime::channel::{Bus, RunName};
+use runtime::control::{self, ControlSetup};
+use runtime::learning::{self, LearningSetup};
+use runtime::mapping::{self, MappingSetup};
+use runtime::plant::{self, PlantSetup};
+use runtime::recorder::{self, RecorderSetup};
+use runtime::setup::{MachineSetup, RecordedSetup};
+use runtime::status::Role;
+use rustix::process::{Pid, Signal, kill_process, set_parent_process_death_signal};
+use scenarios::{EpisodeConfig, RockFieldConfig, Task};
+use traversability::CvarLevel;
+
+const ROLE: &str = "SUREFOOT_TEST_ROLE";
+const RUN: &str = "SUREFOOT_TEST_RUN";
+const FOLDER: &str = "SUREFOOT_TEST_FOLDER";
+/// A file of this name tells the processes to end.
+const OVER: &str = "over";
+pub const ALPHA: f64 = 0.6;
+pub const SEED: u64 = 1;
+
+/// A name that no other test and no other run of the tests has.
+fn unique_run() -> RunName {
+    static NEXT: AtomicU32 = AtomicU32::new(0);
+    let next = NEXT.fetch_add(1, Ordering::Relaxed);
+    format!("test-{}-{next}", std::process::id()).parse().unwrap()
+}
+
+/// A full-size vehicle with coarse maps and few rollouts: what is tested is not how well it drives.
+pub fn machine() -> (Vehicle, Config) {
+    let vehicle = formats::read_vehicle("pietra_full_size").unwrap();
+    let mut config = Config::for_vehicle(&vehicle);
+    let resolution_m = 0.5;
+    config.elevation.resolution_m = resolution_m;
+    config.elevation.recentre_m = 4.0 * resolution_m;
+    config.elevation.gap_radius_m = config.elevation.gap_radius_m.max(2.0 * resolution_m);
+    config.risk_map.recentre_m = 4.0 * resolution_m;
+    (config.risk_map.n_rows, config.risk_map.n_cols, config.risk_map.n_yaws) = (48, 48, 8);
+    (config.elevation.n_rows, config.elevation.n_cols) = (68, 68);
+    config.controller.n_rollouts = 256;
+    config.controller.n_steps = 30;
+    config.controller.n_threads = 1;
+    (vehicle, config)
+}
+
+/// The processes of one run; they end with it.
+pub struct Run {
+    pub name: RunName,
+    pub folder: tempfile::TempDir,
+    children: Vec<(Role, Child)>,
+}
+
+impl Run {
+    pub fn new() -> Self {
+        Self { name: unique_run(), folder: tempfile::tempdir().unwrap(), children: Vec::new() }
+    }
+
+    pub fn start(&mut self, role: Role) {
+        let child = Command::new(std::env::current_exe().unwrap())
+            .args(["--exact", "process_of_its_own", "--nocapture"])
+            .env(ROLE, role.name())
+            .env(RUN, self.name.to_string())
+            .env(FOLDER, self.folder.path())
+            .stdout(Stdio::null())
+            .spawn()
+            .unwrap();
+        self.children.push((role, child));
+    }
+
+    pub fn start_all(&mut self, roles: &[Role]) {
+        roles.iter().for_each(|role| self.start(*role));
+    }
+
+    /// Sends a signal to the process of a role.
+    pub fn signal(&self, role: Role, signal: Signal) {
+        let (_, child) = self.children.iter().find(|(of, _)| *of == role).unwrap();
+        kill_process(Pid::from_raw(child.id() as i32).unwrap(), signal).unwrap();
+    }
+
+    /// Kills the process of a role, with no time to say farewell.
+    pub fn kill(&mut self, role: Role) {
+        let place = self.children.iter().position(|(of, _)| *of == role).unwrap();
+        let (_, mut child) = self.children.remove(place);
+        child.kill().unwrap();
+        child.wait().unwrap();
+    }
+
+    /// Tells all to end, and waits for it.
+    pub fn end(&mut self) {
+        std::fs::write(self.folder.path().join(OVER), "").unwrap();
+        for (role, mut child) in self.children.drain(..) {
+            let ended = eventually(20.0, || child.try_wait().unwrap());
+            assert!(ended.is_some(), "{} does not end", role.name());
+        }
+        std::fs::remove_file(self.folder.path().join(OVER)).unwrap();
+    }
+
+    /// Its files in shared memory.
+    pub fn shared_memory(&self) -> Vec<PathBuf> {
+        let prefix = self.name.prefix();
+        let files = std::fs::read_dir("/dev/shm").unwrap().map(|entry| entry.unwrap());
+        let is_ours = |file: &std::fs::DirEntry| file.file_name().to_string_lossy().starts_with(&prefix);
+        files.filter(is_ours).map(|file| file.path()).collect()
+    }
+
+    pub fn recordings(&self) -> Vec<PathBuf> {
+        let files = std::fs::read_dir(self.folder.path()).unwrap().map(|entry| entry.unwrap().path());
+        let mut files: Vec<_> = files.filter(|path| path.extension().is_some_and(|e| e == "mcap")).collect();
+        files.sort();
+        files
+    }
+}
+
+impl Drop for Run {
+    fn drop(&mut self) {
+        for (_, child) in &mut self.children {
+            drop(child.kill());
+            drop(child.wait());
+        }
+        drop(std::fs::remove_dir_all(self.name.folder()));
+        for file in self.shared_memory() {
+            drop(std::fs::remove_file(file));
+        }
+    }
+}
+
+/// Asks until there is an answer; how long that took and the answer, `None` after `limit_s`.
+pub fn eventually<T>(limit_s: f64, mut ask: impl FnMut() -> Option<T>) -> Option<(Duration, T)> {
+    let began = Instant::now();
+    while began.elapsed().as_secs_f64() < limit_s {
+        if let Some(answer) = ask() {
+            return Some((began.elapsed(), answer));
+        }
+        std::thread::sleep(Duration::from_millis(2));
+    }
+    None
+}
+
+/// Becomes a part of the machine when the environment says so.
+pub fn begin_as_told() {
+    let (Ok(role), Ok(run), Ok(folder)) = (std::env::var(ROLE), std::env::var(RUN), std::env::var(FOLDER))
+    else {
+        return;
+    };
+    // Whoever started it is a thread of the test: when that fails, this ends too.
+    set_parent_process_death_signal(Some(Signal::KILL)).unwrap();
+    let role = Role::ALL.into_iter().find(|known| known.name() == role).unwrap();
+    let folder = PathBuf::from(folder);
+    let over = folder.join(OVER);
+    be(role, &run.parse().unwrap(), &folder, &|| over.exists());
+}
+
+fn be(role: Role, run: &RunName, folder: &Path, is_over: &dyn Fn() -> bool) {
+    let (vehicle, config) = machine();
+    let (model, level) = (Model::of(&vehicle), CvarLevel::new(ALPHA).unwrap());
+    let limits = model.limits;
+    let bus = Bus::join(run).unwrap();
+    match role {
+        Role::Plant => {
+            plant::run(&bus, plant_setup(&vehicle), is_over).unwrap();
+        }
+        Role::Mapping => {
+            mapping::run(&bus, &MappingSetup { vehicle: &vehicle, config, level, limits }, is_over).unwrap();
+        }
+        Role::Learning => {
+            let belief = Belief::Physics;
+            let setup = LearningSetup { vehicle: &vehicle, config, belief, checkpoint: 0, level, limits };
+            learning::run(&bus, &setup, is_over).unwrap();
+        }
+        Role::Control => {
+            control::run(&bus, ControlSetup { model, config, seed: SEED, period_s: 0.1 }, is_over).unwrap();
+        }
+        Role::Recorder => {
+            let setup = RecorderSetup {
+                folder: folder.to_owned(),
+                setup: recorded_setup(),
+                file_bytes_max: 1 << 30,
+                file_time_max_s: 600.0,
+            };
+            recorder::run(&bus, setup, is_over, &mut |line| panic!("{line}")).unwrap();
+        }
+    }
+}
+
+pub fn recorded_setup() -> RecordedSetup {
+    let (vehicle, config) = machine();
+    let model = Model::of(&vehicle);
+    let vehicle_name = vehicle.name.clone();
+    let [vehicle_toml, model_toml, config_toml] = MachineSetup { vehicle, model, config }.texts().unwrap();
+    RecordedSetup {
+        vehicle_name,
+        vehicle_toml,
+        model_toml,
+        config_toml,
+        method: "physics".to_owned(),
+        checkpoint_sha256: String::new(),
+        alpha: ALPHA,
+        seed: SEED.to_string(),
+        revision: String::new(),
+    }
+}
+
+fn plant_setup(vehicle: &Vehicle) -> PlantSetup<'_> {
+    let mut episode = EpisodeConfig::for_vehicle(vehicle);
+    // Faults make it stand for long; that is no end of the drive here.
+    (episode.rules.immobile_s, episode.rules.stopped_s, episode.rules.time_limit_s) = (1e3, 1e3, 1e3);
+    if let Some(sensor) = &mut episode.range_sensor {
+        (sensor.n_azimuths, sensor.n_beams) = (120, 24);
+    }
+    let task = Task::rock_field(&RockFieldConfig::default(), SEED).unwrap();
+    PlantSetup { task, vehicle, episode, seed: SEED, command_age_max_s: 0.3 }
+}

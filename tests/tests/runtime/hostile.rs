@@ -1,0 +1,148 @@
+//! Publishers that mean harm or are broken: what they send is refused by its reason, and a good one is heard.
+
+use iceoryx2::config::Config;
+use iceoryx2::node::NodeBuilder;
+use iceoryx2::port::publisher::Publisher;
+use iceoryx2::prelude::{FileName, Path, SemanticString, SignalHandlingMode, ipc};
+use runtime::channel::{Bus, COMMAND, Channel, Counts, Inlet, ODOMETRY, RISK, Refusal, RunName, SURFACE};
+use runtime::clock::now_ns;
+use runtime::message::{
+    CommandRecord, Grid, LAYOUT_VERSION, OdometryRecord, RiskHeader, Stamp, SurfaceHeader,
+};
+
+use crate::fixture::Run;
+
+/// A publisher that fills in headers as it likes; it keeps its node alive.
+struct Hostile<H: runtime::channel::Header, T: runtime::channel::Element> {
+    publisher: Publisher<ipc::Service, [T], H>,
+}
+
+impl<H: runtime::channel::Header, T: runtime::channel::Element> Hostile<H, T> {
+    fn new(run: &RunName, channel: &Channel<H, T>, n_max: usize) -> Self {
+        let mut config = Config::default();
+        config.global.prefix = FileName::new(run.prefix().as_bytes()).unwrap();
+        config.global.set_root_path(&Path::new(run.folder().as_bytes()).unwrap());
+        let node = NodeBuilder::new()
+            .config(&config)
+            .signal_handling_mode(SignalHandlingMode::Disabled)
+            .create::<ipc::Service>()
+            .unwrap();
+        let service = node
+            .service_builder(&channel.name.try_into().unwrap())
+            .publish_subscribe::<[T]>()
+            .user_header::<H>()
+            .open()
+            .unwrap();
+        Self { publisher: service.publisher_builder().initial_max_slice_len(n_max).create().unwrap() }
+    }
+
+    fn send(&self, header: H, payload: &[T]) {
+        let loan = self.publisher.loan_slice_uninit(payload.len()).unwrap();
+        let mut loan = loan.write_from_fn(|place| payload[place]);
+        *loan.user_header_mut() = header;
+        loan.send().unwrap();
+    }
+}
+
+fn stamp(sequence: u64) -> Stamp {
+    let now_ns = now_ns();
+    Stamp {
+        layout_version: LAYOUT_VERSION,
+        epoch_ns: 1,
+        sequence,
+        valid_at_ns: now_ns,
+        published_at_ns: now_ns,
+        ..Stamp::default()
+    }
+}
+
+fn polled<H: runtime::channel::Header, T: runtime::channel::Element>(inlet: &mut Inlet<H, T>) -> Counts {
+    inlet.poll(|_, _| ());
+    *inlet.counts()
+}
+
+#[test]
+fn broken_commands_never_come_through() {
+    let run = Run::new();
+    let bus = Bus::join(&run.name).unwrap();
+    let mut inlet = bus.inlet(&COMMAND).unwrap();
+    let hostile = Hostile::new(&run.name, &COMMAND, 8);
+    let drive = CommandRecord { speed_mps: 1.0, decision: 1, ..CommandRecord::default() };
+    let future_ns = now_ns() + 3_600_000_000_000;
+    let broken = [
+        (Stamp { layout_version: 2, ..stamp(1) }, vec![drive], Refusal::LayoutVersion),
+        (Stamp { valid_at_ns: future_ns, ..stamp(2) }, vec![drive], Refusal::FromFuture),
+        (Stamp { published_at_ns: u64::MAX, ..stamp(3) }, vec![drive], Refusal::FromFuture),
+        (stamp(4), vec![CommandRecord { speed_mps: f32::NAN, ..drive }], Refusal::NonFinite),
+        (stamp(5), vec![CommandRecord { steering_rad: f32::INFINITY, ..drive }], Refusal::NonFinite),
+        (stamp(6), vec![CommandRecord { decision: 77, ..drive }], Refusal::Malformed),
+        (stamp(7), vec![], Refusal::Malformed),
+        (stamp(8), vec![drive; 8], Refusal::Malformed),
+    ];
+    for (n, (stamp, payload, refusal)) in broken.iter().enumerate() {
+        let before = inlet.counts().of(*refusal);
+        hostile.send(*stamp, payload);
+        let counts = polled(&mut inlet);
+        assert_eq!(counts.of(*refusal), before + 1, "{n}: {refusal:?}");
+        assert_eq!(counts.received, 0, "{n}");
+    }
+    // None of that made it the channel's publisher: a good one is heard at once.
+    let mut outlet = bus.outlet(&COMMAND, 1).unwrap();
+    outlet.send_one(Stamp::default(), drive, now_ns()).unwrap();
+    assert_eq!(polled(&mut inlet).received, 1);
+}
+
+#[test]
+fn maps_with_huge_counts_and_wrong_lengths_never_come_through() {
+    let run = Run::new();
+    let bus = Bus::join(&run.name).unwrap();
+    let (mut risks, mut surfaces) = (bus.inlet(&RISK).unwrap(), bus.inlet(&SURFACE).unwrap());
+    let hostile_risk = Hostile::new(&run.name, &RISK, 16);
+    let hostile_surface = Hostile::new(&run.name, &SURFACE, 16);
+    let grid = Grid { resolution_m: 0.2, origin: [0, 0], n_rows: 2, n_cols: 2 };
+    let risk = |grid: Grid, n_yaws: u64| RiskHeader {
+        stamp: stamp(1),
+        grid,
+        n_yaws,
+        author: 1,
+        ..RiskHeader::default()
+    };
+    let huge = Grid { n_rows: u64::MAX, n_cols: u64::MAX, ..grid };
+    let far = Grid { origin: [i64::MIN, i64::MAX], ..grid };
+    for header in [risk(huge, 16), risk(grid, u64::MAX), risk(far, 1), risk(grid, 3), risk(grid, 0)] {
+        let before = risks.counts().of(Refusal::Malformed);
+        hostile_risk.send(header, &[[0.5; 4]; 7]);
+        assert!(risks.newest().is_none(), "{header:?}");
+        assert_eq!(risks.counts().of(Refusal::Malformed), before + 1);
+    }
+    for grid in [huge, far, Grid { n_rows: 3, ..grid }, Grid { resolution_m: -1.0, ..grid }] {
+        hostile_surface
+            .send(SurfaceHeader { stamp: stamp(1), grid, ..SurfaceHeader::default() }, &[[0.0; 8]; 4]);
+        assert!(surfaces.newest().is_none(), "{grid:?}");
+    }
+    let odd = SurfaceHeader { stamp: stamp(1), grid, jump_m: [f64::NAN; 3], ..SurfaceHeader::default() };
+    hostile_surface.send(odd, &[[0.0; 8]; 4]);
+    assert!(surfaces.newest().is_none());
+    assert_eq!((surfaces.counts().of(Refusal::Malformed), surfaces.counts().of(Refusal::NonFinite)), (4, 1));
+}
+
+#[test]
+fn a_flood_keeps_nobody_from_being_heard() {
+    let run = Run::new();
+    let bus = Bus::join(&run.name).unwrap();
+    let mut inlet = bus.inlet(&ODOMETRY).unwrap();
+    // The flood comes first, so that the channel's publisher is behind it wherever order counts.
+    let hostile = Hostile::new(&run.name, &ODOMETRY, 1);
+    let mut outlet = bus.outlet(&ODOMETRY, 1).unwrap();
+    let mut heard = 0;
+    for cycle in 1..=20u64 {
+        for n in 0..500 {
+            let flood = Stamp { layout_version: 99, ..stamp(500 * cycle + n) };
+            hostile.send(flood, &[OdometryRecord::default()]);
+        }
+        outlet.send_one(Stamp::default(), OdometryRecord::default(), cycle).unwrap();
+        inlet.poll(|stamp, _| heard += u64::from(stamp.valid_at_ns == cycle));
+    }
+    assert_eq!(heard, 20);
+    assert_eq!(inlet.counts().lost, 0);
+}
