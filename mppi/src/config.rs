@@ -37,7 +37,8 @@ pub struct Config {
     /// with the commands that were already sent [s].
     pub delay_s: f64,
     /// How far the commands may run ahead of the measured speed and steering angle, as the time that the limits of
-    /// acceleration and steering rate need for it; 0 = the plan starts exactly at the measured state [s].
+    /// acceleration and steering rate need for it, beyond the lag of the model's own effects; 0 = the plan of a model
+    /// without effects starts exactly at the measured state [s].
     pub tracking_s: f64,
     /// Backing up when stuck; needs a reverse gear.
     pub recovery: Recovery,

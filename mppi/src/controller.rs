@@ -9,6 +9,7 @@ use crate::history::History;
 use crate::judgement::Judge;
 use crate::kernel::workers::Workers;
 use crate::kernel::{CHUNK, Machine, functions};
+use crate::lag;
 use crate::objective::{Input, ReferenceStep};
 use crate::plan::Plan;
 use crate::recovery::{Mode, Watch};
@@ -50,6 +51,8 @@ pub struct Controller {
     cell_stepper: Stepper,
     history: History,
     watch: Watch,
+    /// How far the model's effects keep speed and steering behind the commands [s].
+    lag_s: [f64; 2],
     reference: Vec<ReferenceStep>,
     /// Whether there is no plan yet.
     is_fresh: bool,
@@ -79,6 +82,7 @@ impl Controller {
         if n_slots > MAX_SLOTS {
             return Err(ConfigError::EffectMemory { found: n_slots, step_s: config.step_s });
         }
+        let lag_s = lag::of_actuators(&stepper, &model.limits, config.step_s);
         let n_chunks = config.n_rollouts / CHUNK;
         Ok(Self {
             workers: Workers::new(config.n_threads, n_chunks)?,
@@ -89,6 +93,7 @@ impl Controller {
             stepper,
             history: History::new(),
             watch: Watch::new(config.recovery),
+            lag_s,
             reference: vec![ReferenceStep::default(); config.n_steps],
             is_fresh: true,
             slots: [0.0; MAX_SLOTS],
@@ -250,7 +255,7 @@ impl Controller {
     /// Steps in which the vehicle could stop, one to spare, from the faster of its speed and the planned one.
     fn steps_to_stop(&self) -> usize {
         let speed_mps = self.start.speed_mps.abs().max(f64::from(self.plan.nominal[0][0].abs()));
-        let stop_s = speed_mps / self.model.limits.acceleration_max_mps2;
+        let stop_s = speed_mps / self.model.limits.acceleration_max_mps2 + self.lag_s[0];
         ((stop_s / self.config.step_s).ceil() as usize + 1).min(self.config.n_steps)
     }
 

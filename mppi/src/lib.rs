@@ -9,6 +9,7 @@ mod diagnostics;
 mod history;
 mod judgement;
 mod kernel;
+mod lag;
 mod objective;
 mod plan;
 mod recovery;

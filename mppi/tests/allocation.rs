@@ -2,7 +2,7 @@
 
 mod fixture;
 
-use bicycle::effect::{SpeedLag, SteerDelay};
+use bicycle::effect::{CATALOGUE, SpeedLag, SteerDelay};
 use bicycle::{Decision, Effect, State};
 use mppi::{Config, Controller, CostToGo, CostToGoConfig, Input, Objective, Terminal};
 use std::alloc::{GlobalAlloc, Layout, System};
@@ -37,12 +37,20 @@ fn a_decision_allocates_nothing() {
         Effect::SteerDelay(SteerDelay { delay_s: 0.25 }),
         Effect::SpeedLag(SpeedLag { time_constant_s: 0.3 }),
     ];
+    let mut with_all = fixture::model();
+    let every = CATALOGUE.iter().map(|effect| {
+        let values =
+            [0, 1, 2, 3].map(|k| effect.parameters.get(k).map_or(0.0, |parameter| parameter.tried[0]));
+        Effect::from_values(effect.id, values).unwrap()
+    });
+    with_all.effects = every.collect();
     let delayed = Config { delay_s: 0.15, n_iterations: 2, n_threads: 3, ..Config::default() };
     let cases = [
         (Config::bound(), fixture::model()),
         (Config::default(), fixture::model()),
         (Config { n_threads: 2, ..Config::default() }, with_effects.clone()),
         (delayed, with_effects),
+        (Config::default(), with_all),
     ];
     let map = fixture::rough(3);
     for (config, model) in cases {

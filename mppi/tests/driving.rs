@@ -2,7 +2,8 @@
 
 mod fixture;
 
-use bicycle::{Command, Decision, HoldReason, Limits, Model, State, StopReason};
+use bicycle::effect::{RollingDrag, SpeedLoop};
+use bicycle::{Command, Decision, Effect, HoldReason, Limits, Model, State, StopReason};
 use fixture::{STEP_S, block, cell, drive, goal, level, model};
 use mppi::{
     Config, Controller, CostToGo, CostToGoConfig, Input, Objective, Recovery, ReferencePath, Rollout,
@@ -55,6 +56,19 @@ fn commands_keep_the_limits_of_the_actuators_from_the_measured_state_on() {
         assert!((-1.0..=2.0).contains(&speed_mps) && steering_rad.abs() <= 0.5);
         before = [f64::from(speed_mps), f64::from(steering_rad)];
     }
+}
+
+/// The speed loop closes 1 m/s of distance to the command with 1 m/s2 and drag takes 1.2: the vehicle moves only if the
+/// command may run ahead farther than the second's half that actuators without a lag are given at 2 m/s2.
+#[test]
+fn commands_run_ahead_as_far_as_the_model_lags() {
+    let mut model = model();
+    model.effects = vec![
+        Effect::SpeedLoop(SpeedLoop { time_constant_s: 1.0 }),
+        Effect::RollingDrag(RollingDrag { deceleration_mps2: 1.2 }),
+    ];
+    let drive = drive(&smooth(), &model, &level(), goal([5.0, 0.0]), (standing(), 150));
+    assert_eq!(drive.decisions.last(), Some(&Decision::Hold(HoldReason::AtGoal)));
 }
 
 #[test]

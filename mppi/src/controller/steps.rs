@@ -51,7 +51,8 @@ impl Controller {
         *slots = memory.map(|value| value as f32);
     }
 
-    /// Where the commands of the plan start from: the last command, held near the measured state.
+    /// Where the commands of the plan start from: the last command, held as near to the measured state as the lag that
+    /// the model knows of allows.
     fn start_control(&self) -> Control {
         let limits = &self.model.limits;
         let reached = [self.start.speed_mps, self.start.steering_rad];
@@ -59,8 +60,8 @@ impl Controller {
             .history
             .last()
             .map_or(reached, |command| [f64::from(command.speed_mps), f64::from(command.steering_rad)]);
-        let reach = [limits.acceleration_max_mps2, limits.steering_rate_max_radps]
-            .map(|rate| rate * self.config.tracking_s);
+        let rates = [limits.acceleration_max_mps2, limits.steering_rate_max_radps];
+        let reach = [0, 1].map(|c| rates[c] * (self.config.tracking_s + self.lag_s[c]));
         [0, 1].map(|c| last[c].clamp(reached[c] - reach[c], reached[c] + reach[c]) as f32)
     }
 

@@ -4,8 +4,8 @@
 use super::*;
 use crate::cost_to_go::CostToGoView;
 use crate::kernel::{Isa, Machine};
-use bicycle::{Limits, Model};
-use traversability::{GridGeometry, RiskMap};
+use bicycle::{Command, Effect, Limits, Model, State};
+use traversability::{GridGeometry, Ground, RiskMap};
 
 const N_STEPS: usize = 40;
 const STEP_S: f64 = 0.1;
@@ -18,8 +18,8 @@ fn machines() -> Vec<Machine> {
     [Isa::Portable, Isa::Avx2, Isa::Avx512].into_iter().filter_map(Machine::find).collect()
 }
 
-fn stepper(resolution_m: f64) -> Stepper {
-    let limits = Limits {
+fn model_limits() -> Limits {
+    Limits {
         speed_max_mps: 3.0,
         reverse_speed_max_mps: 1.0,
         steering_max_rad: 0.5,
@@ -28,8 +28,11 @@ fn stepper(resolution_m: f64) -> Stepper {
         lateral_acceleration_max_mps2: 1.0,
         roll_max_rad: 0.5,
         pitch_max_rad: 0.5,
-    };
-    let model = Model { wheelbase_m: WHEELBASE_M, limits, effects: Vec::new() };
+    }
+}
+
+fn stepper(resolution_m: f64) -> Stepper {
+    let model = Model { wheelbase_m: WHEELBASE_M, limits: model_limits(), effects: Vec::new() };
     Stepper::new(&model, STEP_S, resolution_m)
 }
 
@@ -217,5 +220,109 @@ fn the_cost_to_go_field_is_interpolated_between_cells() {
             let found = f64::from(chunk.terms[CostTerm::Terminal as usize].0[lane]);
             assert!((found - linear([x, y])).abs() < 1e-3, "{found} {}", linear([x, y]));
         }
+    }
+}
+
+/// Effects at every stage, in the order of a machine: delays and lags of both commands, gains, play, rate limits, a
+/// speed loop under drags and slope, understeer, slip and grip, and the sensors, which change no rollout.
+fn whole_model() -> Model {
+    let given: [(&str, [f64; 4]); 18] = [
+        ("steer_delay", [0.13, 0.0, 0.0, 0.0]),
+        ("speed_delay", [0.21, 0.0, 0.0, 0.0]),
+        ("speed_scale", [0.95, 0.0, 0.0, 0.0]),
+        ("steer_gain", [1.05, 0.0, 0.0, 0.0]),
+        ("steer_bias", [0.01, 0.0, 0.0, 0.0]),
+        ("backlash", [0.01, 0.0, 0.0, 0.0]),
+        ("steer_rate", [0.9, 0.0, 0.0, 0.0]),
+        ("steer_lag", [0.15, 0.0, 0.0, 0.0]),
+        ("steer_lag", [0.05, 0.0, 0.0, 0.0]),
+        ("speed_loop", [0.4, 0.0, 0.0, 0.0]),
+        ("rolling_drag", [0.2, 0.0, 0.0, 0.0]),
+        ("quad_drag", [0.02, 0.0, 0.0, 0.0]),
+        ("veg_drag", [0.5, 0.0, 0.0, 0.0]),
+        ("slope_gravity", [0.8, 0.0, 0.0, 0.0]),
+        ("cross_slope", [0.6, 0.0, 0.0, 0.0]),
+        ("understeer", [0.02, 0.0, 0.0, 0.0]),
+        ("rear_slip", [0.01, 0.0, 0.0, 0.0]),
+        ("yaw_misalign", [0.1, 0.0, 0.0, 0.0]),
+    ];
+    let effects = given.iter().map(|&(id, values)| Effect::from_values(id, values).unwrap()).collect();
+    let limits = Limits { steering_rate_max_radps: 0.8, ..model_limits() };
+    Model { wheelbase_m: WHEELBASE_M, limits, effects }
+}
+
+/// Slopes and plants that change from cell to cell.
+fn hilly() -> RiskMap {
+    let mut map = map();
+    for (index, ground) in map.arrays_mut().1.iter_mut().enumerate() {
+        let wave = |factor: usize| ((index * factor) % 97) as f32 / 96.0 - 0.5;
+        *ground = Ground {
+            gradient: [0.3 * wave(5), 0.3 * wave(11)],
+            class: (index % 3) as u8,
+            ..Ground::default()
+        };
+    }
+    map
+}
+
+/// The command in force `age_s` before the start.
+fn past(age_s: f64) -> Command {
+    Command { speed_mps: (1.0 - 0.4 * age_s) as f32, steering_rad: (0.3 * (3.0 * age_s).sin()) as f32 }
+}
+
+/// Every lane of every instruction set goes where the model of one vehicle in f64 goes on the same ground, with the
+/// past that it remembers. Lanes that come within 1e-4 of a cell's or bin's edge are left out.
+#[test]
+fn rollouts_of_a_whole_model_go_where_one_vehicle_goes() {
+    let (map, model) = (hilly(), whole_model());
+    let one = Stepper::new(&model, STEP_S, 1.0);
+    let stepper = Stepper::new(&model, STEP_S, 0.5);
+    assert!(one.n_slots() <= MAX_SLOTS);
+    let mut remembered = vec![0.0; one.n_slots()];
+    one.recall(&past, &mut remembered);
+    let slots: Vec<f32> = remembered.iter().map(|value| *value as f32).collect();
+    let task = Task::Goal(GoalTask { x_cells: 1e3, ..goal(&map, 0.0, None) });
+    let mut scene = scene(&map, &stepper, task);
+    (scene.slots, scene.start.speed_mps, scene.start.steering_rad) = (&slots, 0.8, 0.1);
+    let view = map.view();
+    for machine in machines() {
+        let mut chunk = chunk();
+        machine.run(RollOut { scene: &scene, chunk: &mut chunk });
+        let mut n_compared = 0;
+        for lane in 0..CHUNK {
+            let mut memory = remembered.clone();
+            let mut state =
+                State { x_m: START[0], y_m: START[1], yaw_rad: START[2], speed_mps: 0.8, steering_rad: 0.1 };
+            let mut margin = f64::INFINITY;
+            for t in 0..N_STEPS {
+                for place in [state.x_m / 0.5, state.y_m / 0.5, state.yaw_rad / std::f64::consts::TAU * 13.0]
+                {
+                    margin = margin.min((place - place.round()).abs());
+                }
+                let risk = view.risk_at(state.x_m, state.y_m, state.yaw_rad);
+                let cell = view.geometry.cell_at(state.x_m, state.y_m).unwrap();
+                let ground = view.ground[view.geometry.index(cell)];
+                let sample = GroundSample {
+                    linear_traction: f64::from(risk.linear_traction),
+                    angular_traction: f64::from(risk.angular_traction),
+                    gradient: ground.gradient.map(f64::from),
+                    class: f64::from(ground.class),
+                };
+                let [speed, steering] = control(lane, t);
+                let command = Command { speed_mps: speed as f32, steering_rad: steering as f32 };
+                state = one.step_state(&state, command, &sample, &mut memory, t);
+            }
+            if margin < 1e-4 {
+                continue;
+            }
+            n_compared += 1;
+            // The cost at the end is the time for the rest of the way, and the goal is far.
+            let corner_m = view.geometry.south_west_m();
+            let goal_m = [corner_m[0] + 0.5e3, GOAL_M[1]];
+            let expected = (state.x_m - goal_m[0]).hypot(state.y_m - goal_m[1]) / 2.0;
+            let found = f64::from(chunk.terms[CostTerm::Terminal as usize].0[lane]);
+            assert!((found - expected).abs() < 3e-3, "{machine:?} lane {lane}: {found} {expected}");
+        }
+        assert!(n_compared > 40, "{n_compared} compared");
     }
 }
