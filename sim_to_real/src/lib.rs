@@ -26,6 +26,7 @@ mod verification;
 
 pub use answer::{Answer, BeforeAfter, Condition, Estimate, NamedEffect, Place, Ranked, Shrink, Verdict};
 pub use baseline::{Baseline, GapError};
+pub use causes::composed;
 pub use diagnosis::{Diagnosis, diagnose};
 pub use drive::DriveError;
 pub use findings::{
