@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use bench::closed_loop::{ClosedLoop, Drive, MapSource, Method};
-use bicycle::{Decision, Model, StopReason, Vehicle};
+use bicycle::{Decision, Effect, Model, StopReason, Vehicle};
 use navigator::Config;
 use scenarios::{
     EpisodeConfig, Fault, Outcome, Patch, RangeSensorConfig, RockFieldConfig, RockMap, SensorFault, Split,
@@ -67,10 +67,15 @@ impl Course {
     }
 
     pub fn begin(&self) -> ClosedLoop {
+        self.begin_believing(Vec::new())
+    }
+
+    /// With a controller that believes in these effects.
+    pub fn begin_believing(&self, effects: Vec<Effect>) -> ClosedLoop {
         ClosedLoop::new(Drive {
             task: self.task.clone(),
             vehicle: &self.vehicle,
-            model: Model::of(&self.vehicle),
+            model: Model { effects, ..Model::of(&self.vehicle) },
             config: self.config.clone(),
             episode: self.episode.clone(),
             method: self.method,

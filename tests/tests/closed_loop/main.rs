@@ -6,3 +6,4 @@ mod course;
 mod faults;
 mod goals;
 mod repeats;
+mod sensors;
