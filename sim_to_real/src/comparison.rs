@@ -46,6 +46,28 @@ impl<'a> Comparison<'a> {
         residuals
     }
 
+    pub(crate) fn drives(&self) -> impl Iterator<Item = &Drive> {
+        self.drives.iter().copied()
+    }
+
+    /// Whether every drive can judge this effect.
+    pub(crate) fn judges(&self, id: &str) -> bool {
+        self.drives.iter().all(|drive| drive.evidence.judges(id))
+    }
+
+    /// What the noise of the measurements alone makes of the residuals: the smoothed outcome less the measured one.
+    pub(crate) fn noise(&self) -> Vec<f32> {
+        let of_drive = |drive: &&Drive| {
+            let smooth = Drive { measured: drive.smooth.clone(), ..(*drive).clone() };
+            outcomes(&smooth).into_iter().zip(outcomes(drive)).collect::<Vec<_>>()
+        };
+        let both = self.drives.iter().flat_map(of_drive).zip(self.per_sigma.iter().cycle());
+        let noise = |((smooth, measured), per_sigma): ((f32, f32), &f32)| {
+            if measured.is_nan() { 0.0 } else { (smooth - measured) * per_sigma }
+        };
+        both.map(noise).collect()
+    }
+
     /// Mean robust loss of a model.
     pub(crate) fn loss(&self, effects: &[Effect]) -> f64 {
         mean_loss(&self.residuals(effects))

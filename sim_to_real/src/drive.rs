@@ -22,6 +22,8 @@ pub(crate) const N_STEPS: usize = HORIZONS[3];
 /// Runs with room for this many steps after the settling time are compared at all horizons from every start; rollouts
 /// of shorter ones end with the run.
 const LONG: usize = N_STEPS + STRIDE;
+/// What actuators remember of their commands in a stretch of a drive [s].
+const REMEMBERED_S: f64 = 3.0;
 /// The shortest run [s].
 const SHORTEST_S: f64 = 1.0;
 
@@ -136,6 +138,28 @@ impl Drive {
     pub(crate) fn halves(&self) -> Vec<Self> {
         let (earlier, later) = self.starts.split_at(self.starts.len() / 2);
         [earlier, later].map(|starts| Self { starts: starts.to_vec(), ..self.clone() }).to_vec()
+    }
+
+    /// The part of the drive that rollouts from these starts run through, with what came before them for as long as
+    /// actuators remember.
+    pub(crate) fn stretch(&self, starts: &[usize]) -> Self {
+        let (Some(&first), Some(&last)) = (starts.first(), starts.last()) else {
+            return Self { starts: Vec::new(), ..self.clone() };
+        };
+        let from = first.saturating_sub((REMEMBERED_S / STEP_S) as usize);
+        let rows = from..(last + N_STEPS + 1).min(self.commands.len());
+        Self {
+            name: self.name.clone(),
+            time_s: self.time_s + from as f64 * STEP_S,
+            evidence: self.evidence,
+            commands: self.commands[rows.clone()].to_vec(),
+            measured: self.measured.each_ref().map(|values| values[rows.clone()].to_vec()),
+            smooth: self.smooth.each_ref().map(|values| values[rows.clone()].to_vec()),
+            gradient: self.gradient.each_ref().map(|values| values[rows.clone()].to_vec()),
+            class: self.class[rows.clone()].to_vec(),
+            travelled: self.travelled.each_ref().map(|values| values[rows.clone()].to_vec()),
+            starts: starts.iter().map(|start| start - from).collect(),
+        }
     }
 
     /// Whether anything was measured at a row.

@@ -23,6 +23,7 @@ mod screening;
 mod signals;
 mod smoothing;
 mod verification;
+mod without_simulator;
 
 pub use answer::{Answer, BeforeAfter, Condition, Estimate, NamedEffect, Place, Ranked, Shrink, Verdict};
 pub use baseline::{Baseline, GapError};
@@ -36,3 +37,4 @@ pub use findings::{
 pub use machine::{GroundMap, Machine, SensorNoise};
 pub use screening::{Gravity, Place as RowPlace, Suspicion, screen, screen_sets, split_at_breaks};
 pub use verification::{Verification, verify};
+pub use without_simulator::{WithoutSimulator, diagnose_without_simulator};
