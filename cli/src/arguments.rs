@@ -1,12 +1,16 @@
 //! The command line: what can be asked, in which units, and what each word must look like.
 
 mod bench;
+mod bench_gap;
 mod collect;
 mod drive;
 mod gap;
 mod gap_check;
+mod inspect;
 mod learned_map;
+mod replay;
 mod train;
+mod up;
 mod values;
 
 use clap::{Parser, Subcommand};
@@ -15,12 +19,16 @@ pub use bench::{
     BenchCommand, BenchControlArguments, BenchLearningArguments, BenchNavigationArguments,
     BenchPriorMapArguments, BenchWork,
 };
+pub use bench_gap::BenchGapArguments;
 pub use collect::{CollectArguments, CollectMap, CollectSplit, CollectWorld};
 pub use drive::{DriveArguments, InstructionSet, MapSource, Method, Pace};
 pub use gap::{GapApplyArguments, GapCommand, GapDiagnoseArguments};
 pub use gap_check::{GapScoreArguments, GapSealArguments};
+pub use inspect::InspectArguments;
 pub use learned_map::{BenchLearnedMapArguments, NetworkSizes};
+pub use replay::ReplayArguments;
 pub use train::{TrainArguments, TrainCommand};
+pub use up::{UpArguments, UpRole};
 pub use values::{Goal, StartPose, WorldSource};
 
 /// Everything after `surefoot`.
@@ -46,6 +54,15 @@ pub enum Command {
     /// Drive a simulated vehicle over rough ground to a goal
     #[command(long_about = drive::LONG_ABOUT)]
     Drive(Box<DriveArguments>),
+    /// Drive with every part a process of its own, as on a robot
+    #[command(long_about = up::LONG_ABOUT)]
+    Up(Box<UpArguments>),
+    /// Make every decision of a recording again, to the last bit
+    #[command(long_about = replay::LONG_ABOUT)]
+    Replay(ReplayArguments),
+    /// Say what a recording, an elevation map, a vehicle or networks hold
+    #[command(long_about = inspect::LONG_ABOUT)]
+    Inspect(InspectArguments),
     /// Gather data to learn from, by simulated drives or from a recorded one
     #[command(long_about = collect::LONG_ABOUT)]
     Collect(Box<CollectArguments>),
@@ -81,6 +98,7 @@ Examples:
   surefoot drive                        40 m over a generated rock field, nothing else needed
   surefoot drive --world arena          an RC car in a hall with a ramp and bushes
   surefoot drive --help                 every option, with its unit and default
+  surefoot up                           the same drive by processes that survive one another
   surefoot collect                      data to learn from, out of 200 simulated trials
   surefoot train traversability --train train.safetensors --validation validation.safetensors
                                         networks that know what the drives have taught

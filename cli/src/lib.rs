@@ -9,12 +9,15 @@ mod collect;
 mod drive;
 mod failure;
 mod gap;
+mod inspect;
 pub mod interrupt;
 pub mod output;
 pub mod picture;
 pub mod progress;
+mod replay;
 pub mod summary;
 mod train;
+mod up;
 
 use std::io::Write;
 use std::process::ExitCode;
@@ -43,6 +46,9 @@ pub fn run() -> ExitCode {
 fn dispatch(command: Command) -> anyhow::Result<()> {
     match command {
         Command::Drive(drive) => drive::run(&drive),
+        Command::Up(up) => up::run(&up),
+        Command::Replay(replay) => replay::run(&replay),
+        Command::Inspect(inspect) => inspect::run(&inspect),
         Command::Gap { command } => gap::run(&command),
         Command::Collect(collect) => collect::run(&collect),
         Command::Train { command: TrainCommand::Traversability(traversability) } => {
@@ -53,6 +59,7 @@ fn dispatch(command: Command) -> anyhow::Result<()> {
         Command::Bench { command: BenchCommand::LearnedMap(learned_map) } => {
             bench::run_learned_map(&learned_map)
         }
+        Command::Bench { command: BenchCommand::Gap(gap) } => bench::run_gap(&gap),
         Command::Bench { command: BenchCommand::Learning(learning) } => bench::run_learning(&learning),
         Command::Bench { command: BenchCommand::Navigation(navigation) } => {
             bench::run_navigation(&navigation)

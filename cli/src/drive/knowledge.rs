@@ -17,7 +17,7 @@ const SIDECAR: &str = "weights.json";
 const FILE_BYTES_MAX: u64 = 1 << 28;
 
 /// A method and its networks.
-pub(super) struct Knowledge {
+pub(crate) struct Knowledge {
     pub method: Method,
     /// `None` for a method without any.
     pub networks: Option<Arc<Checkpoint>>,
@@ -61,9 +61,7 @@ impl Knowledge {
 
     fn from_folder(folder: &Path, asked: Option<Method>, vehicle: &Vehicle) -> Result<Self, UsageError> {
         let told = |text: String| UsageError(format!("--weights {}: {text}", folder.display()));
-        let [weights, sidecar] = [WEIGHTS, SIDECAR].map(|name| read(&folder.join(name)));
-        let checkpoint = Checkpoint::from_bytes(&weights.map_err(&told)?, &sidecar.map_err(&told)?)
-            .map_err(|error| told(UsageError::from_input(error).0))?;
+        let checkpoint = read_checkpoint(folder).map_err(|UsageError(text)| told(text))?;
         let trained = checkpoint.sidecar.method;
         checkpoint.check_vehicle(&vehicle.geometry).map_err(|error| told(error.to_string()))?;
         let drives_on_these =
@@ -83,6 +81,13 @@ impl Knowledge {
         })?;
         Ok(Self { method, networks: Some(Arc::new(checkpoint)), why_not_learned: None })
     }
+}
+
+/// The networks of a folder as `surefoot train` leaves it.
+pub(crate) fn read_checkpoint(folder: &Path) -> Result<Checkpoint, UsageError> {
+    let [weights, sidecar] = [WEIGHTS, SIDECAR].map(|name| read(&folder.join(name)));
+    Checkpoint::from_bytes(&weights.map_err(UsageError)?, &sidecar.map_err(UsageError)?)
+        .map_err(UsageError::from_input)
 }
 
 /// A whole file, refused when it is too large for networks.

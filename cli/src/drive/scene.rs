@@ -12,6 +12,7 @@ use scenarios::{
 };
 
 use super::knowledge::Knowledge;
+use super::open_loop::Script;
 use crate::UsageError;
 use crate::arguments::{DriveArguments, WorldSource};
 
@@ -29,10 +30,33 @@ pub(super) struct Scene {
     pub config: Config,
     pub task: Task,
     pub knowledge: Knowledge,
+    /// Commands to carry out instead of planning.
+    pub script: Option<Script>,
+}
+
+/// A vehicle and what its planner knows, wherever it drives.
+pub(crate) struct Machine {
+    pub vehicle: Vehicle,
+    pub model: Model,
+    pub config: Config,
+    pub knowledge: Knowledge,
 }
 
 /// Reads and builds everything; whatever cannot be is refused here, before anything drives.
 pub(super) fn prepare(arguments: &DriveArguments) -> Result<Scene, UsageError> {
+    let Machine { vehicle, model, config, knowledge } = machine(arguments)?;
+    let mut task = task(arguments, &vehicle)?;
+    let read = |path: &PathBuf| Script::read(path, &vehicle.limits);
+    let script = arguments.commands.as_ref().map(read).transpose()?;
+    if script.is_some() {
+        // Whoever follows commands to their end passes the goal by.
+        task.goal_tolerance_m = 0.0;
+    }
+    Ok(Scene { vehicle, model, config, task, knowledge, script })
+}
+
+/// The machine alone.
+pub(crate) fn machine(arguments: &DriveArguments) -> Result<Machine, UsageError> {
     let vehicle = read_vehicle(arguments.vehicle_name_or_path()).map_err(UsageError::from_input)?;
     let model = match &arguments.model {
         Some(path) => read_model(path).map_err(UsageError::from_input)?,
@@ -46,11 +70,11 @@ pub(super) fn prepare(arguments: &DriveArguments) -> Result<Scene, UsageError> {
     config.controller.n_threads = arguments.n_threads();
     config.controller.isa = arguments.isa.into();
     let knowledge = Knowledge::choose(arguments, &vehicle)?;
-    let task = task(arguments, &vehicle)?;
-    Ok(Scene { vehicle, model, config, task, knowledge })
+    Ok(Machine { vehicle, model, config, knowledge })
 }
 
-fn task(arguments: &DriveArguments, vehicle: &Vehicle) -> Result<Task, UsageError> {
+/// Where to drive, from where, where to.
+pub(crate) fn task(arguments: &DriveArguments, vehicle: &Vehicle) -> Result<Task, UsageError> {
     let standard = match &arguments.world {
         WorldSource::Rocks => {
             Task::rock_field(&RockFieldConfig::default(), arguments.seed).map_err(UsageError::from_input)?

@@ -1,0 +1,32 @@
+//! `surefoot inspect`.
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+/// What to look into.
+#[derive(Args, Clone, Debug)]
+#[command(after_long_help = AFTER_HELP)]
+pub struct InspectArguments {
+    /// A recording (.mcap), elevation (.npz, .tif, .png), a vehicle (.toml, or the name of a shipped one), or a folder
+    /// with networks
+    #[arg(value_name = "FILE")]
+    pub file: PathBuf,
+
+    /// Write what was found to this file too
+    #[arg(long, value_name = "FILE")]
+    pub json: Option<PathBuf>,
+}
+
+pub(super) const LONG_ABOUT: &str = "\
+Says what a file holds: topics, times and setup of a recording, also of one that breaks off; size and heights of an \
+elevation map; the figures of a vehicle; method, training and size of networks.";
+
+const AFTER_HELP: &str = "\
+Examples:
+  surefoot inspect surefoot-out/drive.mcap
+  surefoot inspect rc_car
+
+Exit codes:
+  0  the file was understood
+  2  it was not; one line says what was expected and what was found";

@@ -1,0 +1,37 @@
+//! `surefoot replay`.
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+/// What to make again.
+#[derive(Args, Clone, Debug)]
+#[command(after_long_help = AFTER_HELP)]
+pub struct ReplayArguments {
+    /// Recordings of `surefoot up`; files that follow one another, in their order
+    #[arg(value_name = "FILE", required = true)]
+    pub files: Vec<PathBuf>,
+
+    /// Networks that were used, when they did not come with the program: a folder with weights.safetensors and
+    /// weights.json
+    #[arg(long, value_name = "DIR")]
+    pub weights: Option<PathBuf>,
+
+    /// Write the result to this file too
+    #[arg(long, value_name = "FILE")]
+    pub json: Option<PathBuf>,
+}
+
+pub(super) const LONG_ABOUT: &str = "\
+Makes every decision of a recording again: the maps from the recorded scans and the networks, checked by their hashes, \
+and the commands from the maps and what control says it used. Every command must come out to the last bit; the first \
+that does not is told. What the recording lacks is told too, and what hangs on it is not counted as made again.";
+
+const AFTER_HELP: &str = "\
+Example:
+  surefoot replay surefoot-out/drive-000.mcap
+
+Exit codes:
+  0  every decision was made again to the last bit
+  1  one was not, or something that it needs was not recorded; one line says which
+  2  bad usage or input; one line says what was expected and what was found";

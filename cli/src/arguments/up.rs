@@ -1,0 +1,116 @@
+//! `surefoot up`.
+
+use clap::{Args, ValueEnum};
+use runtime::channel::RunName;
+use runtime::status::Role;
+
+use super::DriveArguments;
+use super::values;
+
+/// What to run, and for which machine.
+#[derive(Args, Clone, Debug)]
+#[command(after_long_help = AFTER_HELP)]
+pub struct UpArguments {
+    /// Which process to be; all starts every one of them and keeps them alive
+    #[arg(long, value_enum, default_value_t = UpRole::All, help_heading = "Processes")]
+    pub role: UpRole,
+
+    /// Name of the run: processes of the same name find one another
+    #[arg(long, value_name = "NAME", default_value = "field", help_heading = "Processes")]
+    pub run: RunName,
+
+    /// Decisions per second, 1 to 50 [Hz]
+    #[arg(long, value_name = "HERTZ", value_parser = rate_hz, default_value = "10",
+          allow_hyphen_values = true, help_heading = "Processes")]
+    pub rate: f64,
+
+    /// Age up to which the vehicle follows a command [s]; then it stops
+    #[arg(long, value_name = "SECONDS", value_parser = values::duration_s, default_value = "0.3",
+          allow_hyphen_values = true, help_heading = "Processes")]
+    pub command_age: f64,
+
+    /// Set for the processes that `--role all` starts: end when it does
+    #[arg(long, hide = true)]
+    pub supervised: bool,
+
+    /// World, vehicle, controller and output, as for `surefoot drive`.
+    #[command(flatten)]
+    pub drive: DriveArguments,
+}
+
+/// A process, or all of them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum UpRole {
+    /// All of the others, kept alive
+    All,
+    /// The simulated vehicle; leave it out and run your own instead
+    Plant,
+    /// Scans and poses to the map of the ground
+    Mapping,
+    /// The map of the ground to risk
+    Learning,
+    /// Risk to commands
+    Control,
+    /// Everything into a recording
+    Recorder,
+}
+
+impl UpRole {
+    /// The one process; `None` for all.
+    pub fn role(self) -> Option<Role> {
+        match self {
+            Self::All => None,
+            Self::Plant => Some(Role::Plant),
+            Self::Mapping => Some(Role::Mapping),
+            Self::Learning => Some(Role::Learning),
+            Self::Control => Some(Role::Control),
+            Self::Recorder => Some(Role::Recorder),
+        }
+    }
+}
+
+fn rate_hz(word: &str) -> Result<f64, String> {
+    values::number_where(word, "a rate from 1 to 50 Hz", |value| (1.0..=50.0).contains(&value))
+}
+
+pub(super) const LONG_ABOUT: &str = "\
+Drives as `surefoot drive` does, with every part a process of its own: the vehicle, mapping, learning, control and \
+the recorder, linked by channels in shared memory.
+
+Control decides at absolute deadlines on what there is and never waits for a map. When learning dies, physics judges \
+the ground; when nothing young enough is left to drive on, the vehicle stops; when control dies, the vehicle's own \
+watchdog stops it. Processes may start in any order, each in its own terminal, and be restarted at any time.";
+
+const AFTER_HELP: &str = "\
+Examples:
+  surefoot up
+      All processes, over a generated rock field.
+  surefoot up --role control --run north
+      One of them, in its own terminal, for the run `north`.
+
+Exit codes:
+  0  the goal was reached, or the process was told to end
+  1  it was not, or a process could not be kept alive; one line says why
+  2  bad usage or input; one line says what was expected and what was found";
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::Parser;
+
+    #[derive(Parser)]
+    struct Only {
+        #[command(flatten)]
+        up: UpArguments,
+    }
+
+    #[test]
+    fn rates_and_runs_are_what_they_may_be() {
+        let parse = |words: &[&str]| Only::try_parse_from(std::iter::once(&"surefoot").chain(words));
+        let up = parse(&[]).unwrap().up;
+        assert_eq!((up.role, up.rate, up.run.to_string()), (UpRole::All, 10.0, "field".to_owned()));
+        for wrong in [["--rate", "0"], ["--rate", "51"], ["--run", "a b"], ["--role", "pilot"]] {
+            assert!(parse(&wrong).is_err(), "{wrong:?}");
+        }
+    }
+}

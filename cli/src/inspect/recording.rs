@@ -1,0 +1,76 @@
+//! What a recording holds, also one that breaks off.
+
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::BufReader;
+use std::path::Path;
+
+use mcap::io::MessageReader;
+use mcap::sans_io::LinearReaderOptions;
+use serde_json::{Value, json};
+
+use crate::UsageError;
+
+/// Longest record that is believed: far above what recorders write.
+const RECORD_BYTES_MAX: usize = 1 << 28;
+
+#[derive(Default)]
+struct Topic {
+    schema: String,
+    encoding: String,
+    messages: u64,
+    bytes: u64,
+}
+
+pub(super) fn look(path: &Path) -> Result<Value, UsageError> {
+    let refused = |problem: String| {
+        UsageError(format!("{}: expected a recording in MCAP, found {problem}", path.display()))
+    };
+    let file = File::open(path).map_err(|error| refused(error.to_string()))?;
+    let n_bytes = file.metadata().map_err(|error| refused(error.to_string()))?.len();
+    let options = LinearReaderOptions::default()
+        .with_record_length_limit(RECORD_BYTES_MAX)
+        .with_prevalidate_chunk_crcs(true);
+    let mut topics: BTreeMap<String, Topic> = BTreeMap::new();
+    let (mut setup, mut ended_early, mut times_ns) = (Value::Null, None, None);
+    for message in MessageReader::new_with_options(BufReader::new(file), options) {
+        let message = match message {
+            Ok(message) => message,
+            Err(error) => {
+                ended_early = Some(error.to_string());
+                break;
+            }
+        };
+        let channel = &message.channel;
+        if channel.topic == "/setup" {
+            setup = serde_json::from_slice(&message.data).unwrap_or(Value::Null);
+        }
+        let topic = topics.entry(channel.topic.clone()).or_default();
+        topic.schema = channel.schema.as_ref().map_or(String::new(), |schema| schema.name.clone());
+        topic.encoding.clone_from(&channel.message_encoding);
+        topic.messages += 1;
+        topic.bytes += message.data.len() as u64;
+        let (first, last) = times_ns.unwrap_or((message.log_time, message.log_time));
+        times_ns = Some((first.min(message.log_time), last.max(message.log_time)));
+    }
+    if topics.is_empty() {
+        return Err(refused(ended_early.unwrap_or_else(|| "no message in it".to_owned())));
+    }
+    let duration_s = times_ns.map(|(first, last)| (last - first) as f64 * 1e-9);
+    let topics: BTreeMap<String, Value> =
+        topics.into_iter().map(|(name, topic)| (name, told(&topic))).collect();
+    Ok(json!({
+        "kind": "recording",
+        "bytes": n_bytes,
+        "duration_s": duration_s,
+        "complete": ended_early.is_none(),
+        "ended_early": ended_early,
+        "setup": setup,
+        "topics": topics,
+    }))
+}
+
+fn told(topic: &Topic) -> Value {
+    let Topic { schema, encoding, messages, bytes } = topic;
+    json!({ "schema": schema, "encoding": encoding, "messages": messages, "bytes": bytes })
+}

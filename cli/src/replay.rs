@@ -1,0 +1,97 @@
+//! `surefoot replay`: what was recorded, decided again.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use bench::closed_loop::Method;
+use evidential::{Checkpoint, shipped};
+use navigator::Belief;
+use runtime::replay::{self, Knowledge, ReplayReport};
+use runtime::setup::{MachineSetup, RecordedSetup};
+use sha2::{Digest, Sha256};
+
+use crate::arguments::ReplayArguments;
+use crate::drive::read_checkpoint;
+use crate::{UsageError, WorkFailed};
+
+/// Every method that a recording may name.
+const METHODS: [Method; 7] = [
+    Method::Pietra,
+    Method::PietraAvoid,
+    Method::Evora,
+    Method::PhysicsInformed,
+    Method::Vanilla,
+    Method::Physics,
+    Method::Nominal,
+];
+
+pub(crate) fn run(arguments: &ReplayArguments) -> anyhow::Result<()> {
+    if let Some(json) = &arguments.json {
+        crate::output::prepare_json(json)?;
+    }
+    let records = replay::read(&arguments.files).map_err(UsageError::from_input)?;
+    let Some(setup) = &records.setup else { return Ok(()) };
+    let machine = MachineSetup::read(setup).map_err(UsageError::from_input)?;
+    let knowledge = knowledge(setup, &machine, arguments.weights.as_deref())?;
+    let report = replay::replay(&records, &knowledge).map_err(UsageError::from_input)?;
+    if let Some(json) = &arguments.json {
+        formats::write_json_atomic(json, &report)?;
+    }
+    show(&report);
+    Ok(verdict(&report)?)
+}
+
+fn show(report: &ReplayReport) {
+    println!(
+        "{} of {} decisions made again to the last bit, from {} maps of the ground and {} risk maps",
+        report.n_identical, report.n_decisions, report.n_surfaces, report.n_risk_maps
+    );
+    for missing in &report.missing {
+        println!("  not recorded: {missing}");
+    }
+    if let Some(why) = &report.ended_early {
+        println!("  the recording breaks off: {why}");
+    }
+}
+
+fn verdict(report: &ReplayReport) -> Result<(), WorkFailed> {
+    match &report.first_difference {
+        Some(difference) => Err(WorkFailed(difference.clone())),
+        None if report.n_unmade > 0 => {
+            let first = report.missing.first().map_or("", String::as_str);
+            Err(WorkFailed(format!("{} decisions not made again, for want of {first}", report.n_unmade)))
+        }
+        None => Ok(()),
+    }
+}
+
+/// The networks that the recording names, found by their hash and no others.
+fn knowledge(
+    setup: &RecordedSetup,
+    machine: &MachineSetup,
+    weights: Option<&Path>,
+) -> anyhow::Result<Knowledge> {
+    let named = METHODS.into_iter().find(|method| method.name() == setup.method);
+    let method = named.ok_or_else(|| {
+        UsageError(format!("recorded method: expected one that this program knows, found {}", setup.method))
+    })?;
+    let Some((training, unfamiliar)) = method.learned() else {
+        let belief = if method == Method::Nominal { Belief::Nominal } else { Belief::Physics };
+        return Ok(Knowledge { belief, checkpoint: 0 });
+    };
+    let checkpoint: Checkpoint = match weights {
+        Some(folder) => read_checkpoint(folder)?,
+        None => shipped(training, &machine.vehicle.geometry).map_err(UsageError::from_input)?,
+    };
+    let digest = Sha256::digest(checkpoint.weights_bytes()?);
+    let found: String = digest.iter().map(|byte| format!("{byte:02x}")).collect();
+    if found != setup.checkpoint_sha256 {
+        let expected = &setup.checkpoint_sha256;
+        return Err(UsageError(format!(
+            "networks: expected those with SHA-256 {expected}, found {found}; give them with --weights"
+        ))
+        .into());
+    }
+    let hash = digest.iter().take(8).fold(0, |word, byte| word << 8 | u64::from(*byte));
+    Ok(Knowledge::learned(Arc::new(checkpoint), unfamiliar, hash))
+}

@@ -1,0 +1,183 @@
+//! One process of the machine.
+
+use bench::closed_loop::Method;
+use navigator::Belief;
+use runtime::channel::Bus;
+use runtime::control::{self, ControlSetup};
+use runtime::learning::{self, LearningSetup};
+use runtime::mapping::{self, MappingSetup};
+use runtime::plant::{self, PlantReport, PlantSetup};
+use runtime::recorder::{self, RecorderSetup};
+use runtime::setup::{MachineSetup, RecordedSetup};
+use runtime::status::Role;
+use rustix::process::{Signal, set_parent_process_death_signal};
+use scenarios::{EpisodeConfig, Outcome};
+use serde::Serialize;
+use sha2::{Digest, Sha256};
+use std::sync::Arc;
+use traversability::CvarLevel;
+
+use crate::arguments::UpArguments;
+use crate::drive::scene::{self, Machine};
+use crate::summary::revision;
+use crate::{UsageError, WorkFailed, interrupt};
+
+/// Longest that the vehicle may stand before the drive counts as over: processes are restarted meanwhile [s].
+const STANDING_MAX_S: f64 = 30.0;
+
+/// Reads everything that the processes will, so that bad input is refused before they start.
+pub(super) fn prepare(arguments: &UpArguments) -> Result<(), UsageError> {
+    let machine = scene::machine(&arguments.drive)?;
+    scene::task(&arguments.drive, &machine.vehicle)?;
+    Ok(())
+}
+
+pub(super) fn run(arguments: &UpArguments, role: Role) -> anyhow::Result<()> {
+    if arguments.supervised {
+        set_parent_process_death_signal(Some(Signal::TERM))?;
+    }
+    let machine = scene::machine(&arguments.drive)?;
+    let is_over = &interrupt::interrupted;
+    match role {
+        Role::Plant => run_plant(arguments, &machine)?,
+        Role::Mapping => {
+            let setup = MappingSetup {
+                vehicle: &machine.vehicle,
+                config: machine.config.clone(),
+                level: level(arguments)?,
+                model: &machine.model,
+            };
+            mapping::run(&Bus::join(&arguments.run)?, &setup, is_over)?;
+        }
+        Role::Learning => {
+            let (belief, checkpoint) = belief(&machine)?;
+            let setup = LearningSetup {
+                vehicle: &machine.vehicle,
+                config: machine.config.clone(),
+                belief,
+                checkpoint,
+                level: level(arguments)?,
+                limits: machine.model.limits,
+            };
+            learning::run(&Bus::join(&arguments.run)?, &setup, is_over)?;
+        }
+        Role::Control => {
+            let Machine { model, config, .. } = machine;
+            let setup =
+                ControlSetup { model, config, seed: arguments.drive.seed, period_s: 1.0 / arguments.rate };
+            control::run(&Bus::join(&arguments.run)?, setup, is_over)?;
+        }
+        Role::Recorder => {
+            let setup = recorder_setup(arguments, machine)?;
+            std::fs::create_dir_all(&setup.folder)?;
+            recorder::run(&Bus::join(&arguments.run)?, setup, is_over, &mut |line| {
+                eprintln!("surefoot recorder: {line}");
+            })?;
+        }
+    }
+    Ok(())
+}
+
+/// Size and time after which the next file of a recording is begun.
+const FILE_BYTES_MAX: u64 = 256 << 20;
+const FILE_TIME_MAX_S: f64 = 600.0;
+
+fn recorder_setup(arguments: &UpArguments, machine: Machine) -> anyhow::Result<RecorderSetup> {
+    let Machine { vehicle, model, config, knowledge } = machine;
+    let checkpoint_sha256 = match &knowledge.networks {
+        Some(networks) => hexadecimal(&Sha256::digest(networks.weights_bytes()?)),
+        None => String::new(),
+    };
+    let vehicle_name = vehicle.name.clone();
+    let [vehicle_toml, model_toml, config_toml] = MachineSetup { vehicle, model, config }.texts()?;
+    let setup = RecordedSetup {
+        vehicle_name,
+        vehicle_toml,
+        model_toml,
+        config_toml,
+        method: knowledge.method.name().to_owned(),
+        checkpoint_sha256,
+        alpha: arguments.drive.alpha,
+        seed: arguments.drive.seed.to_string(),
+        revision: revision().to_owned(),
+    };
+    let folder = arguments.drive.out.clone();
+    Ok(RecorderSetup { folder, setup, file_bytes_max: FILE_BYTES_MAX, file_time_max_s: FILE_TIME_MAX_S })
+}
+
+fn hexadecimal(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+fn level(arguments: &UpArguments) -> Result<CvarLevel, UsageError> {
+    CvarLevel::new(arguments.drive.alpha).map_err(UsageError::from_input)
+}
+
+/// What the method believes of the ground, and which networks that takes.
+fn belief(machine: &Machine) -> anyhow::Result<(Belief, u64)> {
+    let knowledge = &machine.knowledge;
+    Ok(match (knowledge.method.learned(), &knowledge.networks) {
+        (Some((_, unfamiliar)), Some(networks)) => {
+            let digest = Sha256::digest(networks.weights_bytes()?);
+            let checkpoint = digest.iter().take(8).fold(0, |word, byte| word << 8 | u64::from(*byte));
+            (Belief::Learned { checkpoint: Arc::clone(networks), unfamiliar }, checkpoint)
+        }
+        _ if knowledge.method == Method::Nominal => (Belief::Nominal, 0),
+        _ => (Belief::Physics, 0),
+    })
+}
+
+/// What a drive of the processes came to, as `summary.json`.
+#[derive(Serialize)]
+struct LiveSummary<'a> {
+    outcome: Option<Outcome>,
+    duration_s: f64,
+    path_length_m: f64,
+    distance_to_goal_m: f64,
+    cycles_stopped_by_watchdog: u64,
+    seed: u64,
+    vehicle: &'a str,
+    world: &'a str,
+    method: &'static str,
+}
+
+fn run_plant(arguments: &UpArguments, machine: &Machine) -> anyhow::Result<()> {
+    let task = scene::task(&arguments.drive, &machine.vehicle)?;
+    let world = task.world.name.clone();
+    let mut episode = EpisodeConfig::for_vehicle(&machine.vehicle);
+    episode.rules.time_limit_s = arguments.drive.time_limit;
+    episode.deviations = arguments.drive.deviation.iter().map(|asked| asked.deviation).collect();
+    episode.rules.immobile_s = STANDING_MAX_S;
+    episode.rules.stopped_s = STANDING_MAX_S;
+    let setup = PlantSetup {
+        task,
+        vehicle: &machine.vehicle,
+        episode,
+        seed: arguments.drive.seed,
+        command_age_max_s: arguments.command_age,
+    };
+    let report = plant::run(&Bus::join(&arguments.run)?, setup, &interrupt::interrupted)?;
+    let PlantReport { outcome, time_s, path_length_m, distance_to_goal_m, n_stopped_by_watchdog } = report;
+    std::fs::create_dir_all(&arguments.drive.out)?;
+    formats::write_json_atomic(
+        &arguments.drive.out.join("summary.json"),
+        &LiveSummary {
+            outcome,
+            duration_s: time_s,
+            path_length_m,
+            distance_to_goal_m,
+            cycles_stopped_by_watchdog: n_stopped_by_watchdog,
+            seed: arguments.drive.seed,
+            vehicle: &machine.vehicle.name,
+            world: &world,
+            method: machine.knowledge.method.name(),
+        },
+    )?;
+    match outcome {
+        Some(Outcome::Goal) | None => Ok(()),
+        Some(outcome) => Err(WorkFailed(format!(
+            "goal not reached: {outcome} {distance_to_goal_m:.1} m from it after {time_s:.1} s"
+        ))
+        .into()),
+    }
+}
