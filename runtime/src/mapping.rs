@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use bicycle::{Decision, Odometry, Vehicle};
+use bicycle::{Decision, Model, Odometry, SensorModel, Vehicle};
 use navigator::{Assessor, Belief, Config, Jump, Surface, Surveyor};
 use terrain::Scan;
 use traversability::CvarLevel;
@@ -46,8 +46,8 @@ pub struct MappingSetup<'a> {
     pub config: Config,
     /// Share of the worst outcomes to plan for.
     pub level: CvarLevel,
-    /// Limits that plans keep to.
-    pub limits: bicycle::Limits,
+    /// What is believed of the vehicle: limits that plans keep to, and how its sensors misstate its motion.
+    pub model: &'a Model,
 }
 
 /// Maps until `is_over` says to end.
@@ -86,10 +86,11 @@ struct Fallback {
 
 impl Mapping {
     fn new(bus: &Bus, setup: &MappingSetup<'_>) -> Result<Self, RuntimeError> {
-        let MappingSetup { vehicle, config, .. } = setup;
+        let MappingSetup { vehicle, config, model, .. } = setup;
         let n_cells = config.elevation.n_rows * config.elevation.n_cols;
         Ok(Self {
-            surveyor: Surveyor::new(vehicle, config.elevation, config.guard, Surface::Sensed)?,
+            surveyor: Surveyor::new(vehicle, config.elevation, config.guard, Surface::Sensed)?
+                .with_sensors(SensorModel::of(&model.effects)),
             recent: VecDeque::with_capacity(ODOMETRY_KEPT),
             odometry: bus.inlet(&ODOMETRY)?,
             commands: bus.inlet(&COMMAND)?,
@@ -214,8 +215,8 @@ enum Event {
 
 impl Fallback {
     fn new(bus: &Bus, setup: &MappingSetup<'_>) -> Result<Self, RuntimeError> {
-        let MappingSetup { vehicle, config, level, limits } = setup;
-        let assessor = Assessor::new(vehicle, limits, config, &Belief::Physics, *level)?;
+        let MappingSetup { vehicle, config, level, model } = setup;
+        let assessor = Assessor::new(vehicle, &model.limits, config, &Belief::Physics, *level)?;
         Ok(Self {
             maker: RiskMaker::new(assessor, PHYSICS, 0),
             learned: bus.inlet(&RISK)?,

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
+use bicycle::SensorModel;
 use navigator::{Assessor, Belief, Jump, NavigatorError, Surface, Surveyor};
 use traversability::CvarLevel;
 
@@ -137,8 +138,9 @@ impl<'a> Maps<'a> {
         header: &SurfaceHeader,
     ) -> Result<Result<Vec<[f32; 8]>, Unmade>, ReplayError> {
         if self.surveyor.as_ref().is_none_or(|(epoch_ns, _)| *epoch_ns != key.epoch_ns) {
-            let MachineSetup { vehicle, config, .. } = self.machine;
-            let surveyor = Surveyor::new(vehicle, config.elevation, config.guard, Surface::Sensed)?;
+            let MachineSetup { vehicle, model, config } = self.machine;
+            let surveyor = Surveyor::new(vehicle, config.elevation, config.guard, Surface::Sensed)?
+                .with_sensors(SensorModel::of(&model.effects));
             self.surveyor = Some((key.epoch_ns, surveyor));
         }
         let Some((_, surveyor)) = &mut self.surveyor else { return Ok(Err(Unmade { what: String::new() })) };
