@@ -5,6 +5,7 @@ pub mod closed_loop;
 pub mod collection;
 pub mod control;
 mod error;
+pub mod gap_closed_loop;
 pub mod gap_score;
 pub mod learned_map;
 pub mod learning;
@@ -13,6 +14,7 @@ pub mod prior_map;
 mod spread;
 mod stopwatch;
 pub mod traction_map;
+mod turns;
 
 pub use error::BenchError;
 pub use spread::Spread;

@@ -1,0 +1,258 @@
+//! What a repaired model is worth to the controller: plants with a gap, driven with the nominal model, with the model
+//! that the diagnosis repaired from recorded drives of the plant, and with the true one.
+//!
+//! A gap is made by the plant's own parts. Its recorded drives are those of an excited driver on the machine's hills,
+//! another one than the controller. All speeds, courses and sizes of gaps are constants, chosen so that the plant
+//! without a gap is driven well.
+
+mod belief;
+mod course;
+mod drive;
+mod gap;
+mod rocks;
+mod row;
+mod track;
+
+use std::collections::BTreeMap;
+
+use bicycle::{Effect, Model};
+use mppi::Isa;
+use scenarios::{Deviation, TestMachine};
+use serde::Serialize;
+use sim_to_real::Verdict;
+
+use crate::closed_loop::DriveError;
+use crate::turns::in_turns;
+pub use belief::Belief;
+use belief::Simulator;
+pub use drive::{DriveResult, End, Ground, Job};
+pub use gap::Gap;
+use rocks::Rocks;
+pub use row::{Differences, Mean, Row};
+use track::Track;
+
+/// Name of the machine around which the one that drives is drawn.
+pub const BASE: &str = "pietra_full_size";
+/// Seed of the machine, its hills and the recorded drives.
+const MACHINE_SEED: u64 = 1;
+/// Lateral acceleration that plans on the course may ask for, over the grip of firm ground [-].
+const LATERAL_SHARE: f64 = 0.75;
+/// Steps of a plan after which the vehicle is looked for where the plan put it: half a second.
+const PLAN_AHEAD: usize = 5;
+
+/// Which drives to do.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Request {
+    /// Where to drive.
+    pub grounds: Vec<Ground>,
+    /// What the plant does and its simulator does not.
+    pub gaps: Vec<Gap>,
+    /// Seeds 1 to this.
+    pub n_seeds: u64,
+    /// Drives at a time.
+    pub n_threads: usize,
+    /// Instruction set of the controller.
+    pub isa: Isa,
+}
+
+impl Request {
+    /// How many drives that are.
+    pub fn n_drives(&self) -> usize {
+        jobs(self).len()
+    }
+}
+
+/// What was found in the recorded drives of one plant.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Found {
+    /// What the plant does and its simulator does not.
+    pub gap: Gap,
+    /// What the diagnosis says.
+    pub verdict: Verdict,
+    /// The effects that it adds to the calibrated model.
+    pub found: Vec<Effect>,
+    /// The effect that the gap amounts to.
+    pub truth: Option<Effect>,
+}
+
+/// All drives and what they add up to.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Report {
+    /// Name of the machine around which the one that drives is drawn.
+    pub vehicle: &'static str,
+    /// Seeds were 1 to this.
+    pub n_seeds: u64,
+    /// Instruction set that the controller used.
+    pub isa: Isa,
+    /// The calibrated model's effects, which all models but the bare one share.
+    pub calibrated: Vec<Effect>,
+    /// What the diagnoses found.
+    pub diagnoses: Vec<Found>,
+    /// One row for each ground, gap and belief.
+    pub rows: Vec<Row>,
+    /// All drives, row by row, each row by ascending seed.
+    pub drives: Vec<DriveResult>,
+}
+
+/// Why there is no table.
+#[derive(Debug, thiserror::Error)]
+pub enum ClosedLoopError {
+    /// Nothing to drive.
+    #[error("expected at least one seed, one ground and one gap, found none")]
+    NoDrives,
+    /// The vehicle cannot be read.
+    #[error(transparent)]
+    Vehicle(#[from] formats::ConfigError),
+    /// The machine's hills cannot be made.
+    #[error(transparent)]
+    World(#[from] scenarios::WorldError),
+    /// There is no such rock field.
+    #[error(transparent)]
+    Field(#[from] scenarios::RockFieldError),
+    /// No drive could be recorded.
+    #[error(transparent)]
+    TestDrive(#[from] scenarios::TestDriveError),
+    /// The recorded drives cannot be diagnosed.
+    #[error(transparent)]
+    Gap(#[from] sim_to_real::GapError),
+    /// The plant cannot be put on its ground.
+    #[error(transparent)]
+    Plant(#[from] scenarios::PlantError),
+    /// A command was no number.
+    #[error(transparent)]
+    Command(#[from] scenarios::CommandError),
+    /// The controller refused its settings.
+    #[error(transparent)]
+    Controller(#[from] mppi::ConfigError),
+    /// There is no such risk tolerance.
+    #[error(transparent)]
+    Level(#[from] traversability::CvarLevelError),
+    /// The closed loop gave up.
+    #[error(transparent)]
+    Loop(#[from] Box<DriveError>),
+    /// The system refused the threads.
+    #[error("threads: {0}")]
+    Threads(#[from] rayon::ThreadPoolBuildError),
+}
+
+impl From<DriveError> for ClosedLoopError {
+    fn from(error: DriveError) -> Self {
+        Self::Loop(Box::new(error))
+    }
+}
+
+/// What happens while a table is made.
+#[derive(Clone, Debug)]
+pub enum Progress<'a> {
+    /// A plant was diagnosed.
+    Diagnosed(&'a Found),
+    /// A drive has ended.
+    Drove(&'a DriveResult),
+}
+
+/// Calibrates, diagnoses, and does all drives; `told` hears of each as it is done, in any order and on any thread.
+///
+/// # Errors
+/// Nothing to drive, no threads to be had, or a drive that could not begin or go on.
+pub fn measure(request: &Request, told: impl Fn(Progress<'_>) + Sync) -> Result<Report, ClosedLoopError> {
+    let jobs = jobs(request);
+    if jobs.is_empty() {
+        return Err(ClosedLoopError::NoDrives);
+    }
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(request.n_threads).build()?;
+    let fleet = Fleet::prepare(request)?;
+    let diagnoses = in_turns(&pool, request.gaps.len(), |index| {
+        let found = fleet.diagnose(request.gaps[index])?;
+        told(Progress::Diagnosed(&found));
+        Ok::<_, ClosedLoopError>(found)
+    })?;
+    let drives = in_turns(&pool, jobs.len(), |index| {
+        let job = jobs[index];
+        let found = diagnoses.iter().find(|found| found.gap == job.gap);
+        let drive = fleet.drive(job, found.map_or(&[][..], |found| &found.found))?;
+        told(Progress::Drove(&drive));
+        Ok::<_, ClosedLoopError>(drive)
+    })?;
+    Ok(Report {
+        vehicle: BASE,
+        n_seeds: request.n_seeds,
+        isa: request.isa,
+        calibrated: fleet.simulator.calibrated().to_vec(),
+        diagnoses,
+        rows: rows(&drives),
+        drives,
+    })
+}
+
+/// Row by row, each row by ascending seed.
+fn jobs(request: &Request) -> Vec<Job> {
+    let mut jobs = Vec::new();
+    for &ground in &request.grounds {
+        for &gap in &request.gaps {
+            for &belief in beliefs(ground, gap) {
+                jobs.extend((1..=request.n_seeds).map(|seed| Job { ground, gap, belief, seed }));
+            }
+        }
+    }
+    jobs
+}
+
+/// Where there is no gap, the nominal model is the true one. Among the rocks nobody drives without calibration: that
+/// comparison costs minutes and the course makes it.
+fn beliefs(ground: Ground, gap: Gap) -> &'static [Belief] {
+    let without_truth = &Belief::ALL[..3];
+    match (ground, gap) {
+        (Ground::Course, Gap::None) => without_truth,
+        (Ground::Course, _) => &Belief::ALL,
+        (Ground::Rocks, Gap::None) => &without_truth[1..],
+        (Ground::Rocks, _) => &Belief::ALL[1..],
+    }
+}
+
+fn rows(drives: &[DriveResult]) -> Vec<Row> {
+    let mut cells: BTreeMap<(Ground, Gap, Belief), Vec<DriveResult>> = BTreeMap::new();
+    for drive in drives {
+        let Job { ground, gap, belief, .. } = drive.job;
+        cells.entry((ground, gap, belief)).or_default().push(*drive);
+    }
+    let nominal = |ground, gap| cells.get(&(ground, gap, Belief::Nominal)).map_or(&[][..], Vec::as_slice);
+    cells.iter().filter_map(|((ground, gap, _), drives)| Row::of(drives, nominal(*ground, *gap))).collect()
+}
+
+/// The machine, its simulator, and what it drives on.
+struct Fleet {
+    machine: TestMachine,
+    simulator: Simulator,
+    track: Track,
+    rocks: Rocks,
+}
+
+impl Fleet {
+    fn prepare(request: &Request) -> Result<Self, ClosedLoopError> {
+        let base = formats::read_vehicle(BASE)?;
+        let machine = TestMachine::draw(&base, BASE, MACHINE_SEED)?;
+        Ok(Self {
+            simulator: Simulator::calibrate(&machine, MACHINE_SEED)?,
+            track: Track::new(&machine, request.isa),
+            rocks: Rocks::new(&machine, request.isa)?,
+            machine,
+        })
+    }
+
+    fn diagnose(&self, gap: Gap) -> Result<Found, ClosedLoopError> {
+        let (verdict, found) = self.simulator.diagnose(&self.machine, gap, MACHINE_SEED)?;
+        Ok(Found { gap, verdict, found, truth: gap.effect(&self.machine) })
+    }
+
+    fn drive(&self, job: Job, found: &[Effect]) -> Result<DriveResult, ClosedLoopError> {
+        let model: Model = self.simulator.model(&self.machine, (job.belief, job.gap), found);
+        let deviations: Vec<Deviation> = job.gap.deviation(&self.machine).into_iter().collect();
+        match job.ground {
+            Ground::Course => self.track.drive(&self.machine, job, (model, &deviations)),
+            Ground::Rocks => self.rocks.drive(&self.machine, job, (model, &deviations)),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;
