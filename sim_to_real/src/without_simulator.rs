@@ -27,7 +27,7 @@ use std::collections::BTreeMap;
 
 /// Rollouts by which effects are selected, and by which the selected ones are fitted; of longer drives, stretches evenly
 /// spread.
-const N_STARTS_TO_SELECT: usize = 300;
+const N_STARTS_TO_SELECT: usize = 200;
 const N_STARTS: usize = 1500;
 /// Starts of a stretch: five seconds.
 const STRETCH: usize = 25;

@@ -24,7 +24,7 @@ const FORCES: [&str; 7] =
     ["rolling_drag", "quad_drag", "veg_drag", "loose_drag", "cornering_drag", "slope_gravity", "wind"];
 /// Additions that are fitted together with all that is known, best first, and how often the next few get their turn.
 const N_REFINED: usize = 3;
-const N_BATCHES: usize = 4;
+const N_BATCHES: usize = 2;
 
 /// The effects that were selected, and what else was tried.
 pub(crate) struct Selection {
