@@ -5,6 +5,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
+use std::sync::LazyLock;
 
 use bicycle::{Column, DriveLog};
 use sim_to_real::Answer;
@@ -47,9 +48,31 @@ fn names(folder: &Path) -> Vec<String> {
     names
 }
 
-/// A folder whose `cache` keeps the calibration over the runs of one test.
-fn folder() -> tempfile::TempDir {
-    tempfile::tempdir().unwrap()
+/// Two nominal drives and one real one of the labelled case, so that a calibration takes seconds.
+fn write_case(folder: &Path, name: &str, heldout: &str) -> String {
+    let list =
+        |names: &[&str]| names.iter().map(|name| format!("'{}'", open(name))).collect::<Vec<_>>().join(", ");
+    let sim = list(&["vehicles/veh_d/sim_1.csv", "vehicles/veh_d/sim_2.csv"]);
+    let (vehicle, real) =
+        (open(&format!("{VEHICLE}/vehicle.toml")), list(&["cases/open_10/real_train_1.csv"]));
+    let text = format!(
+        "name = '{name}'\nvehicle = '{vehicle}'\nsim = [{sim}]\nreal = [{real}]\nheldout = ['{heldout}']\n"
+    );
+    let path = folder.join(format!("{name}.toml"));
+    fs::write(&path, text).unwrap();
+    path.to_str().unwrap().to_owned()
+}
+
+/// Keeps the calibration of [`write_case`]'s nominal drives for all tests.
+static CACHE: LazyLock<tempfile::TempDir> = LazyLock::new(|| {
+    let folder = tempfile::tempdir().unwrap();
+    let case = write_case(folder.path(), "first", &open(&format!("{CASE}/real_heldout.csv")));
+    succeed(folder.path(), &["diagnose", &case, "--json", "a.json", "--baseline-cache", "cache"]);
+    folder
+});
+
+fn cache() -> String {
+    CACHE.path().join("cache").to_str().unwrap().to_owned()
 }
 
 /// Root mean square distance after two seconds, from the predictions' file and the drive alone.
@@ -71,11 +94,12 @@ fn position_error_2s_m(predictions: &str, drive: &DriveLog, model: &str) -> f64 
 
 #[test]
 fn a_labelled_case_is_diagnosed_verified_written_and_applied() {
-    let folder = folder();
+    let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name);
+    let case = write_case(folder.path(), "late", &open(&format!("{CASE}/real_heldout.csv")));
     let words = [
         "diagnose",
-        &open(CASE),
+        &case,
         "--out",
         "r",
         "--json",
@@ -83,11 +107,11 @@ fn a_labelled_case_is_diagnosed_verified_written_and_applied() {
         "--predictions",
         "p.csv",
         "--baseline-cache",
-        "cache",
+        &cache(),
     ];
     let told = succeed(folder.path(), &words);
     let answer: Answer = serde_json::from_slice(&fs::read(path("a.json")).unwrap()).unwrap();
-    assert_eq!(answer.case, "open_10");
+    assert_eq!(answer.case, "late");
     assert_eq!(answer.effects[0].id, "steer_lag", "{:?}", answer.effects);
     let lag = answer.effects[0].parameters["time_constant_s"];
     assert!((lag.value - 0.35).abs() < 0.07 && lag.low <= lag.value && lag.value <= lag.high, "{lag:?}");
@@ -111,7 +135,7 @@ fn a_labelled_case_is_diagnosed_verified_written_and_applied() {
     assert_eq!(names(&path("r")), written);
     let html = fs::read_to_string(path("r/report.html")).unwrap();
     assert_eq!(html.matches("data:image/png;base64,").count(), pictures.len());
-    assert_eq!(names(&path("cache")).len(), 1);
+    assert_eq!(names(Path::new(&cache())).len(), 1, "calibrated once");
 
     let drive = formats::read_drive(Path::new(&open(&format!("{CASE}/real_heldout.csv")))).unwrap().log;
     let predictions = fs::read_to_string(path("p.csv")).unwrap();
@@ -129,23 +153,10 @@ fn a_labelled_case_is_diagnosed_verified_written_and_applied() {
 
 #[test]
 fn the_prediction_stands_before_the_held_out_drives_are_opened() {
-    let folder = folder();
-    let drives = |names: &[&str]| names.iter().map(|name| open(name)).collect::<Vec<_>>();
-    let vehicle = open(&format!("{VEHICLE}/vehicle.toml"));
-    let sim = drives(&["vehicles/veh_d/sim_1.csv", "vehicles/veh_d/sim_2.csv"]);
-    let real = drives(&["cases/open_10/real_train_1.csv"]);
-    let words = |heldout: &str, out: &str| {
-        let mut words =
-            vec!["diagnose".to_owned(), "--vehicle".to_owned(), vehicle.clone(), "--sim".to_owned()];
-        words.extend(sim.clone());
-        words.push("--real".to_owned());
-        words.extend(real.clone());
-        words.extend(["--heldout", heldout, "--out", out, "--baseline-cache", "cache"].map(str::to_owned));
-        words
-    };
+    let folder = tempfile::tempdir().unwrap();
     let run = |heldout: &str, out: &str| {
-        let words = words(heldout, out);
-        surefoot(folder.path(), &words.iter().map(String::as_str).collect::<Vec<_>>())
+        let case = write_case(folder.path(), "case", heldout);
+        surefoot(folder.path(), &["diagnose", &case, "--out", out, "--baseline-cache", &cache()])
     };
     let file = |name: &str| fs::read(folder.path().join(name)).unwrap();
     assert!(run(&open("cases/open_10/real_heldout.csv"), "one").status.success());
@@ -154,13 +165,13 @@ fn the_prediction_stands_before_the_held_out_drives_are_opened() {
     assert_ne!(file("one/answer.json"), file("two/answer.json"));
     // A held-out drive that nobody can read does not keep the prediction from standing.
     fs::write(folder.path().join("broken.csv"), "t,x\n0,a\n").unwrap();
-    let broken = run("broken.csv", "three");
-    assert_eq!(broken.status.code(), Some(2));
+    assert_eq!(run("broken.csv", "three").status.code(), Some(2));
     assert_eq!(file("one/prediction.json"), file("three/prediction.json"));
     assert!(!folder.path().join("three/answer.json").exists());
-    let told = run(&open("cases/open_10/../open_10/real_train_1.csv"), "four");
-    let told = String::from_utf8(told.stderr).unwrap();
-    assert!(told.contains("expected a drive not used before, found the drive of"), "{told}");
+    // Under another name the same drive is still one that was used before.
+    fs::copy(open("cases/open_10/real_train_1.csv"), folder.path().join("copy.csv")).unwrap();
+    let told = String::from_utf8(run("copy.csv", "four").stderr).unwrap();
+    assert!(told.contains("copy.csv: expected a drive not used before, found the drive of"), "{told}");
 }
 
 /// A real drive of the case with a column changed, as a file.
@@ -181,7 +192,7 @@ fn changed(folder: &Path, name: &str, column: Column, change: impl Fn(f64) -> f6
 
 #[test]
 fn drives_that_would_be_misread_are_refused_with_the_suspicion() {
-    let folder = folder();
+    let folder = tempfile::tempdir().unwrap();
     let vehicle = open(&format!("{VEHICLE}/vehicle.toml"));
     let sim = open(&format!("{VEHICLE}/sim_1.csv"));
     let diagnose = |real: &str| {
@@ -218,14 +229,26 @@ fn drives_that_would_be_misread_are_refused_with_the_suspicion() {
 
 #[test]
 fn what_cannot_be_asked_is_refused() {
-    let folder = folder();
-    let cases: [(&[&str], &str); 5] = [
+    let folder = tempfile::tempdir().unwrap();
+    let cases: [(&[&str], &str); 6] = [
         (&["diagnose"], "CASE"),
         (&["diagnose", "nowhere"], "nowhere: expected a readable text file"),
         (&["diagnose", &open(CASE), "--real", "a.csv"], "cannot be used with"),
         (
             &["apply", "none.json", "--model", "rc_car", "--out", "m.toml"],
             "none.json: expected a readable file",
+        ),
+        (
+            &[
+                "diagnose",
+                "--vehicle",
+                "sedan",
+                "--sim",
+                &open(&format!("{CASE}/real_heldout.csv")),
+                "--real",
+                &open(&format!("{VEHICLE}/sim_1.csv")),
+            ],
+            "found them swapped?",
         ),
         (&["diagnose", &open(CASE), "--json", "."], "--json: expected a file, found the folder"),
     ];
@@ -238,7 +261,7 @@ fn what_cannot_be_asked_is_refused() {
 
 #[test]
 fn an_interrupted_run_leaves_nothing_half_written() {
-    let folder = folder();
+    let folder = tempfile::tempdir().unwrap();
     let mut command = Command::new(env!("CARGO_BIN_EXE_surefoot"));
     let words =
         ["gap", "diagnose", &open(CASE), "--out", "r", "--json", "a.json", "--baseline-cache", "cache"];

@@ -1,8 +1,14 @@
 //! `surefoot gap diagnose`: read, screen, calibrate, diagnose, predict; only then open the held-out drives and verify.
 
-use bicycle::DriveLog;
-use sim_to_real::{Answer, Baseline, Diagnosis, Machine, Verification, diagnose, verify};
+use std::path::Path;
 
+use bicycle::DriveLog;
+use sim_to_real::{
+    Answer, Baseline, Diagnosis, Machine, Verification, WithoutSimulator, diagnose,
+    diagnose_without_simulator, verify,
+};
+
+use super::follow_up::Diagnosed;
 use super::outputs::Outputs;
 use super::progress::Progress;
 use super::request::Request;
@@ -27,22 +33,26 @@ struct Verified {
 pub(super) fn run(arguments: &GapDiagnoseArguments) -> anyhow::Result<()> {
     let request = Request::of(arguments)?;
     let outputs = Outputs::prepare(arguments)?;
-    let mut doubts = request.doubtful_names();
+    let mut doubts = request.doubtful_names()?;
     let inputs = read(&request, &mut doubts)?;
     let folder = arguments.baseline_cache.clone().or_else(baseline::default_folder);
-    let baseline = baseline::load_or_calibrate(&inputs.machine, &inputs.sim, folder.as_deref(), &mut doubts)
-        .map_err(UsageError::from_input)?;
-    let searching = Progress::search();
-    let diagnosis = diagnose(&baseline, &inputs.machine, &inputs.real);
-    searching.finish();
-    let diagnosis = diagnosis.map_err(UsageError::from_input)?;
-    let predicted = diagnosis.answer(request.name.as_deref().unwrap_or(&inputs.machine.name));
+    let (baseline, diagnosis) = diagnosed_against(&inputs, folder.as_deref(), &mut doubts)?;
+    let mut predicted = diagnosis.answer(request.name.as_deref().unwrap_or(&inputs.machine.name));
+    let diagnosed = Diagnosed {
+        baseline: &baseline,
+        machine: &inputs.machine,
+        diagnosis: &diagnosis,
+        sim: &inputs.sim,
+        real: &inputs.real,
+    };
+    diagnosed.advise(&mut predicted, (arguments, &outputs))?;
     outputs.write_json("prediction.json", &predicted)?;
 
     // From here on the prediction cannot change any more.
     let verified = open_heldout(&request, &inputs, &baseline, &diagnosis, &mut doubts)?;
     let complete = |verification: &Verification| verification.complete(predicted.clone());
     let mut answer = verified.verification.as_ref().map_or_else(|| predicted.clone(), complete);
+    diagnosed.bound(&mut answer, (arguments, &outputs), &verified.heldout)?;
     answer.advice.extend(doubts.iter().map(|doubt| format!("check {doubt}")));
     let report = Report {
         request: &request,
@@ -54,6 +64,28 @@ pub(super) fn run(arguments: &GapDiagnoseArguments) -> anyhow::Result<()> {
     report.write(&outputs, &verified)?;
     report.say(&outputs);
     Ok(())
+}
+
+/// Against the calibrated simulator; without nominal drives against the bare kinematic bicycle.
+fn diagnosed_against(
+    inputs: &Inputs,
+    folder: Option<&Path>,
+    doubts: &mut Vec<String>,
+) -> Result<(Baseline, Diagnosis), UsageError> {
+    let Inputs { machine, sim, real } = inputs;
+    if sim.is_empty() {
+        let searching = Progress::search();
+        let found = diagnose_without_simulator(machine, real);
+        searching.finish();
+        let WithoutSimulator { baseline, diagnosis } = found.map_err(UsageError::from_input)?;
+        return Ok((baseline, diagnosis));
+    }
+    let baseline =
+        baseline::load_or_calibrate(machine, sim, folder, doubts).map_err(UsageError::from_input)?;
+    let searching = Progress::search();
+    let diagnosis = diagnose(&baseline, machine, real);
+    searching.finish();
+    Ok((baseline, diagnosis.map_err(UsageError::from_input)?))
 }
 
 fn read(request: &Request, doubts: &mut Vec<String>) -> Result<Inputs, UsageError> {

@@ -2,7 +2,7 @@
 
 use base64::Engine;
 use base64::prelude::BASE64_STANDARD;
-use sim_to_real::{Answer, Estimate, Verdict};
+use sim_to_real::{Answer, NamedEffect, Verdict};
 
 use super::told;
 use crate::picture::GapPicture;
@@ -74,29 +74,30 @@ fn doubts(doubts: &[String]) -> String {
 }
 
 fn effects(answer: &Answer) -> String {
-    let row = |id: &str, parameter: &str| {
+    if answer.effects.is_empty() {
+        return String::new();
+    }
+    let row = |effect: &NamedEffect| {
         format!(
             "<tr><td><code>{}</code></td><td>{}</td><td>{}</td></tr>\n",
-            escaped(id),
-            escaped(told::meaning(id)),
-            escaped(parameter)
+            escaped(&effect.id),
+            escaped(told::meaning(&effect.id)),
+            escaped(&told::parameters(effect))
         )
     };
-    let of_effect = |effect: &sim_to_real::NamedEffect| -> String {
-        let told = |(name, estimate): (&String, &Estimate)| told::parameter(&effect.id, name, estimate);
-        row(&effect.id, &effect.parameters.iter().map(told).collect::<Vec<_>>().join(", "))
-    };
-    let rows: String = answer.effects.iter().map(of_effect).collect();
-    let table = format!(
-        "<table>\n<tr><th>effect</th><th>what it is</th><th>value (90 %)</th></tr>\n{rows}</table>\n"
-    );
-    let credible =
-        answer.credible_set.iter().map(|id| format!("<code>{}</code>", escaped(id))).collect::<Vec<_>>();
-    let credible = match credible.len() {
-        0 | 1 => String::new(),
-        n => format!("<p>These {n} alone explain the drives about as well: {}.</p>\n", credible.join(", ")),
-    };
-    if answer.effects.is_empty() { credible } else { table + &credible }
+    let rows: String = answer.effects.iter().map(row).collect();
+    let header = "<tr><th>effect</th><th>what it is</th><th>value (90 %)</th></tr>";
+    format!("<table>\n{header}\n{rows}</table>\n{}", credible(answer))
+}
+
+/// The single explanations, where there is more than one.
+fn credible(answer: &Answer) -> String {
+    let names: Vec<_> =
+        answer.credible_set.iter().map(|id| format!("<code>{}</code>", escaped(id))).collect();
+    if names.len() < 2 {
+        return String::new();
+    }
+    format!("<p>Each of these alone explains the drives about as well: {}.</p>\n", names.join(", "))
 }
 
 fn places(answer: &Answer) -> String {

@@ -56,22 +56,28 @@ impl Request {
         }
     }
 
-    /// Files whose names contradict what they are given as.
-    pub(super) fn doubtful_names(&self) -> Vec<String> {
-        let named = |paths: &[PathBuf], word: &str, role: &str| {
-            let contradicts = |path: &&PathBuf| {
-                let stem = path.file_stem().unwrap_or_default().to_string_lossy().to_lowercase();
-                stem.split(|c: char| !c.is_alphabetic()).any(|part| part == word)
-            };
-            let doubted = paths.iter().filter(contradicts);
-            doubted
-                .map(|path| format!("{}: given as a {role} drive, named '{word}': swapped?", path.display()))
-                .collect()
-        };
-        let of_sim: Vec<String> = named(&self.sim, "real", "nominal");
-        let of_real: Vec<String> = named(&self.real, "sim", "real");
-        [of_sim, of_real].concat()
+    /// Files whose names contradict what they are given as. Errors: all of them do.
+    pub(super) fn doubtful_names(&self) -> Result<Vec<String>, UsageError> {
+        let (of_sim, of_real) = (named(&self.sim, "real", "nominal"), named(&self.real, "sim", "real"));
+        let all_contradict = !of_sim.is_empty() && of_sim.len() == self.sim.len();
+        if all_contradict && of_real.len() == self.real.len() {
+            return Err(UsageError(format!(
+                "--sim and --real: expected nominal and real drives, found them swapped? {}",
+                of_sim[0]
+            )));
+        }
+        Ok([of_sim, of_real].concat())
     }
+}
+
+/// What is to be said of drives whose file's name holds `word`.
+fn named(paths: &[PathBuf], word: &str, role: &str) -> Vec<String> {
+    let contradicts = |path: &&PathBuf| {
+        let stem = path.file_stem().unwrap_or_default().to_string_lossy().to_lowercase();
+        stem.split(|c: char| !c.is_alphabetic()).any(|part| part == word)
+    };
+    let doubted = paths.iter().filter(contradicts);
+    doubted.map(|path| format!("{}: given as a {role} drive, named '{word}'", path.display())).collect()
 }
 
 #[cfg(test)]
@@ -87,13 +93,27 @@ mod tests {
             real: vec!["sim_real/drive.csv".into(), "SIM-2.csv".into()],
             heldout: Vec::new(),
         };
-        assert_eq!(
-            request.doubtful_names(),
-            [
-                "a/real_1.csv: given as a nominal drive, named 'real': swapped?",
-                "SIM-2.csv: given as a real drive, named 'sim': swapped?"
-            ]
-        );
+        let told = request.doubtful_names().unwrap();
+        let expected = [
+            "a/real_1.csv: given as a nominal drive, named 'real'",
+            "SIM-2.csv: given as a real drive, named 'sim'",
+        ];
+        assert_eq!(told, expected);
+    }
+
+    #[test]
+    fn drives_that_are_all_named_otherwise_are_refused() {
+        let with = |sim: &[&str], real: &[&str]| Request {
+            name: None,
+            vehicle: "v".to_owned(),
+            sim: sim.iter().map(PathBuf::from).collect(),
+            real: real.iter().map(PathBuf::from).collect(),
+            heldout: Vec::new(),
+        };
+        let told = with(&["real_1.csv", "real_2.csv"], &["sim_1.csv"]).doubtful_names().unwrap_err().0;
+        assert!(told.contains("found them swapped? real_1.csv: given as a nominal drive"), "{told}");
+        assert!(with(&[], &["sim_1.csv"]).doubtful_names().is_ok());
+        assert!(with(&["real_1.csv"], &["monday.csv"]).doubtful_names().is_ok());
     }
 
     #[test]

@@ -1,7 +1,5 @@
 //! A diagnosis in plain words.
 
-use std::fmt::Write;
-
 use bicycle::effect::{CATALOGUE, Parameter};
 use sim_to_real::{Answer, Condition, Estimate, NamedEffect, Shrink, Verdict};
 
@@ -74,9 +72,12 @@ pub(crate) fn condition(condition: Condition) -> &'static str {
     }
 }
 
+/// Share above the null from which a condition is told [-].
+pub(crate) const STANDS_OUT: f64 = 0.01;
+
 /// The conditions that stand out, as `speed 0.61, pitch 0.12`.
 pub(crate) fn places(answer: &Answer) -> String {
-    let standing = answer.places.iter().filter(|place| place.share >= 0.01);
+    let standing = answer.places.iter().filter(|place| place.share > STANDS_OUT);
     let told: Vec<_> =
         standing.map(|place| format!("{} {:.2}", condition(place.condition), place.share)).collect();
     if told.is_empty() { "nowhere in particular".to_owned() } else { told.join(", ") }
@@ -129,37 +130,64 @@ fn closed(shrink: &Shrink) -> Option<String> {
 
 /// Everything for the terminal.
 pub(super) fn answer(answer: &Answer, drives: &str) -> String {
-    let mut text = format!("\n  {} · {drives}\n\n  {}\n", answer.case, verdict(answer));
-    // Writing to a string cannot fail.
-    let mut line = |name: &str, told: &str| drop(writeln!(text, "  {name:<10}{told}"));
+    let mut lines = vec![String::new(), format!("  {} · {drives}", answer.case), String::new()];
+    lines.push(format!("  {}", verdict(answer)));
     for effect in &answer.effects {
-        line("", &format!("{}: {}", effect.id, meaning(&effect.id)));
-        line("", &parameters(effect));
+        lines.push(format!("    {}  {}", effect.id, parameters(effect)));
+        lines.push(format!("      {}", meaning(&effect.id)));
     }
-    let others: Vec<_> = answer
-        .credible_set
-        .iter()
-        .filter(|id| answer.effects.iter().all(|effect| effect.id != **id))
-        .collect();
-    if !others.is_empty() {
-        let names = others.iter().map(|id| id.as_str()).collect::<Vec<_>>().join(", ");
-        line("", &format!("alone, these would explain as much: {names}"));
+    if matches!(answer.verdict, Verdict::Effects | Verdict::EffectsAndUnknown) {
+        lines.extend(others(answer));
     }
     if answer.verdict != Verdict::None {
-        line("where", &places(answer));
+        lines.push(format!("  where    {}", places(answer)));
     }
-    for (place, told) in shrink(&answer.shrink).iter().enumerate() {
-        line(if place == 0 { "how far" } else { "" }, told);
-    }
-    for (place, advice) in answer.advice.iter().enumerate() {
-        line(if place == 0 { "next" } else { "" }, advice);
-    }
-    text
+    lines.extend(named("how far", &shrink(&answer.shrink)));
+    lines.extend(named("next", &answer.advice));
+    lines.join("\n") + "\n"
+}
+
+/// What else would explain the gap alone.
+fn others(answer: &Answer) -> Option<String> {
+    let is_other = |id: &&String| answer.effects.iter().all(|effect| effect.id != **id);
+    let others: Vec<&str> = answer.credible_set.iter().filter(is_other).map(String::as_str).collect();
+    (!others.is_empty()).then(|| format!("    alone, these would explain as much: {}", others.join(", ")))
+}
+
+/// Lines below one another, the first with a name before it.
+fn named(name: &str, lines: &[String]) -> Vec<String> {
+    let name = |place: usize| if place == 0 { name } else { "" };
+    lines.iter().enumerate().map(|(place, line)| format!("  {:<9}{line}", name(place))).collect()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::picture::gap_examples;
+
+    #[test]
+    fn the_answer_is_told_line_by_line() {
+        let told = answer(&gap_examples::answer(), "v: 4 nominal drives");
+        let lines: Vec<&str> = told.lines().map(str::trim_end).collect();
+        let expected = [
+            "",
+            "  steering <late> · v: 4 nominal drives",
+            "",
+            "  The gap comes from steer_lag.",
+            "    steer_lag  time constant 0.210 s (0.180 to 0.240)",
+        ];
+        assert_eq!(&lines[..5], expected);
+        let rest = [
+            "    alone, these would explain as much: steer_delay",
+            "  where    change of steering 0.61",
+            "  how far  predicted from the real drives alone: 95 % of the gap closes",
+            "           held-out rollout error 2.10 before, 0.40 after, 0.35 is the floor",
+            "           97 % (90 to 100 %) of the gap closes on the held-out drives",
+            "           position error after 2 s 0.289 m before, 0.101 m after",
+            "  next     drive steps of the steering & sines",
+        ];
+        assert_eq!(lines[6..], rest);
+    }
 
     #[test]
     fn a_parameter_is_told_with_unit_and_interval() {

@@ -13,6 +13,9 @@ const LEFT: f64 = 100.0;
 const TOP: f64 = 160.0;
 const PANEL: f64 = 630.0;
 const STEP: f64 = 690.0;
+/// One of the sizes of a rollout's residual.
+type Size = fn(&GroundResidual) -> f64;
+
 /// Vegetation over the heights' colours.
 const PLANTS: f32 = 0.45;
 
@@ -32,7 +35,7 @@ pub(super) fn page(pictures: &GapPictures<'_>) -> Option<Canvas> {
         "root mean square residual of each rollout, in standard deviations on nominal drives, where it began";
     draw_header("The residual over the ground", line, &mut canvas);
     let worst = worst(residuals);
-    let panels: [(&str, fn(&GroundResidual) -> f64); 2] = [
+    let panels: [(&str, Size); 2] = [
         ("calibrated nominal model", |residual| residual.before),
         ("with the announced effects", |residual| residual.after),
     ];
@@ -82,7 +85,7 @@ fn window(residuals: &[GroundResidual]) -> Option<[Range; 2]> {
             [low.min(position), high.max(position)]
         });
         let margin = 0.06 * (high - low) + 0.5;
-        (high >= low).then(|| Range { low: low - margin, high: high + margin })
+        (high >= low).then_some(Range { low: low - margin, high: high + margin })
     };
     Some([range(|residual| residual.x_m)?, range(|residual| residual.y_m)?])
 }
@@ -129,13 +132,7 @@ fn relief(ground: &GroundMap, axes: &Axes) -> Image {
     Image { width, pixels: (0..width * height).map(pixel).collect() }
 }
 
-fn draw_residuals(
-    residuals: &[GroundResidual],
-    value: fn(&GroundResidual) -> f64,
-    worst: f64,
-    axes: &Axes,
-    canvas: &mut Canvas,
-) {
+fn draw_residuals(residuals: &[GroundResidual], value: Size, worst: f64, axes: &Axes, canvas: &mut Canvas) {
     // The largest on top.
     let mut ordered: Vec<_> = residuals.iter().filter(|residual| value(residual).is_finite()).collect();
     ordered.sort_by(|a, b| value(a).total_cmp(&value(b)));

@@ -43,7 +43,7 @@ fn draw_bars(tables: &[&ConditionTable], frame: Rect, canvas: &mut Canvas) {
     for (row, table) in tables.iter().enumerate() {
         let centre = -(row as f64) - 0.5;
         let (x, y) = axes.place(whole(table), centre);
-        let stands_out = table.share > 0.0;
+        let stands_out = table.share > crate::gap::told::STANDS_OUT;
         let colour = if stands_out { BEFORE } else { Rgb::RULE };
         canvas.rect(Rect { x: frame.x, y: y - 12.0, width: x - frame.x, height: 24.0 }, colour, 0.9);
         let null_x = axes.place(table.null_share.clamp(0.0, axes.x.high), centre).0;

@@ -21,6 +21,9 @@ const WIDTH: f64 = 270.0;
 const HEIGHT: f64 = 300.0;
 const STEP: [f64; 2] = [300.0, 450.0];
 
+/// One of the sizes of a residual.
+type Size = fn(&ResidualCell) -> f64;
+
 pub(super) fn page(pictures: &GapPictures<'_>) -> Option<Canvas> {
     let rows = [
         ("The drives the cause was sought in", &pictures.findings.residuals[..]),
@@ -74,15 +77,19 @@ fn draw_row(cells: &[ResidualCell], top: f64, canvas: &mut Canvas) {
 }
 
 fn draw_curves(cells: &[&ResidualCell], axes: &Axes, canvas: &mut Canvas) {
-    let curves: [(fn(&ResidualCell) -> f64, Rgb, &'static str); 3] =
-        [(|cell| cell.floor, FLOOR, "7 5"), (|cell| cell.before, BEFORE, ""), (|cell| cell.after, AFTER, "")];
-    for (value, colour, dash) in curves {
-        let points: Vec<_> = cells
-            .iter()
-            .filter(|cell| value(cell).is_finite())
-            .map(|cell| axes.place(cell.horizon_s, value(cell)))
-            .collect();
-        canvas.polyline(&points, Stroke { colour, width: 3.0, dash });
-        points.iter().for_each(|point| canvas.circle(*point, 5.0, colour, Stroke::solid(Rgb::WHITE, 1.5)));
+    // The first ones are wider, to be seen below the others.
+    let curves: [(Size, Stroke); 3] = [
+        (|cell| cell.before, Stroke::solid(BEFORE, 6.0)),
+        (|cell| cell.after, Stroke::solid(AFTER, 3.0)),
+        (|cell| cell.floor, Stroke { dash: "7 5", ..Stroke::solid(FLOOR, 2.0) }),
+    ];
+    for (value, stroke) in curves {
+        let own = cells.iter().filter(|cell| value(cell).is_finite());
+        let points: Vec<_> = own.map(|cell| axes.place(cell.horizon_s, value(cell))).collect();
+        canvas.polyline(&points, stroke);
+        let radius = 2.5 + stroke.width;
+        points.iter().for_each(|point| {
+            canvas.circle(*point, radius, stroke.colour, Stroke::solid(Rgb::WHITE, 1.5));
+        });
     }
 }

@@ -17,7 +17,7 @@ pub(super) fn condition(condition: Condition) -> (&'static str, &'static str) {
     match condition {
         Condition::Speed => ("speed", "m/s"),
         Condition::Steering => ("steering", "rad"),
-        Condition::SteeringChange => ("change of steering", "rad/s"),
+        Condition::SteeringChange => ("change of steering", "rad"),
         Condition::SpeedChange => ("change of speed", "m/s²"),
         Condition::LateralAcceleration => ("lateral acceleration", "m/s²"),
         Condition::Pitch => ("pitch", "rad"),
