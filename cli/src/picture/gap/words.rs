@@ -18,7 +18,7 @@ pub(super) fn condition(condition: Condition) -> (&'static str, &'static str) {
         Condition::Speed => ("speed", "m/s"),
         Condition::Steering => ("steering", "rad"),
         Condition::SteeringChange => ("change of steering", "rad"),
-        Condition::SpeedChange => ("change of speed", "m/s²"),
+        Condition::SpeedChange => ("change of speed", "m/s"),
         Condition::LateralAcceleration => ("lateral acceleration", "m/s²"),
         Condition::Pitch => ("pitch", "rad"),
         Condition::Roll => ("roll", "rad"),
