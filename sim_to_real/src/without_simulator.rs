@@ -8,7 +8,7 @@
 mod notes;
 mod selection;
 
-use crate::answer::{Ranked, Verdict};
+use crate::answer::Verdict;
 use crate::baseline::{Baseline, GapError, Null, drives_of};
 use crate::causes::{Explanation, Trial};
 use crate::comparison::{Comparison, Yardstick, root_mean_square};

@@ -9,7 +9,7 @@ use crate::comparison::{Comparison, Yardstick, root_mean_square};
 use crate::evidence::SpeedInput;
 use crate::machine::Machine;
 use bicycle::Effect;
-use bicycle::effect::{CATALOGUE, Description};
+use bicycle::effect::{CATALOGUE, Description, Parameter};
 
 /// Logarithmic gain in loss that an effect must bring on the drives themselves,
 const PRICE: f64 = 0.05;
@@ -119,20 +119,18 @@ impl Selection {
     }
 }
 
-/// An effect that needs more than it may have, or forces where nothing regulates the speed, explains nothing.
+/// Whether every parameter stays clear of the end of what it may be: an effect that is pushed there explains nothing.
 fn is_within_bounds(explanation: &Explanation) -> bool {
+    let is_clear = |parameter: &Parameter, value: f64| {
+        if is_limit(parameter) {
+            return value > 1.5 * parameter.low;
+        }
+        let end = if value > parameter.neutral { parameter.high } else { parameter.low };
+        (value - parameter.neutral).abs() <= 0.95 * (end - parameter.neutral).abs()
+    };
     explanation.causes.iter().all(|cause| {
         let parameters = cause.description().parameters;
-        parameters.iter().zip(cause.values()).all(|(parameter, value)| {
-            let reach = if is_limit(parameter) {
-                0.5 * parameter.low
-            } else {
-                1e-3 * (parameter.high - parameter.low)
-            };
-            let at_end =
-                value < parameter.low + reach || (value > parameter.high - reach && !is_limit(parameter));
-            !at_end || value == parameter.neutral
-        })
+        parameters.iter().zip(cause.values()).all(|(parameter, value)| is_clear(parameter, value))
     })
 }
 
