@@ -14,14 +14,16 @@ mod findings;
 mod ground;
 mod intervals;
 mod judgement;
+mod learned_bound;
 mod least_squares;
 mod machine;
+mod manoeuvre;
 mod residual_table;
 mod rollout;
-pub mod scratch_api;
 mod screening;
 mod signals;
 mod smoothing;
+mod unseen;
 mod verification;
 mod without_simulator;
 
@@ -34,7 +36,10 @@ pub use findings::{
     ConditionBin, ConditionTable, Findings, GroundResidual, Prediction, PredictionModel, ResidualCell,
     ResidualState,
 };
+pub use learned_bound::{LearnedBound, LearnedBoundError, learned_bound};
 pub use machine::{GroundMap, Machine, SensorNoise};
+pub use manoeuvre::{Manoeuvre, design_manoeuvre};
 pub use screening::{Gravity, Place as RowPlace, Suspicion, screen, screen_sets, split_at_breaks};
+pub use unseen::unseen_effects;
 pub use verification::{Verification, verify};
 pub use without_simulator::{WithoutSimulator, diagnose_without_simulator};
