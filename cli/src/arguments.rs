@@ -3,6 +3,7 @@
 mod bench;
 mod bench_gap;
 mod collect;
+mod deviation;
 mod drive;
 mod gap;
 mod gap_check;
@@ -21,6 +22,7 @@ pub use bench::{
 };
 pub use bench_gap::BenchGapArguments;
 pub use collect::{CollectArguments, CollectMap, CollectSplit, CollectWorld};
+pub use deviation::AskedDeviation;
 pub use drive::{DriveArguments, InstructionSet, MapSource, Method, Pace};
 pub use gap::{GapApplyArguments, GapCommand, GapDiagnoseArguments};
 pub use gap_check::{GapScoreArguments, GapSealArguments};

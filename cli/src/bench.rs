@@ -1,5 +1,6 @@
 //! `surefoot bench`: what was asked, handed to the benchmarks, and their result shown and written.
 
+mod gap;
 mod learned_map;
 mod learning;
 mod navigation;
@@ -9,6 +10,7 @@ use serde::Serialize;
 
 use crate::arguments::{BenchControlArguments, BenchPriorMapArguments, BenchWork};
 use crate::{UsageError, output};
+pub(crate) use gap::run_gap;
 pub(crate) use learned_map::run_learned_map;
 pub(crate) use learning::run_learning;
 pub(crate) use navigation::run_navigation;

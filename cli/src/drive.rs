@@ -2,6 +2,7 @@
 #![allow(clippy::disallowed_methods, reason = "--pace real follows the wall clock")]
 
 mod knowledge;
+mod open_loop;
 mod record;
 pub(crate) mod scene;
 
@@ -21,6 +22,7 @@ use crate::progress::{DriveProgress, ProgressLine};
 use crate::summary::{Milliseconds, Outcome, Summary, revision};
 use crate::{UsageError, interrupt};
 pub(crate) use knowledge::read_checkpoint;
+use open_loop::Script;
 use record::{KnownRisk, Recording, path_samples};
 use scene::Scene;
 
@@ -48,7 +50,10 @@ pub(crate) fn run(arguments: &DriveArguments) -> anyhow::Result<()> {
     for path in files.summaries.iter().chain([&files.recording, &files.picture]) {
         println!("  {}", path.display());
     }
-    Ok(summary.verdict()?)
+    match scene.script.as_ref().is_some_and(|script| script.is_over(&closed.episode)) {
+        true => Ok(()),
+        false => Ok(summary.verdict()?),
+    }
 }
 
 /// What the cycles leave behind.
@@ -83,6 +88,10 @@ impl Tally {
 fn drive<'a>(arguments: &DriveArguments, scene: &'a Scene) -> Result<Drive<'a>, UsageError> {
     let mut episode = EpisodeConfig::for_vehicle(&scene.vehicle);
     episode.rules.time_limit_s = arguments.time_limit;
+    if scene.script.is_some() {
+        Script::prepare(&mut episode);
+    }
+    episode.deviations = arguments.deviation.iter().map(|asked| asked.deviation).collect();
     Ok(Drive {
         task: scene.task.clone(),
         vehicle: &scene.vehicle,
@@ -121,15 +130,18 @@ fn follow(
     let began = Instant::now();
     while closed.episode.outcome().is_none() {
         let scan = closed.episode.observe().scan.clone();
-        let cycle = closed.cycle()?;
+        let cycle = match &scene.script {
+            Some(script) => script.cycle(&mut closed.episode)?,
+            None => closed.cycle()?,
+        };
         kept.tally.count(&cycle, closed.episode.cycle_s());
         if let Some(map) = closed.navigator.risk_map().filter(|_| cycle.map_ms.is_some()) {
             kept.known.update(&map);
         }
         recording.cycle(closed, &cycle, scan.as_deref())?;
         progress.update(&told(closed, &cycle));
-        if interrupt::interrupted() {
-            kept.tally.is_interrupted = true;
+        kept.tally.is_interrupted = interrupt::interrupted();
+        if kept.tally.is_interrupted || scene.script.as_ref().is_some_and(|own| own.is_over(&closed.episode)) {
             closed.episode.interrupt();
         }
         if arguments.pace == Pace::Real {
@@ -180,7 +192,7 @@ fn summarise(
     let goal_m = scene.task.goal_m;
     Summary {
         outcome,
-        reason: reason(outcome, tally, &pose),
+        reason: reason(outcome, tally, (&pose, scene.script.is_some())),
         time_to_goal_s: (outcome == Outcome::Goal).then(|| episode.time_s()),
         duration_s: episode.time_s(),
         path_length_m: episode.path_length_m(),
@@ -199,6 +211,7 @@ fn summarise(
         goal: Goal { x_m: goal_m[0], y_m: goal_m[1] },
         method: scene.knowledge.method,
         alpha: arguments.alpha,
+        deviations: arguments.deviation.iter().map(|asked| asked.words.clone()).collect(),
         unfamiliar_share: has_density.then(|| kept.known.unfamiliar_share()),
         isa: format!("{:?}", closed.navigator.controller().diagnostics().isa).to_lowercase(),
         threads: arguments.n_threads(),
@@ -208,7 +221,7 @@ fn summarise(
 }
 
 /// Why it did not end at the goal, for a person.
-fn reason(outcome: Outcome, tally: &Tally, pose: &terrain::Pose) -> String {
+fn reason(outcome: Outcome, tally: &Tally, (pose, is_scripted): (&terrain::Pose, bool)) -> String {
     let place = format!("at ({:.1}, {:.1}) m", pose.x_m, pose.y_m);
     match outcome {
         Outcome::Goal => String::new(),
@@ -218,6 +231,7 @@ fn reason(outcome: Outcome, tally: &Tally, pose: &terrain::Pose) -> String {
             pose.pitch_rad.to_degrees()
         ),
         Outcome::Stopped if tally.is_interrupted => format!("interrupted by the user {place}"),
+        Outcome::Stopped if is_scripted => format!("all commands were carried out {place}"),
         Outcome::Stopped => match tally.stops.iter().max_by_key(|(_, count)| **count) {
             Some((reason, count)) => format!("{reason:?} in {count} cycles {place}"),
             None => place,

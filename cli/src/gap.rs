@@ -4,6 +4,7 @@ mod apply;
 mod baseline;
 mod diagnose;
 mod drives;
+mod follow_up;
 mod html;
 mod machine;
 mod outputs;

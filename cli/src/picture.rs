@@ -6,6 +6,7 @@ mod canvas;
 mod collection;
 mod colour;
 mod gap;
+mod gap_closed_loop;
 mod gap_score;
 mod learning;
 mod legend;
@@ -29,6 +30,7 @@ use colour::Rgb;
 #[cfg(test)]
 pub(crate) use gap::examples as gap_examples;
 pub use gap::{GapPicture, GapPictures, HeldOutSample, HeldOutStrip, draw_gap};
+pub use gap_closed_loop::draw_gap_closed_loop;
 pub use gap_score::draw_gap_score;
 pub use learning::{draw_learning, learning_svg};
 pub use loss_curves::draw_loss_curves;

@@ -76,6 +76,9 @@ pub struct Summary {
     pub method: Method,
     /// Risk tolerance (CVaR level).
     pub alpha: f64,
+    /// How the machine departed from its description, as asked for.
+    #[serde(default)]
+    pub deviations: Vec<String>,
     /// Share of the ground that was ever known that is unlike what the networks were trained on; null for a method
     /// that cannot tell.
     pub unfamiliar_share: Option<f64>,
@@ -155,6 +158,9 @@ impl fmt::Display for Summary {
         row("start", format!("{:.2},{:.2},{:.3}", self.start.x_m, self.start.y_m, self.start.yaw_rad))?;
         row("goal", format!("{:.2},{:.2}", self.goal.x_m, self.goal.y_m))?;
         row("vehicle", self.vehicle.clone())?;
+        if !self.deviations.is_empty() {
+            row("departs by", self.deviations.join(" "))?;
+        }
         row("method", format!("{}, alpha {}", self.method.name(), self.alpha))?;
         if let Some(share) = self.unfamiliar_share {
             row(
@@ -201,6 +207,7 @@ mod tests {
             goal: Goal { x_m: 45.0, y_m: 25.0 },
             method: Method::Physics,
             alpha: 0.6,
+            deviations: vec!["steering_delay=0.2".to_owned()],
             unfamiliar_share: Some(0.125),
             isa: "avx512".to_owned(),
             threads: 2,

@@ -1,4 +1,4 @@
-//! `surefoot bench control`, `prior-map`, `navigation` and `learning`.
+//! `surefoot bench`; this file holds `control`, `prior-map`, `navigation` and `learning`.
 
 use std::path::PathBuf;
 
@@ -21,6 +21,9 @@ pub enum BenchCommand {
     /// Drives over the default rock field, with every method and risk tolerance
     #[command(long_about = NAVIGATION_ABOUT)]
     Navigation(BenchNavigationArguments),
+    /// Drives of plants with a gap, with nominal, repaired and true models
+    #[command(long_about = super::bench_gap::LONG_ABOUT)]
+    Gap(super::BenchGapArguments),
     /// How well traction, roll and pitch are foretold on ground unlike that of the training
     #[command(long_about = LEARNING_ABOUT)]
     Learning(BenchLearningArguments),

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 use scenarios::ArenaConfig;
 
+use super::AskedDeviation;
 use super::values::{self, Goal, StartPose, WorldSource};
 use crate::UsageError;
 
@@ -40,6 +41,11 @@ pub struct DriveArguments {
     /// Names: pietra_full_size (3.4 x 1.8 m), rc_car (0.33 x 0.25 m), buggy_fifth (1/5 scale), sedan.
     #[arg(long, value_name = "NAME|FILE", help_heading = "Vehicle and controller")]
     pub vehicle: Option<String>,
+
+    /// How the simulated machine departs from its description, which the controller is not told: PART=NUMBER,.. as in
+    /// steering_delay=0.2; repeatable, see "Deviations" below
+    #[arg(long, value_name = "PART=NUMBER,..", help_heading = "Vehicle and controller")]
+    pub deviation: Vec<AskedDeviation>,
 
     /// What the controller believes of the machine, a TOML file [default: the vehicle's geometry, no effects]
     #[arg(long, value_name = "FILE", help_heading = "Vehicle and controller")]
@@ -94,6 +100,11 @@ pub struct DriveArguments {
     /// Folder for drive.png, drive.mcap and summary.json; made if missing, earlier files are replaced
     #[arg(long, value_name = "DIR", default_value = "surefoot-out", help_heading = "Output")]
     pub out: PathBuf,
+
+    /// Carry out the commands of this drive log (.csv or .mcap: t, cmd_speed, cmd_steer) instead of planning; nothing but
+    /// the world's edge, a fall or a standstill ends the drive before they do
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["goal", "method", "weights"], help_heading = "Run")]
+    pub commands: Option<PathBuf>,
 
     /// Write the summary to this file too
     #[arg(long, value_name = "FILE", help_heading = "Output")]
@@ -229,6 +240,9 @@ Examples:
       The same field for a controller that believes in full traction everywhere.
   surefoot drive --world arena --bush-height 0.3
       Tall bushes: does it take the ramp?
+  surefoot drive --deviation steering_delay=0.25 --deviation tyre_grip=0.6
+      A robot that is not what its simulator says. Record it, diagnose it with
+      `surefoot gap`, and drive again with --model.
   surefoot drive --world hills.npz --start 12,-3,1.57 --goal 60,20
       Real elevation; negative coordinates are fine.
 
@@ -249,7 +263,8 @@ Outcomes:
   stuck           it moved less than 0.1 m in 5 s
   out_of_bounds   it left the world
   timeout         --time-limit passed
-  stopped         the controller stopped for good, or Ctrl-C
+  stopped         the controller stopped for good, all of --commands were carried out,
+                  or Ctrl-C
 
 Elevation files:
   .npz        elevation [row, col] in metres, row 0 = south, column 0 = west;
@@ -258,8 +273,19 @@ Elevation files:
   .tif        GeoTIFF, one band of heights in metres
   .png        16-bit greyscale heights, scaled by FILE.png.toml beside it
 
+Deviations (SECONDS and ADDED are added to the described value, FACTORs multiply it):
+  steering   steering_delay=SECONDS, steering_response=SECONDS, steering_rate=RAD/S, steering_trim=RAD,
+             steering_ratio=LEFT,RIGHT, steering_play=RAD, steering_compliance=RAD/N
+  tyres      tyre_grip=FACTOR, tyre_stiffness=FRONT,REAR, rolling_resistance=ADDED, wheel_radius=FACTOR,
+             flat_tyre=WHEEL,RADIUS,STIFFNESS,RESISTANCE
+  motor      motor_delay=SECONDS, motor_response=SECONDS, motor_ramp=M/S2, motor_torque=NM,
+             motor_dead_band=M/S, motor_droop, battery_sag=PER_S, command_drop_out=PERIOD_S,LENGTH_S
+  body       mass=FACTOR, slope_pull=ALONG,ACROSS, wind=EAST_N,NORTH_N, drag_area=M2, dense_vegetation=FACTOR,
+             trailer=KG,DRAWBAR_M,RESISTANCE, yaw_moment=NM, sway=NM,PERIOD_S
+  sensors    pose_latency=SECONDS, odometry_scale=FACTOR, gyro_bias=RAD/S, yaw_misalignment=RAD
+
 Exit codes:
-  0  the goal was reached
+  0  the goal was reached, or all of --commands were carried out
   1  it was not, or a result could not be written; one line on standard error says why
   2  bad usage or input; one line says what was expected and what was found";
 

@@ -64,6 +64,16 @@ pub struct GapDiagnoseArguments {
     #[arg(long, value_name = "FILE")]
     pub predictions: Option<PathBuf>,
 
+    /// Design the drive that would separate what these leave open, and write its commands to this file (CSV), for
+    /// `surefoot drive --commands` [default: manoeuvre.csv beside the report, if there is one]
+    #[arg(long, value_name = "FILE")]
+    pub manoeuvre: Option<PathBuf>,
+
+    /// Fit a learned correction to what is left and tell how much it closes of the held-out drives: what no model could
+    /// surpass by far; always done for a report
+    #[arg(long)]
+    pub learned_bound: bool,
+
     /// Folder that keeps what was calibrated on nominal drives, for the next case of the same vehicle
     /// [default: surefoot/baselines in the user's cache folder]
     #[arg(long, value_name = "DIR")]
@@ -140,6 +150,7 @@ Drives:
 Files in --out:
   report.html      everything below on one page, without network
   answer.json      the answer, as --json
+  manoeuvre.csv    what to drive next, where something is left open
   prediction.json  the answer before the held-out drives were opened
   *.png            places, residuals, map, ranking, a held-out drive
 

@@ -1,6 +1,6 @@
 //! From arguments to a vehicle, a world and a task in it.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use bicycle::{Model, Vehicle};
@@ -12,6 +12,7 @@ use scenarios::{
 };
 
 use super::knowledge::Knowledge;
+use super::open_loop::Script;
 use crate::UsageError;
 use crate::arguments::{DriveArguments, WorldSource};
 
@@ -29,6 +30,8 @@ pub(super) struct Scene {
     pub config: Config,
     pub task: Task,
     pub knowledge: Knowledge,
+    /// Commands to carry out instead of planning.
+    pub script: Option<Script>,
 }
 
 /// A vehicle and what its planner knows, wherever it drives.
@@ -42,8 +45,14 @@ pub(crate) struct Machine {
 /// Reads and builds everything; whatever cannot be is refused here, before anything drives.
 pub(super) fn prepare(arguments: &DriveArguments) -> Result<Scene, UsageError> {
     let Machine { vehicle, model, config, knowledge } = machine(arguments)?;
-    let task = task(arguments, &vehicle)?;
-    Ok(Scene { vehicle, model, config, task, knowledge })
+    let mut task = task(arguments, &vehicle)?;
+    let read = |path: &PathBuf| Script::read(path, &vehicle.limits);
+    let script = arguments.commands.as_ref().map(read).transpose()?;
+    if script.is_some() {
+        // Whoever follows commands to their end passes the goal by.
+        task.goal_tolerance_m = 0.0;
+    }
+    Ok(Scene { vehicle, model, config, task, knowledge, script })
 }
 
 /// The machine alone.

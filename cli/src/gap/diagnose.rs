@@ -8,6 +8,7 @@ use sim_to_real::{
     diagnose_without_simulator, verify,
 };
 
+use super::follow_up::Diagnosed;
 use super::outputs::Outputs;
 use super::progress::Progress;
 use super::request::Request;
@@ -32,17 +33,26 @@ struct Verified {
 pub(super) fn run(arguments: &GapDiagnoseArguments) -> anyhow::Result<()> {
     let request = Request::of(arguments)?;
     let outputs = Outputs::prepare(arguments)?;
-    let mut doubts = request.doubtful_names();
+    let mut doubts = request.doubtful_names()?;
     let inputs = read(&request, &mut doubts)?;
     let folder = arguments.baseline_cache.clone().or_else(baseline::default_folder);
     let (baseline, diagnosis) = diagnosed_against(&inputs, folder.as_deref(), &mut doubts)?;
-    let predicted = diagnosis.answer(request.name.as_deref().unwrap_or(&inputs.machine.name));
+    let mut predicted = diagnosis.answer(request.name.as_deref().unwrap_or(&inputs.machine.name));
+    let diagnosed = Diagnosed {
+        baseline: &baseline,
+        machine: &inputs.machine,
+        diagnosis: &diagnosis,
+        sim: &inputs.sim,
+        real: &inputs.real,
+    };
+    diagnosed.advise(&mut predicted, (arguments, &outputs))?;
     outputs.write_json("prediction.json", &predicted)?;
 
     // From here on the prediction cannot change any more.
     let verified = open_heldout(&request, &inputs, &baseline, &diagnosis, &mut doubts)?;
     let complete = |verification: &Verification| verification.complete(predicted.clone());
     let mut answer = verified.verification.as_ref().map_or_else(|| predicted.clone(), complete);
+    diagnosed.bound(&mut answer, (arguments, &outputs), &verified.heldout)?;
     answer.advice.extend(doubts.iter().map(|doubt| format!("check {doubt}")));
     let report = Report {
         request: &request,
