@@ -16,8 +16,12 @@ use crate::recovery::{Mode, Watch};
 use crate::rollout::MAX_SLOTS;
 use crate::summary::Totals;
 use crate::weights::WeightSummary;
-use bicycle::{Command, Decision, HoldReason, Model, State, Stepper, StopReason};
+use bicycle::{Command, Decision, Effect, HoldReason, Model, State, Stepper, StopReason};
 use traversability::RiskMapView;
+
+/// Share of the tyres' grip that a plan may ask for: beyond it they slide, and what they then do no model foretells well.
+const GRIP_SHARE: f64 = 0.75;
+const GRAVITY_MPS2: f64 = 9.81;
 
 /// A part of a decision, for whoever measures where time goes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -51,6 +55,8 @@ pub struct Controller {
     cell_stepper: Stepper,
     history: History,
     watch: Watch,
+    /// Largest lateral acceleration that a plan may ask for [m/s2].
+    lateral_max_mps2: f64,
     /// How far the model's effects keep speed and steering behind the commands [s].
     lag_s: [f64; 2],
     reference: Vec<ReferenceStep>,
@@ -94,6 +100,7 @@ impl Controller {
             history: History::new(),
             watch: Watch::new(config.recovery),
             lag_s,
+            lateral_max_mps2: lateral_max_mps2(&model),
             reference: vec![ReferenceStep::default(); config.n_steps],
             is_fresh: true,
             slots: [0.0; MAX_SLOTS],
@@ -273,6 +280,15 @@ impl Controller {
             }
         }
     }
+}
+
+/// The limit of lateral acceleration, or what is safe on tyres whose grip the model knows, if that is less [m/s2].
+fn lateral_max_mps2(model: &Model) -> f64 {
+    let safe = |effect: &Effect| match effect {
+        Effect::Friction(friction) => GRIP_SHARE * friction.mu * GRAVITY_MPS2,
+        _ => f64::INFINITY,
+    };
+    model.effects.iter().map(safe).fold(model.limits.lateral_acceleration_max_mps2, f64::min)
 }
 
 /// Whether the arrays have the shape that the geometry says.

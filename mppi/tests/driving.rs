@@ -192,6 +192,28 @@ fn lateral_acceleration_is_kept_at_speed() {
     }
 }
 
+/// Three quarters of the grip of tyres with a friction coefficient of 0.272 are 2 m/s2.
+#[test]
+fn lateral_acceleration_is_kept_below_a_known_grip() {
+    let limits = Limits {
+        speed_max_mps: 6.0,
+        lateral_acceleration_max_mps2: 9.0,
+        acceleration_max_mps2: 4.0,
+        ..model().limits
+    };
+    let values = [0.272, 1.0, 10.0, 0.0];
+    let model = Model { limits, effects: vec![Effect::from_values("friction", values).unwrap()], ..model() };
+    let start = State { speed_mps: 4.0, ..standing() };
+    let drive = drive(&smooth(), &model, &level(), goal([6.0, 9.0]), (start, 160));
+    assert_eq!(drive.decisions.last(), Some(&Decision::Hold(HoldReason::AtGoal)));
+    let lateral_mps2 = drive.states.windows(2).map(|two| {
+        let turned_rad = (two[1].yaw_rad - two[0].yaw_rad).sin();
+        (two[1].speed_mps * turned_rad / STEP_S).abs()
+    });
+    let most_mps2 = lateral_mps2.fold(0.0, f64::max);
+    assert!(most_mps2 < 2.2, "{most_mps2} m/s2 of 2.67");
+}
+
 #[test]
 fn a_path_is_followed_to_its_end() {
     let points_m: Vec<[f64; 2]> =

@@ -174,7 +174,7 @@ impl Controller {
             roll_max_rad: limits.roll_max_rad,
             pitch_max_rad: limits.pitch_max_rad,
             attitude_s: costs.attitude_s,
-            lateral_max_mps2: limits.lateral_acceleration_max_mps2,
+            lateral_max_mps2: self.lateral_max_mps2,
             lateral_s: costs.lateral_s,
             reverse_s: costs.reverse_s,
         }
