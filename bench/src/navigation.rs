@@ -7,8 +7,6 @@
 mod drive;
 mod row;
 
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
-
 use bicycle::Vehicle;
 use mppi::Isa;
 use navigator::Config;
@@ -17,8 +15,9 @@ use serde::Serialize;
 use traversability::CvarLevel;
 
 use crate::closed_loop::{DriveError, Method};
+use crate::turns::in_turns;
+use drive::Job;
 pub use drive::{DriveResult, name_of_outcome};
-use drive::{Finished, Job};
 pub use row::{Row, WILSON_Z, wilson_interval};
 
 /// Name of the machine that drives.
@@ -137,7 +136,13 @@ pub fn measure(
     }
     let settings = settings(request)?;
     let pool = rayon::ThreadPoolBuilder::new().num_threads(request.n_threads).build()?;
-    let finished = drive_all(&pool, &jobs, &settings, &after_drive)?;
+    let finished = in_turns(&pool, jobs.len(), |index| {
+        let told =
+            |source| NavigationError::Drive { drive: jobs[index].to_string(), source: Box::new(source) };
+        let finished = jobs[index].drive(&settings).map_err(told)?;
+        after_drive(&finished.result);
+        Ok::<_, NavigationError>(finished)
+    })?;
     let isa = finished.first().map_or(request.isa, |finished| finished.isa);
     let drives: Vec<DriveResult> = finished.into_iter().map(|finished| finished.result).collect();
     Ok(Report {
@@ -173,42 +178,10 @@ fn settings(request: &Request) -> Result<Settings, NavigationError> {
     Ok(Settings { field: RockFieldConfig::default(), vehicle, config, episode })
 }
 
-/// Every thread takes the next drive until none is left or one broke.
-///
-/// A broadcast and no parallel iterator: mapping inside a drive is parallel itself, and a thread that waits for its
-/// rows of the map would otherwise begin another whole drive meanwhile.
-fn drive_all(
-    pool: &rayon::ThreadPool,
-    jobs: &[Job],
-    settings: &Settings,
-    after_drive: &(impl Fn(&DriveResult) + Sync),
-) -> Result<Vec<Finished>, NavigationError> {
-    let (next, is_broken) = (AtomicUsize::new(0), AtomicBool::new(false));
-    let work = |_: rayon::BroadcastContext<'_>| {
-        let mut done = Vec::new();
-        while !is_broken.load(Ordering::Relaxed) {
-            let index = next.fetch_add(1, Ordering::Relaxed);
-            let Some(job) = jobs.get(index) else { break };
-            let finished = job.drive(settings);
-            match &finished {
-                Ok(finished) => after_drive(&finished.result),
-                Err(_) => is_broken.store(true, Ordering::Relaxed),
-            }
-            done.push((index, finished));
-        }
-        done
-    };
-    let mut done: Vec<_> = pool.broadcast(work).into_iter().flatten().collect();
-    done.sort_by_key(|(index, _)| *index);
-    let told = |index: usize, source| NavigationError::Drive {
-        drive: jobs[index].to_string(),
-        source: Box::new(source),
-    };
-    done.into_iter().map(|(index, finished)| finished.map_err(|source| told(index, source))).collect()
-}
-
 #[cfg(test)]
 mod tests {
+    use std::sync::atomic::{AtomicUsize, Ordering};
+
     use super::*;
     use scenarios::Outcome;
 
