@@ -10,7 +10,7 @@ mod selection;
 
 use crate::answer::Verdict;
 use crate::baseline::{Baseline, GapError, Null, drives_of};
-use crate::causes::{Explanation, Trial};
+use crate::causes::Trial;
 use crate::comparison::{Comparison, Yardstick, root_mean_square};
 use crate::conditions::{StartRecord, condition_tables, ground_residuals};
 use crate::diagnosis::Diagnosis;
@@ -65,10 +65,11 @@ pub fn diagnose_without_simulator(
     let left_out = LeftOut { folds: &folds, machine, yardstick: &yardstick };
     let trial = Trial { comparison: folds.comparison(machine, &yardstick), baseline: &[] };
     let grown = grown(&trial, Some(&left_out), usize::MAX);
-    let selection = Selection::of(&trial, grown, &left_out);
+    let mut selection = Selection::of(&trial, grown, &left_out);
     let many = stretches(&drives, N_STARTS);
     let all: Vec<&Drive> = many.iter().collect();
     let baseline = bare_baseline(machine, &all, yardstick.clone());
+    selection.refit(&baseline.trial(&all));
     let diagnosis = diagnosis(&baseline, &all, &folds, &selection);
     Ok(WithoutSimulator { baseline, diagnosis })
 }
@@ -90,14 +91,18 @@ fn bare_baseline(machine: &Machine, drives: &[&Drive], yardstick: Yardstick) -> 
 
 fn diagnosis(baseline: &Baseline, all: &[&Drive], folds: &Folds<'_>, selection: &Selection) -> Diagnosis {
     let trial = baseline.trial(all);
-    let start = selection.explanation.clone();
-    let repaired = Explanation { loss: trial.loss(&start.causes), ..start };
-    let causes = if repaired.causes.is_empty() { Vec::new() } else { trial.refined(repaired).causes };
+    let causes = selection.explanation.causes.clone();
     let (before, after) = (trial.residuals(&[]), trial.residuals(&causes));
     let [own, repaired] = [&before, &after].map(|residuals| StartRecord::of(all, residuals));
     let errors = [root_mean_square(&before), root_mean_square(&after)];
     let [left_out_before, left_out_after] = selection.left_out_errors(folds, baseline);
-    let credible = selection.alternatives.iter().flat_map(|(_, ids)| ids.iter().copied());
+    let mut credible_set: Vec<String> = Vec::new();
+    let rivals = selection.alternatives.iter().flat_map(|(_, ids)| ids.iter().copied());
+    for id in selection.explanation.ids().into_iter().chain(rivals) {
+        if credible_set.iter().all(|known| known != id) {
+            credible_set.push(id.to_owned());
+        }
+    }
     Diagnosis {
         named: named_effects(&trial, &causes),
         findings: Findings {
@@ -110,7 +115,7 @@ fn diagnosis(baseline: &Baseline, all: &[&Drive], folds: &Folds<'_>, selection: 
         verdict: if causes.is_empty() { Verdict::None } else { Verdict::Effects },
         effects: causes,
         ranking: selection.ranking(),
-        credible_set: selection.explanation.ids().into_iter().chain(credible).map(str::to_owned).collect(),
+        credible_set,
         floor: baseline.null.error,
         notes: notes::notes(all, selection, errors),
     }

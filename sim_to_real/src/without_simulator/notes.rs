@@ -7,6 +7,9 @@ use bicycle::effect::CATALOGUE;
 /// Contradictions between sensors, or between them and any motion: no machine in order shows them.
 const OF_SENSORS: [&str; 4] = ["pose_latency", "odom_scale", "gyro_bias", "yaw_misalign"];
 
+/// More effects than this that do the work of one are counted and not named.
+const MOST_NAMED: usize = 4;
+
 pub(crate) fn notes(drives: &[&Drive], selection: &Selection, errors: [f64; 2]) -> Vec<String> {
     let ids = selection.explanation.ids();
     let (of_sensors, of_machine): (Vec<&str>, Vec<&str>) = ids.iter().partition(|id| OF_SENSORS.contains(id));
@@ -29,7 +32,12 @@ pub(crate) fn notes(drives: &[&Drive], selection: &Selection, errors: [f64; 2]) 
         ));
     }
     for (id, others) in selection.alternatives.iter().filter(|(_, others)| !others.is_empty()) {
-        notes.push(format!("{id} cannot be told from {}: either explains these drives", others.join(", ")));
+        notes.push(match others.len() {
+            ..=MOST_NAMED => {
+                format!("{id} cannot be told from {}: either explains these drives", others.join(", "))
+            }
+            n => format!("{id} brings little that {n} other effects would not bring as well"),
+        });
     }
     notes.push(format!(
         "{:.0} % of the error is left; whether that is noise, ordinary or unknown cannot be told without nominal \

@@ -119,8 +119,12 @@ impl Selection {
     }
 }
 
-/// Whether every parameter stays clear of the end of what it may be: an effect that is pushed there explains nothing.
 fn is_within_bounds(explanation: &Explanation) -> bool {
+    explanation.causes.iter().all(is_clear_of_bounds)
+}
+
+/// Whether every parameter stays clear of the end of what it may be: an effect that is pushed there explains nothing.
+fn is_clear_of_bounds(cause: &Effect) -> bool {
     let is_clear = |parameter: &Parameter, value: f64| {
         if is_limit(parameter) {
             return value > 1.5 * parameter.low;
@@ -128,18 +132,22 @@ fn is_within_bounds(explanation: &Explanation) -> bool {
         let end = if value > parameter.neutral { parameter.high } else { parameter.low };
         (value - parameter.neutral).abs() <= 0.95 * (end - parameter.neutral).abs()
     };
-    explanation.causes.iter().all(|cause| {
-        let parameters = cause.description().parameters;
-        parameters.iter().zip(cause.values()).all(|(parameter, value)| is_clear(parameter, value))
-    })
+    let parameters = cause.description().parameters;
+    parameters.iter().zip(cause.values()).all(|(parameter, value)| is_clear(parameter, value))
 }
 
-/// Every effect that is not known yet beside the known ones, best first. What acts as a force on the speed takes part
-/// only where a force can have a lasting effect: with a commanded acceleration, or a speed loop to work against.
+/// Whether every drive gives forces on the speed a lasting effect: by a commanded acceleration, or by a speed loop for
+/// them to work against.
+fn may_push(trial: &Trial<'_>, ids: &[&str]) -> bool {
+    ids.contains(&"speed_loop")
+        || trial.comparison.drives().all(|drive| drive.evidence.speed_input != SpeedInput::Commanded)
+}
+
+/// Every effect that is not known yet beside the known ones, best first.
 fn additions(trial: &Trial<'_>, known: &Explanation) -> Vec<(&'static Description, Explanation)> {
     let ids = known.ids();
-    let is_free = trial.comparison.drives().all(|drive| drive.evidence.speed_input != SpeedInput::Commanded);
-    let may_act = |id: &str| is_free || ids.contains(&"speed_loop") || !FORCES.contains(&id);
+    let may_push = may_push(trial, &ids);
+    let may_act = |id: &str| may_push || !FORCES.contains(&id);
     let candidates = CATALOGUE.iter().filter(|description| {
         let id = description.id;
         !ids.contains(&id) && may_act(id) && trial.comparison.judges(id)
@@ -205,6 +213,29 @@ fn gains(
 }
 
 impl Selection {
+    /// Fits the selected effects to other drives; what is pushed to its bounds there is given up.
+    pub(crate) fn refit(&mut self, trial: &Trial<'_>) {
+        loop {
+            let n_before = self.explanation.causes.len();
+            if n_before == 0 {
+                return;
+            }
+            let start = self.explanation.clone();
+            self.explanation = trial.refined(Explanation { loss: trial.loss(&start.causes), ..start });
+            self.explanation.causes.retain(is_clear_of_bounds);
+            let may_push = may_push(trial, &self.explanation.ids());
+            self.explanation.causes.retain(|cause| may_push || !FORCES.contains(&cause.description().id));
+            if self.explanation.causes.len() == n_before {
+                break;
+            }
+        }
+        let ids = self.explanation.ids();
+        self.alternatives.retain(|(id, _)| ids.contains(id));
+        for causes in &mut self.elsewhere {
+            causes.retain(|cause| ids.contains(&cause.description().id));
+        }
+    }
+
     /// Every effect that can be judged; a half where the gain is the price.
     pub(crate) fn ranking(&self) -> Vec<Ranked> {
         let score = |gain: f64| 1.0 / (1.0 + (-(gain - PRICE) / (0.25 * PRICE)).exp());
