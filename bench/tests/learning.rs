@@ -124,6 +124,7 @@ fn parameters_say_what_data_they_were_chosen_on() {
         validation_emd2: [0.0; 4],
         validation_total: 0.0,
         validation_deviation: 0.0,
+        validation_standard_error: 0.0,
         n_seeds: 1,
     };
     let chosen = |data: String| {
