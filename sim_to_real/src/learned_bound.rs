@@ -18,17 +18,16 @@ use crate::drive::Drive;
 use crate::machine::Machine;
 use bicycle::{DriveLog, Effect};
 use features::{Examples, Scaling};
-use network::{Network, Trained, fitted};
+use network::{Network, Pace, Trained, fitted};
 
-/// Passes over the examples, at most.
-#[allow(dead_code)]
-const N_PASSES: usize = 60;
-pub(crate) fn n_passes_max() -> usize { network::tuned("PASSES", 60.0) as usize }
+/// Slow, so that the little that a small rest tells is not overrun by what is learned by heart, and fast, for a large
+/// rest; the drives themselves say which.
+const PACES: [Pace; 2] = [
+    Pace { learning_rate: 5e-4, batch: 96, n_passes: 60 },
+    Pace { learning_rate: 2e-3, batch: 16, n_passes: 40 },
+];
 /// A correction must lower the error on drives it was not fitted to by this share, else there is none.
 const WORTH_LEARNING: f64 = 0.02;
-/// Steps between the starts of rollouts that the network learns from.
-const STRIDE: usize = 5;
-
 /// Why there is no bound.
 #[derive(Debug, thiserror::Error)]
 pub enum LearnedBoundError {
@@ -68,20 +67,20 @@ pub fn learned_bound(
     }
     let effects = composed(&baseline.effects, diagnosis.effects());
     let examples = |drives: &[Drive]| Examples::of(baseline, &effects, drives, machine);
-    let halves = halves(&real);
-    let n_passes = best_number_of_passes(&halves.each_ref().map(|half| examples(&half.iter().map(denser).collect::<Vec<_>>())))?;
+    let chosen = best_training(&halves(&real).each_ref().map(|half| examples(half)))?;
     let held = examples(&heldout);
-    let after = if n_passes == 0 {
-        held.residuals.clone()
-    } else {
-        let denser: Vec<Drive> = real.iter().map(denser).collect();
-        let all = examples(&denser);
-        let scaling = Scaling::of(&all);
-        let network = fitted(&all, &scaling, n_passes, &mut |_, _| Ok(()))?;
-        Trained { network: &network, scaling: &scaling }.corrected(&held)?
+    let after = match chosen {
+        None => held.residuals.clone(),
+        Some(training) => {
+            let all = examples(&real);
+            let scaling = Scaling::of(&all);
+            let network = fitted(&all, &scaling, training, &mut |_, _| Ok(()))?;
+            Trained { network: &network, scaling: &scaling }.corrected(&held)?
+        }
     };
     let before = root_mean_square(&nominal_residuals(baseline, &heldout));
     let error = root_mean_square(&after);
+    let n_passes = chosen.map_or(0, |(_, n_passes)| n_passes);
     Ok(LearnedBound { error, closed: baseline.closed(before, error), n_passes })
 }
 
@@ -98,36 +97,29 @@ fn halves(drives: &[Drive]) -> [Vec<Drive>; 2] {
     [every_second(0), every_second(1)]
 }
 
-/// The same drive with more starts.
-fn denser(drive: &Drive) -> Drive {
-    let starts = match drive.starts[..] {
-        [first, .., last] => (first..=last).step_by(STRIDE).collect(),
-        _ => drive.starts.clone(),
-    };
-    Drive { starts, ..drive.clone() }
-}
-
-/// Each half is learned, pass by pass, and tried on the other: the number of passes after which both together are
-/// foretold best.
-fn best_number_of_passes(halves: &[Examples; 2]) -> Result<usize, LearnedBoundError> {
-    let mut squares = vec![0.0; n_passes_max() + 1];
-    for (learned, other) in [(0, 1), (1, 0)] {
-        let other = &halves[other];
-        let mut note = |pass: usize, residuals: &[f32]| {
-            squares[pass] += residuals.iter().map(|r| f64::from(*r).powi(2)).sum::<f64>();
-        };
-        note(0, &other.residuals);
-        let scaling = Scaling::of(&halves[learned]);
-        let mut after_pass = |pass: usize, trained: &Network| {
-            note(pass, &Trained { network: trained, scaling: &scaling }.corrected(other)?);
-            if pass % 10 == 0 { eprint!(" {:.3}", root_mean_square(&Trained { network: trained, scaling: &scaling }.corrected(&halves[learned])?)); }
-            Ok(())
-        };
-        fitted(&halves[learned], &scaling, n_passes_max(), &mut after_pass)?;
+/// Each half is learned at every pace, pass by pass, and tried on the other: the pace and the number of passes after
+/// which both together are foretold best; `None` where nothing helps.
+fn best_training(halves: &[Examples; 2]) -> Result<Option<(Pace, usize)>, LearnedBoundError> {
+    let square = |residuals: &[f32]| residuals.iter().map(|r| f64::from(*r).powi(2)).sum::<f64>();
+    let unlearned: f64 = halves.iter().map(|half| square(&half.residuals)).sum();
+    let mut best = (unlearned, None);
+    for pace in PACES {
+        let mut squares = vec![0.0; pace.n_passes];
+        for (learned, other) in [(0, 1), (1, 0)] {
+            let scaling = Scaling::of(&halves[learned]);
+            let mut after_pass = |pass: usize, network: &Network| {
+                let trained = Trained { network, scaling: &scaling };
+                squares[pass - 1] += square(&trained.corrected(&halves[other])?);
+                Ok(())
+            };
+            fitted(&halves[learned], &scaling, (pace, pace.n_passes), &mut after_pass)?;
+        }
+        for (place, &square) in squares.iter().enumerate() {
+            if square < best.0 {
+                best = (square, Some((pace, place + 1)));
+            }
+        }
     }
-    eprintln!(" || {:?}", squares.iter().step_by(6).map(|s| ((s / (halves[0].residuals.len()+halves[1].residuals.len()) as f64).sqrt() * 1e3).round() / 1e3).collect::<Vec<_>>());
-    let best = (0..=n_passes_max()).min_by(|a, b| squares[*a].total_cmp(&squares[*b])).unwrap_or(0);
-    let improved = 1.0 - (squares[best] / squares[0]).sqrt();
-    Ok(if improved > WORTH_LEARNING { best } else { 0 })
+    let improved = 1.0 - (best.0 / unlearned).sqrt();
+    Ok(best.1.filter(|_| improved > WORTH_LEARNING))
 }
-

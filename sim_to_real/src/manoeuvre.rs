@@ -54,8 +54,8 @@ pub struct Manoeuvre {
     pub room_m: [f64; 2],
 }
 
-/// Designs the drive that separates what the diagnosis leaves open: the names of the credible set, or where it found
-/// nothing, no effect from those that the drives could not have shown. `None` where nothing is open, where the machine
+/// Designs the drive that separates what the diagnosis leaves open: the names of the credible set, which of an unknown
+/// cause are those that come nearest, or where it found nothing, no effect from those that the drives could not have shown. `None` where nothing is open, where the machine
 /// was not driven by speed and steering commands, or where nothing that it may drive would help. It is asked for no more
 /// speed and lateral acceleration than it showed in the nominal drives `sim`, or without any in the real ones.
 ///
@@ -117,7 +117,7 @@ fn rivals(
         let name = causes.first().map_or("none", |cause| cause.description().id);
         Rival::new(trial, name.to_owned(), causes)
     };
-    if diagnosis.verdict == Verdict::Effects && diagnosis.effects.len() == 1 {
+    if diagnosis.verdict != Verdict::None && diagnosis.effects.len() < 2 {
         let open = candidates().filter(|own| diagnosis.credible_set.iter().any(|id| id == own.id));
         let fitted = open.filter_map(|description| trial.with_one_more(&[], description));
         let mut fitted: Vec<Explanation> = fitted.collect();
@@ -173,8 +173,7 @@ impl<'a> Design<'a> {
     fn greedy(&self, family: Vec<Piece>) -> Option<Vec<Piece>> {
         let mut left: Vec<Weighed> = family.into_iter().filter_map(|piece| self.weighed(piece)).collect();
         let so_far = self.so_far();
-        let expected =
-            |sums: &[Sums]| expected_log_probability(&self.rivals, &self.contests, sums, so_far);
+        let expected = |sums: &[Sums]| expected_log_probability(&self.rivals, &self.contests, sums, so_far);
         let none = |&(_, rival): &Contest| Sums::none(parameters(&self.rivals[rival]));
         let mut sums: Vec<Sums> = self.contests.iter().map(none).collect();
         let with = |sums: &[Sums], own: &Weighed| -> Vec<Sums> {
@@ -359,4 +358,3 @@ fn listed(names: &[String]) -> String {
         _ => names.concat(),
     }
 }
-

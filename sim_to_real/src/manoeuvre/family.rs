@@ -60,9 +60,9 @@ impl Envelope {
         for &angle in &angles {
             pieces.extend([steps(speed, angle), circles(speed, angle)]);
         }
-        let sines = FREQUENCIES_HZ.iter().flat_map(|&frequency| {
-            [SMALL * wide, wide].map(|angle| sine(speed, angle, frequency))
-        });
+        let sines = FREQUENCIES_HZ
+            .iter()
+            .flat_map(|&frequency| [SMALL * wide, wide].map(|angle| sine(speed, angle, frequency)));
         pieces.extend(sines);
         pieces
     }
@@ -88,10 +88,7 @@ impl Envelope {
             step(middle, fast),
             step(middle, 1.15 * middle),
             step(middle, 0.0),
-            Piece {
-                meaning: format!("creeping at up to {:.2} m/s", creep[2].1),
-                commands: held(&creep),
-            },
+            Piece { meaning: format!("creeping at up to {:.2} m/s", creep[2].1), commands: held(&creep) },
         ]
     }
 }
@@ -152,7 +149,11 @@ mod tests {
             for command in &piece.commands {
                 let (speed, angle) = (f64::from(command.speed_mps), f64::from(command.steering_rad));
                 let lateral = speed * speed * angle.tan().abs() / ENVELOPE.wheelbase_m;
-                assert!((0.0..=4.0 + 1e-6).contains(&speed) && angle.abs() <= 0.5 + 1e-6, "{}", piece.meaning);
+                assert!(
+                    (0.0..=4.0 + 1e-6).contains(&speed) && angle.abs() <= 0.5 + 1e-6,
+                    "{}",
+                    piece.meaning
+                );
                 assert!(lateral <= 2.0 + 1e-5, "{}: {lateral}", piece.meaning);
             }
         }

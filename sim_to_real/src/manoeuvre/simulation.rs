@@ -116,8 +116,7 @@ mod tests {
         let effects = [values("pose_latency", 0.1), values("yaw_misalign", 0.05), values("odom_scale", 1.1)];
         let straight = held(&[(2.0, 1.0, 0.0)]);
         let log = measured_drive(2.0, &effects, (1.0, &straight)).unwrap();
-        let (x, yaw, vx) =
-            (column(&log, Column::X), column(&log, Column::Yaw), column(&log, Column::Vx));
+        let (x, yaw, vx) = (column(&log, Column::X), column(&log, Column::Yaw), column(&log, Column::Vx));
         assert!((x[50] - 0.9).abs() < 1e-6 && (yaw[50] - 0.05).abs() < 1e-9 && (vx[50] - 1.1).abs() < 1e-6);
     }
 }

@@ -60,7 +60,10 @@ fn what_dull_drives_cannot_show_is_told_and_brought_out() {
     assert_eq!(nothing.answer("").verdict, Verdict::None);
     let told = unseen_effects(&BASELINE, &machine(), &nothing, &real).unwrap().join("\n");
     println!("{told}");
-    assert!(told.contains("speed_lag") && told.contains("friction") && told.contains("2.5 to 2.5 m/s"), "{told}");
+    assert!(
+        told.contains("speed_lag") && told.contains("friction") && told.contains("2.5 to 2.5 m/s"),
+        "{told}"
+    );
     let manoeuvre = design_manoeuvre(&BASELINE, &machine(), &nothing, (&NOMINAL, &real)).unwrap().unwrap();
     println!("{}", manoeuvre.advice("manoeuvre.csv"));
     assert_eq!(manoeuvre.separates[0], "none");

@@ -39,8 +39,7 @@ fn rates(state: &State, speed_asked: f64, angle_asked: f64) -> State {
     let [front_arm, rear_arm] = [rear, COG_AHEAD_M];
     // Slip angles of a crawling wheel have no meaning.
     let rolling = speed.max(0.6);
-    let front_force =
-        CORNERING_STIFFNESS_N[0] * (angle - ((side + front_arm * yaw_rate) / rolling).atan());
+    let front_force = CORNERING_STIFFNESS_N[0] * (angle - ((side + front_arm * yaw_rate) / rolling).atan());
     let rear_force = -CORNERING_STIFFNESS_N[1] * ((side - rear_arm * yaw_rate) / rolling).atan();
     let drive = (SPEED_GAIN * (speed_asked - speed)).clamp(-ACCELERATION_MAX, ACCELERATION_MAX);
     let rear_side = side - rear_arm * yaw_rate;
@@ -86,7 +85,8 @@ pub fn drive(commands: &[Command], wrong: Wrong, seed: u64) -> DriveLog {
             (Column::CmdSteer, f64::from(command.steering_rad)),
         ];
         let empty = DriveRow::new(row as f64 * ROW_S);
-        log.push("", &values.into_iter().fold(empty, |row, (column, value)| row.with(column, value))).unwrap();
+        log.push("", &values.into_iter().fold(empty, |row, (column, value)| row.with(column, value)))
+            .unwrap();
         let queued = f64::from(commands[row.saturating_sub(wrong.queue)].steering_rad);
         let angle = queued * wrong.ratio[usize::from(queued < 0.0)];
         for _ in 0..STEPS_PER_ROW {
