@@ -240,7 +240,7 @@ mod tests {
         let lag = "[[effects]]\nid = \"speed_lag\"\ntime_constant_s = ";
         assert_eq!(
             refuse(&format!("{lag}-0.5")),
-            "3: effects[0].time_constant_s: expected 0 to 2 s, found -0.5"
+            "3: effects[0].time_constant_s: expected 0 to 3 s, found -0.5"
         );
         assert_eq!(
             refuse("[[effects]]\nid = \"warp\"").split(", ").next(),
