@@ -141,7 +141,8 @@ fn follow(
         recording.cycle(closed, &cycle, scan.as_deref())?;
         progress.update(&told(closed, &cycle));
         kept.tally.is_interrupted = interrupt::interrupted();
-        if kept.tally.is_interrupted || scene.script.as_ref().is_some_and(|own| own.is_over(&closed.episode)) {
+        if kept.tally.is_interrupted || scene.script.as_ref().is_some_and(|own| own.is_over(&closed.episode))
+        {
             closed.episode.interrupt();
         }
         if arguments.pace == Pace::Real {

@@ -30,7 +30,8 @@ pub use gap_case::{
     parse_gap_labels, read_drive, read_gap_case, read_gap_labels, read_gap_vehicle,
 };
 pub use gap_case_write::{
-    GapSeal, GapSealError, read_sealed_labels, write_gap_case, write_gap_labels, write_gap_seal, write_gap_vehicle,
+    GapSeal, GapSealError, read_sealed_labels, write_gap_case, write_gap_labels, write_gap_seal,
+    write_gap_vehicle,
 };
 pub use model_text::model_text;
 pub use overlay::overlay;

@@ -168,7 +168,8 @@ fn be(role: Role, run: &RunName, folder: &Path, is_over: &dyn Fn() -> bool) {
             plant::run(&bus, plant_setup(&vehicle), is_over).unwrap();
         }
         Role::Mapping => {
-            mapping::run(&bus, &MappingSetup { vehicle: &vehicle, config, level, model: &model }, is_over).unwrap();
+            mapping::run(&bus, &MappingSetup { vehicle: &vehicle, config, level, model: &model }, is_over)
+                .unwrap();
         }
         Role::Learning => {
             let belief = Belief::Physics;
