@@ -13,7 +13,7 @@ const PRICE_OF_TWO: f64 = 0.24;
 /// The same for a second effect in the sensors, which no wrong shape of a motion looks like.
 const PRICE_OF_A_SECOND_SENSOR: f64 = 0.15;
 /// Difference in energy that makes one explanation e times as probable as another.
-const TEMPERATURE: f64 = 0.035;
+pub(crate) const TEMPERATURE: f64 = 0.035;
 /// Explanations this much less probable than the best are told apart from it.
 const TOLD_APART: f64 = 0.05;
 /// Where the data tell nothing apart, this many names are enough to say so.

@@ -134,7 +134,7 @@ fn rivals(
         let n = hidden.len();
         let none = Rival::new(trial, "none".to_owned(), Vec::new());
         // Those that the drives could not have shown have the loss of none by construction.
-        let hidden = hidden.into_iter().map(|rival| rival.as_likely_as(&none));
+        let hidden = hidden.into_iter().map(|rival| rival.made_likely_as(&none));
         let rivals: Vec<Rival> = std::iter::once(none.clone()).chain(hidden).collect();
         return (n > 0).then(|| (rivals, (1..=n).map(|truth| (truth, 0)).collect()));
     }

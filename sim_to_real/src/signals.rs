@@ -132,8 +132,8 @@ fn filled(values: &[f64]) -> Vec<f64> {
     filled[last..].fill(values[last]);
     for pair in known.windows(2).filter(|pair| pair[1] > pair[0] + 1) {
         let slope = (values[pair[1]] - values[pair[0]]) / (pair[1] - pair[0]) as f64;
-        for row in pair[0] + 1..pair[1] {
-            filled[row] = values[pair[0]] + slope * (row - pair[0]) as f64;
+        for (step, value) in filled[pair[0]..pair[1]].iter_mut().enumerate() {
+            *value = values[pair[0]] + slope * step as f64;
         }
     }
     filled
@@ -219,9 +219,10 @@ mod tests {
                 log(&[Column::X, Column::Y, Column::Yaw, Column::CmdSteer], n, 1.0 / rate_hz, on_circle);
             let [smooth, measured] = states(&path);
             // Chords of a circle are shorter than its arcs: (dt / 2 r)^2 / 6 of the speed.
-            for row in 10..measured[X].len() - 20 {
-                assert!((smooth[VX][row] - 1.0).abs() < 0.02, "{rate_hz} Hz: {}", smooth[VX][row]);
-                assert!((smooth[WZ][row] - 0.5).abs() < 1e-6);
+            let inside = 10..measured[X].len() - 20;
+            for (vx_mps, wz_radps) in smooth[VX][inside.clone()].iter().zip(&smooth[WZ][inside]) {
+                assert!((vx_mps - 1.0).abs() < 0.02, "{rate_hz} Hz: {vx_mps}");
+                assert!((wz_radps - 0.5).abs() < 1e-6);
             }
             assert!(measured[VX].iter().chain(&measured[WZ]).all(|value| value.is_nan()));
             let turning = log(&[Column::Wz, Column::CmdSteer, Column::CmdSpeed], n, 1.0 / rate_hz, on_circle);

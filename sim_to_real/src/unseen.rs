@@ -99,7 +99,7 @@ pub fn unseen_effects(
 
 fn missing_ground(drives: &[&Drive]) -> String {
     let rows = || drives.iter().flat_map(|drive| drive.class.iter());
-    let in_vegetation = rows().filter(|class| **class == VEGETATION).count() as f64;
+    let in_vegetation = rows().filter(|class| (**class - VEGETATION).abs() < 0.5).count() as f64;
     let steep = drives.iter().flat_map(|drive| drive.gradient[0].iter().zip(&drive.gradient[1]));
     let n_steep = steep.filter(|(east, north)| f64::from(east.hypot(**north)) > LEVEL).count() as f64;
     let n = rows().count() as f64;

@@ -72,7 +72,8 @@ fn position_error(baseline: &Baseline, residuals: &[f32]) -> Option<f64> {
     let square = |start: &[f32]| {
         let [along, across] =
             [last, last + 1].map(|place| f64::from(start[place]) * baseline.yardstick.0[place]);
-        (start[last] != 0.0 || start[last + 1] != 0.0).then(|| along * along + across * across)
+        let is_measured = start[last] != 0.0 || start[last + 1] != 0.0;
+        is_measured.then_some(along * along + across * across)
     };
     let squares: Vec<f64> = residuals.chunks(PER_START).filter_map(square).collect();
     (!squares.is_empty()).then(|| (squares.iter().sum::<f64>() / squares.len() as f64).sqrt())

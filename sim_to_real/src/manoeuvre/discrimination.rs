@@ -7,12 +7,11 @@
 
 use crate::calibration::{coordinate, with_values};
 use crate::causes::{Trial, composed};
+use crate::judgement::TEMPERATURE;
 use crate::least_squares::Coordinate;
 use bicycle::Effect;
 use nalgebra::{DMatrix, DVector};
 
-/// Difference in logarithmic loss that makes one explanation e times as probable as another.
-const TEMPERATURE: f64 = 0.035;
 /// Step of the derivatives, in changes of a parameter that matter.
 const DERIVATIVE_STEP: f64 = 0.05;
 
@@ -34,7 +33,7 @@ impl Rival {
     }
 
     /// The same, as well in accord with the drives so far as another.
-    pub(super) fn as_likely_as(self, other: &Self) -> Self {
+    pub(super) fn made_likely_as(self, other: &Self) -> Self {
         Self { loss: other.loss, ..self }
     }
 

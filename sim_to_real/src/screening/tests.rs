@@ -383,7 +383,7 @@ fn drives_without_excitation_are_refused_and_poor_ones_told() {
 #[test]
 fn the_same_drive_twice_is_refused() {
     let (one, other) = (log(&rows(1000)), log(&rows(999)));
-    let found = screen_sets(&machine(), &[one.clone()], &[other.clone(), one.clone()]);
+    let found = screen_sets(&machine(), std::slice::from_ref(&one), &[other.clone(), one.clone()]);
     let names =
         |one: &str, other: &str| Suspicion::SameDrive { one: one.to_owned(), other: other.to_owned() };
     assert_eq!(found, [names("sim drive 1", "real drive 2")]);
