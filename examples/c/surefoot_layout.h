@@ -1,4 +1,4 @@
-/* Messages of Surefoot, layout version 1. Written from its types; do not edit. */
+/* Messages of Surefoot, layout version 2. Written from its types; do not edit. */
 #ifndef SUREFOOT_LAYOUT_H
 #define SUREFOOT_LAYOUT_H
 
@@ -6,7 +6,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#define SUREFOOT_LAYOUT_VERSION 1u
+#define SUREFOOT_LAYOUT_VERSION 2u
 
 /* First field of every header: whose message it is, and of when. Known to the channels as surefoot.Stamp. */
 typedef struct SurefootStamp {
@@ -151,6 +151,8 @@ typedef struct SurefootRiskHeader {
     uint64_t author;
     /* The map of the ground that was judged. */
     SurefootSource surface;
+    /* When the odometry was measured in whose frame that map lies [ns]. */
+    uint64_t odometry_at_ns;
     /* Stuck poses that it takes into account. */
     SurefootSource stuck;
     /* Where the time to the goal leads [m]. */
@@ -160,16 +162,17 @@ typedef struct SurefootRiskHeader {
     /* XXH3 of the payload. */
     uint64_t content_hash;
 } SurefootRiskHeader;
-static_assert(sizeof(SurefootRiskHeader) == 160, "RiskHeader");
+static_assert(sizeof(SurefootRiskHeader) == 168, "RiskHeader");
 static_assert(offsetof(SurefootRiskHeader, stamp) == 0, "RiskHeader.stamp");
 static_assert(offsetof(SurefootRiskHeader, grid) == 40, "RiskHeader.grid");
 static_assert(offsetof(SurefootRiskHeader, n_yaws) == 80, "RiskHeader.n_yaws");
 static_assert(offsetof(SurefootRiskHeader, author) == 88, "RiskHeader.author");
 static_assert(offsetof(SurefootRiskHeader, surface) == 96, "RiskHeader.surface");
-static_assert(offsetof(SurefootRiskHeader, stuck) == 112, "RiskHeader.stuck");
-static_assert(offsetof(SurefootRiskHeader, goal_m) == 128, "RiskHeader.goal_m");
-static_assert(offsetof(SurefootRiskHeader, checkpoint) == 144, "RiskHeader.checkpoint");
-static_assert(offsetof(SurefootRiskHeader, content_hash) == 152, "RiskHeader.content_hash");
+static_assert(offsetof(SurefootRiskHeader, odometry_at_ns) == 112, "RiskHeader.odometry_at_ns");
+static_assert(offsetof(SurefootRiskHeader, stuck) == 120, "RiskHeader.stuck");
+static_assert(offsetof(SurefootRiskHeader, goal_m) == 136, "RiskHeader.goal_m");
+static_assert(offsetof(SurefootRiskHeader, checkpoint) == 152, "RiskHeader.checkpoint");
+static_assert(offsetof(SurefootRiskHeader, content_hash) == 160, "RiskHeader.content_hash");
 
 /* What the vehicle shall do. Known to the channels as surefoot.Command. */
 typedef struct SurefootCommandRecord {
@@ -204,6 +207,8 @@ typedef struct SurefootDecisionRecord {
     SurefootSource risk;
     /* Who made that map: 0 = none, 1 = what was learned, 2 = physics alone. */
     uint64_t author;
+    /* When the scan was measured that the map ends with [ns]; 0 = no map. */
+    uint64_t scan_at_ns;
     /* Where to go [m]. */
     double goal_m[2];
     /* How near counts as there [m]. */
@@ -219,7 +224,7 @@ typedef struct SurefootDecisionRecord {
     /* By how much the cycle began after its deadline [ns]. */
     uint64_t lateness_ns;
 } SurefootDecisionRecord;
-static_assert(sizeof(SurefootDecisionRecord) == 176, "DecisionRecord");
+static_assert(sizeof(SurefootDecisionRecord) == 184, "DecisionRecord");
 static_assert(offsetof(SurefootDecisionRecord, command) == 0, "DecisionRecord.command");
 static_assert(offsetof(SurefootDecisionRecord, cycle) == 16, "DecisionRecord.cycle");
 static_assert(offsetof(SurefootDecisionRecord, decided_at_ns) == 24, "DecisionRecord.decided_at_ns");
@@ -227,13 +232,14 @@ static_assert(offsetof(SurefootDecisionRecord, odometry) == 32, "DecisionRecord.
 static_assert(offsetof(SurefootDecisionRecord, n_odometry) == 48, "DecisionRecord.n_odometry");
 static_assert(offsetof(SurefootDecisionRecord, risk) == 56, "DecisionRecord.risk");
 static_assert(offsetof(SurefootDecisionRecord, author) == 72, "DecisionRecord.author");
-static_assert(offsetof(SurefootDecisionRecord, goal_m) == 80, "DecisionRecord.goal_m");
-static_assert(offsetof(SurefootDecisionRecord, tolerance_m) == 96, "DecisionRecord.tolerance_m");
-static_assert(offsetof(SurefootDecisionRecord, n_rollouts) == 104, "DecisionRecord.n_rollouts");
-static_assert(offsetof(SurefootDecisionRecord, elapsed_s) == 112, "DecisionRecord.elapsed_s");
-static_assert(offsetof(SurefootDecisionRecord, state) == 120, "DecisionRecord.state");
-static_assert(offsetof(SurefootDecisionRecord, duration_ns) == 160, "DecisionRecord.duration_ns");
-static_assert(offsetof(SurefootDecisionRecord, lateness_ns) == 168, "DecisionRecord.lateness_ns");
+static_assert(offsetof(SurefootDecisionRecord, scan_at_ns) == 80, "DecisionRecord.scan_at_ns");
+static_assert(offsetof(SurefootDecisionRecord, goal_m) == 88, "DecisionRecord.goal_m");
+static_assert(offsetof(SurefootDecisionRecord, tolerance_m) == 104, "DecisionRecord.tolerance_m");
+static_assert(offsetof(SurefootDecisionRecord, n_rollouts) == 112, "DecisionRecord.n_rollouts");
+static_assert(offsetof(SurefootDecisionRecord, elapsed_s) == 120, "DecisionRecord.elapsed_s");
+static_assert(offsetof(SurefootDecisionRecord, state) == 128, "DecisionRecord.state");
+static_assert(offsetof(SurefootDecisionRecord, duration_ns) == 168, "DecisionRecord.duration_ns");
+static_assert(offsetof(SurefootDecisionRecord, lateness_ns) == 176, "DecisionRecord.lateness_ns");
 
 /* Where the vehicle got stuck. Known to the channels as surefoot.Stuck. */
 typedef struct SurefootStuckRecord {

@@ -1,8 +1,8 @@
-"""Messages of Surefoot, layout version 1. Written from its types; do not edit."""
+"""Messages of Surefoot, layout version 2. Written from its types; do not edit."""
 
 import ctypes
 
-LAYOUT_VERSION = 1
+LAYOUT_VERSION = 2
 
 
 class Stamp(ctypes.Structure):
@@ -213,6 +213,8 @@ class RiskHeader(ctypes.Structure):
         ("author", ctypes.c_uint64),
         # The map of the ground that was judged.
         ("surface", Source),
+        # When the odometry was measured in whose frame that map lies [ns].
+        ("odometry_at_ns", ctypes.c_uint64),
         # Stuck poses that it takes into account.
         ("stuck", Source),
         # Where the time to the goal leads [m].
@@ -228,16 +230,17 @@ class RiskHeader(ctypes.Structure):
         return "surefoot.RiskHeader"
 
 
-assert ctypes.sizeof(RiskHeader) == 160
+assert ctypes.sizeof(RiskHeader) == 168
 assert RiskHeader.stamp.offset == 0
 assert RiskHeader.grid.offset == 40
 assert RiskHeader.n_yaws.offset == 80
 assert RiskHeader.author.offset == 88
 assert RiskHeader.surface.offset == 96
-assert RiskHeader.stuck.offset == 112
-assert RiskHeader.goal_m.offset == 128
-assert RiskHeader.checkpoint.offset == 144
-assert RiskHeader.content_hash.offset == 152
+assert RiskHeader.odometry_at_ns.offset == 112
+assert RiskHeader.stuck.offset == 120
+assert RiskHeader.goal_m.offset == 136
+assert RiskHeader.checkpoint.offset == 152
+assert RiskHeader.content_hash.offset == 160
 
 
 class CommandRecord(ctypes.Structure):
@@ -284,6 +287,8 @@ class DecisionRecord(ctypes.Structure):
         ("risk", Source),
         # Who made that map: 0 = none, 1 = what was learned, 2 = physics alone.
         ("author", ctypes.c_uint64),
+        # When the scan was measured that the map ends with [ns]; 0 = no map.
+        ("scan_at_ns", ctypes.c_uint64),
         # Where to go [m].
         ("goal_m", ctypes.c_double * 2),
         # How near counts as there [m].
@@ -305,7 +310,7 @@ class DecisionRecord(ctypes.Structure):
         return "surefoot.DecisionRecord"
 
 
-assert ctypes.sizeof(DecisionRecord) == 176
+assert ctypes.sizeof(DecisionRecord) == 184
 assert DecisionRecord.command.offset == 0
 assert DecisionRecord.cycle.offset == 16
 assert DecisionRecord.decided_at_ns.offset == 24
@@ -313,13 +318,14 @@ assert DecisionRecord.odometry.offset == 32
 assert DecisionRecord.n_odometry.offset == 48
 assert DecisionRecord.risk.offset == 56
 assert DecisionRecord.author.offset == 72
-assert DecisionRecord.goal_m.offset == 80
-assert DecisionRecord.tolerance_m.offset == 96
-assert DecisionRecord.n_rollouts.offset == 104
-assert DecisionRecord.elapsed_s.offset == 112
-assert DecisionRecord.state.offset == 120
-assert DecisionRecord.duration_ns.offset == 160
-assert DecisionRecord.lateness_ns.offset == 168
+assert DecisionRecord.scan_at_ns.offset == 80
+assert DecisionRecord.goal_m.offset == 88
+assert DecisionRecord.tolerance_m.offset == 104
+assert DecisionRecord.n_rollouts.offset == 112
+assert DecisionRecord.elapsed_s.offset == 120
+assert DecisionRecord.state.offset == 128
+assert DecisionRecord.duration_ns.offset == 168
+assert DecisionRecord.lateness_ns.offset == 176
 
 
 class StuckRecord(ctypes.Structure):

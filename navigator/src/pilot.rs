@@ -4,7 +4,7 @@ use bicycle::{Decision, HoldReason, Model, Odometry, SensorModel, StopReason};
 use mppi::{Controller, CostToGoView, Input, Objective, Terminal};
 use traversability::RiskMapView;
 
-use crate::guard::Guard;
+use crate::guard::{Guard, Jump};
 use crate::risk::StuckPose;
 use crate::{Config, NavigatorError};
 
@@ -59,15 +59,20 @@ impl Pilot {
     }
 
     /// Takes in where the vehicle says it is, and corrects it by what the model believes of the sensors. What cannot be
-    /// used is remembered as the reason for the next decision.
-    pub fn admit(&mut self, measured: &Odometry) {
+    /// used is remembered as the reason for the next decision. Returns the jump of the localisation that it made out:
+    /// maps of before lie elsewhere then.
+    pub fn admit(&mut self, measured: &Odometry) -> Option<Jump> {
         let odometry = self.sensors.corrected(measured);
         match self.guard.admit_odometry(&odometry) {
-            Ok(_) => {
+            Ok(jump) => {
                 self.fault = None;
                 self.odometry = Some(odometry);
+                jump
             }
-            Err(reason) => self.fault = Some(reason),
+            Err(reason) => {
+                self.fault = Some(reason);
+                None
+            }
         }
     }
 

@@ -9,6 +9,7 @@ use crate::channel::{
     Bus, COMMAND, DECISION, Inlet, MISSION, Message, ODOMETRY, Outlet, RISK, RISK_PHYSICS, STUCK,
 };
 use crate::clock::{self, Cycle};
+use crate::frame::Frame;
 use crate::message::{
     CommandRecord, DecisionRecord, MissionRecord, OdometryRecord, RiskHeader, Source, Stamp, StuckRecord,
 };
@@ -66,6 +67,7 @@ struct Inputs {
     physics: MapInput,
     last_odometry: Option<Stamp>,
     n_odometry: u64,
+    frame: Frame,
     destination: Option<Destination>,
 }
 
@@ -99,17 +101,20 @@ impl Inputs {
             physics: map(&RISK_PHYSICS)?,
             last_odometry: None,
             n_odometry: 0,
+            frame: Frame::default(),
             destination: None,
         })
     }
 
     /// Takes in what has come since the last decision.
     fn take(&mut self, pilot: &mut Pilot) {
-        let (last, n_taken) = (&mut self.last_odometry, &mut self.n_odometry);
+        let (last, n_taken, frame) = (&mut self.last_odometry, &mut self.n_odometry, &mut self.frame);
         *n_taken = 0;
         self.odometry.poll(|stamp, records| {
             let Some(record) = records.first() else { return };
-            pilot.admit(&record.odometry(stamp.valid_at_ns));
+            if let Some(jump) = pilot.admit(&record.odometry(stamp.valid_at_ns)) {
+                frame.note(stamp.valid_at_ns, &jump);
+            }
             *last = Some(*stamp);
             *n_taken += 1;
         });
@@ -153,7 +158,7 @@ impl Control {
         let map = self.inputs.map(began_ns).map(|message| (*message.user_header(), message.payload()));
         let chart = map.as_ref().and_then(|(header, payload)| {
             let (map, time_to_goal) = risk_views(header, payload)?;
-            Some(Chart { map, time_to_goal })
+            Some(self.inputs.frame.place(Chart { map, time_to_goal }, header.odometry_at_ns))
         });
         let cycle = self.pilot.cycle();
         // Nobody has said where to: the same as knowing nothing of the ground.
@@ -183,6 +188,7 @@ impl Control {
             n_odometry: self.inputs.n_odometry,
             risk: used.map_or(Source::default(), |header| header.stamp.source()),
             author: used.map_or(0, |header| header.author),
+            scan_at_ns: used.map_or(0, |header| header.stamp.valid_at_ns),
             goal_m: destination.goal_m,
             tolerance_m: destination.tolerance_m,
             n_rollouts: self.pilot.controller().n_rollouts() as u64,

@@ -9,6 +9,7 @@ pub mod channel;
 pub mod clock;
 pub mod control;
 mod error;
+pub mod frame;
 pub mod layout;
 pub mod learning;
 pub mod mapping;

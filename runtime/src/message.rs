@@ -8,7 +8,7 @@ use crate::layout::{RecordLayout, record};
 pub use convert::{HOLD_REASONS, STOP_REASONS};
 
 /// Version of everything in this file; messages of another are refused.
-pub const LAYOUT_VERSION: u32 = 1;
+pub const LAYOUT_VERSION: u32 = 2;
 
 record! {
     /// First field of every header: whose message it is, and of when.
@@ -129,6 +129,8 @@ record! {
         author: u64,
         /// The map of the ground that was judged.
         surface: Source,
+        /// When the odometry was measured in whose frame that map lies [ns].
+        odometry_at_ns: u64,
         /// Stuck poses that it takes into account.
         stuck: Source,
         /// Where the time to the goal leads [m].
@@ -171,6 +173,8 @@ record! {
         risk: Source,
         /// Who made that map: 0 = none, 1 = what was learned, 2 = physics alone.
         author: u64,
+        /// When the scan was measured that the map ends with [ns]; 0 = no map.
+        scan_at_ns: u64,
         /// Where to go [m].
         goal_m: [f64; 2],
         /// How near counts as there [m].

@@ -15,6 +15,7 @@ pub struct RiskMaker {
     checkpoint: u64,
     mirror: Option<GridMap<SurfaceCell>>,
     surface: Source,
+    odometry_at_ns: u64,
     shift: (u64, [f64; 3]),
     stuck: Source,
     goal_m: Option<[f64; 2]>,
@@ -29,6 +30,7 @@ impl RiskMaker {
             checkpoint,
             mirror: None,
             surface: Source::default(),
+            odometry_at_ns: 0,
             shift: (0, [0.0; 3]),
             stuck: Source::default(),
             goal_m: None,
@@ -70,6 +72,7 @@ impl RiskMaker {
         self.assessor.update([x_m, y_m], &next, &changed)?;
         self.mirror = Some(next);
         self.surface = header.stamp.source();
+        self.odometry_at_ns = header.odometry_at_ns;
         Ok(Ok(()))
     }
 
@@ -104,6 +107,7 @@ impl RiskMaker {
             n_yaws: n_yaws as u64,
             author: self.author,
             surface: self.surface,
+            odometry_at_ns: self.odometry_at_ns,
             stuck: self.stuck,
             goal_m,
             checkpoint: self.checkpoint,

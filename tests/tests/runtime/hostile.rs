@@ -70,7 +70,7 @@ fn broken_commands_never_come_through() {
     let drive = CommandRecord { speed_mps: 1.0, decision: 1, ..CommandRecord::default() };
     let future_ns = now_ns() + 3_600_000_000_000;
     let broken = [
-        (Stamp { layout_version: 2, ..stamp(1) }, vec![drive], Refusal::LayoutVersion),
+        (Stamp { layout_version: LAYOUT_VERSION + 1, ..stamp(1) }, vec![drive], Refusal::LayoutVersion),
         (Stamp { valid_at_ns: future_ns, ..stamp(2) }, vec![drive], Refusal::FromFuture),
         (Stamp { published_at_ns: u64::MAX, ..stamp(3) }, vec![drive], Refusal::FromFuture),
         (stamp(4), vec![CommandRecord { speed_mps: f32::NAN, ..drive }], Refusal::NonFinite),
