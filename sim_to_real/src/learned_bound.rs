@@ -28,6 +28,7 @@ const PACES: [Pace; 2] = [
 ];
 /// A correction must lower the error on drives it was not fitted to by this share, else there is none.
 const WORTH_LEARNING: f64 = 0.02;
+
 /// Why there is no bound.
 #[derive(Debug, thiserror::Error)]
 pub enum LearnedBoundError {
@@ -123,3 +124,6 @@ fn best_training(halves: &[Examples; 2]) -> Result<Option<(Pace, usize)>, Learne
     let improved = 1.0 - (best.0 / unlearned).sqrt();
     Ok(best.1.filter(|_| improved > WORTH_LEARNING))
 }
+
+#[cfg(test)]
+mod tests;

@@ -27,6 +27,9 @@ mod unseen;
 mod verification;
 mod without_simulator;
 
+#[cfg(test)]
+mod engine_tests;
+
 pub use answer::{Answer, BeforeAfter, Condition, Estimate, NamedEffect, Place, Ranked, Shrink, Verdict};
 pub use baseline::{Baseline, GapError};
 pub use causes::composed;

@@ -1,0 +1,154 @@
+//! Prices, probabilities, credible sets and the rule of the unknown.
+
+use super::effect;
+use crate::answer::Verdict;
+use crate::baseline::Null;
+use crate::causes::Explanation;
+use crate::judgement::{Judgement, Weighed};
+use proptest::prelude::*;
+use std::collections::BTreeMap;
+
+const SINGLES: [(&str, f64); 5] = [
+    ("steer_lag", 0.2),
+    ("steer_delay", 0.1),
+    ("steer_gain", 0.9),
+    ("speed_scale", 0.9),
+    ("rolling_drag", 0.3),
+];
+
+/// A null of loss 1 in which one effect gained something by chance.
+fn null(gained: (&str, f64)) -> Null {
+    Null {
+        error: 1.0,
+        loss: 1.0,
+        gains: BTreeMap::from([(gained.0.to_owned(), gained.1)]),
+        gain_of_one: gained.1,
+        gain_of_two: 0.0,
+        cells: Vec::new(),
+        starts: Vec::new(),
+    }
+}
+
+fn single((id, value): (&str, f64), loss: f64) -> Explanation {
+    Explanation { causes: vec![effect(id, value)], loss }
+}
+
+/// Singles of the list with these losses, sorted as they come.
+fn weighed(none: f64, losses: &[f64], pair: Option<f64>) -> Weighed {
+    let mut singles: Vec<Explanation> =
+        SINGLES.iter().zip(losses).map(|(&own, &loss)| single(own, loss)).collect();
+    singles.sort_by(|a, b| a.loss.total_cmp(&b.loss));
+    let both = [SINGLES[0], SINGLES[3]].map(|(id, value)| effect(id, value));
+    let pairs = pair.map(|loss| Explanation { causes: both.to_vec(), loss }).into_iter().collect();
+    Weighed { none: Explanation { causes: Vec::new(), loss: none }, singles, pairs }
+}
+
+fn judged(none: f64, losses: &[f64], pair: Option<f64>) -> Judgement {
+    weighed(none, losses, pair).judge(&null(("wind", 0.0)))
+}
+
+fn announced(judgement: &Judgement) -> Vec<&str> {
+    judgement.announced.iter().map(|effect| effect.description().id).collect()
+}
+
+fn score(judgement: &Judgement, id: &str) -> f64 {
+    judgement.ranking.iter().find(|ranked| ranked.id == id).unwrap().score
+}
+
+#[test]
+fn a_gain_below_its_price_is_nothing_and_one_well_above_is_announced() {
+    let at = |gain: f64| judged(1.3, &[1.3 * (-gain).exp(), 1.3, 1.3, 1.3, 1.3], None);
+    assert_eq!(at(0.0).verdict, Verdict::None);
+    assert_eq!(at(0.01).verdict, Verdict::None);
+    assert_eq!(announced(&at(0.26)), ["steer_lag"]);
+    // Once announced, it stays so for every larger gain.
+    let first = (0..60).find(|k| at(0.01 * f64::from(*k)).verdict != Verdict::None).unwrap();
+    assert!((first..60).all(|k| announced(&at(0.01 * f64::from(k))) == ["steer_lag"]), "from {first}");
+}
+
+/// What an effect gains between nominal drives is no evidence for it.
+#[test]
+fn what_chance_gains_has_to_be_gained_on_top() {
+    let losses = [1.3 * (-0.26_f64).exp(), 1.3, 1.3, 1.3, 1.3];
+    let lenient = weighed(1.3, &losses, None).judge(&null(("steer_lag", 0.0)));
+    let strict = weighed(1.3, &losses, None).judge(&null(("steer_lag", 0.26)));
+    assert_eq!((lenient.verdict, strict.verdict), (Verdict::Effects, Verdict::None));
+    // Of two that explain alike, the one that chance favours loses.
+    let alike = [losses[0], losses[0] * 1.0001, 1.3, 1.3, 1.3];
+    let judgement = weighed(1.3, &alike, None).judge(&null(("steer_lag", 0.05)));
+    assert_eq!(announced(&judgement), ["steer_delay"]);
+}
+
+#[test]
+fn a_second_effect_has_its_own_price() {
+    let losses = [2.0, 3.5, 3.8, 3.9, 4.0];
+    assert_eq!(announced(&judged(4.0, &losses, Some(1.95))), ["steer_lag"]);
+    assert_eq!(announced(&judged(4.0, &losses, Some(1.0))), ["steer_lag", "speed_scale"]);
+    let credible = judged(4.0, &losses, Some(1.0)).credible_set;
+    assert_eq!(credible, ["steer_lag", "speed_scale"], "of a pair, its members");
+}
+
+/// Most is left: unknown. Much is left, but much was explained as well: both. Little is left: effects.
+#[test]
+fn what_exceeds_the_floor_and_a_share_of_the_gap_is_unknown() {
+    let with = |loss: f64| judged(20.0, &[loss, 19.9, 19.9, 19.9, 19.9], None);
+    assert_eq!(with(1.1).verdict, Verdict::Effects);
+    assert_eq!(with(7.0).verdict, Verdict::EffectsAndUnknown);
+    assert_eq!(announced(&with(7.0)), ["steer_lag"]);
+    let nothing = with(17.0);
+    assert_eq!(nothing.verdict, Verdict::Unknown);
+    assert!(nothing.announced.is_empty());
+    // Three floors above it and nothing gained at all.
+    assert_eq!(judged(9.0, &[9.0; 5], None).verdict, Verdict::Unknown);
+    // In reach of the floor a rest is no unknown, whatever its share.
+    assert_eq!(judged(1.2, &[1.2; 5], None).verdict, Verdict::None);
+}
+
+proptest! {
+    /// Without pairs no two effects are true together: their probabilities and that of none add up to one.
+    #[test]
+    fn probabilities_add_up(none in 1.0..3.0_f64, losses in prop::collection::vec(0.8..3.0_f64, 5)) {
+        let judgement = judged(none, &losses, None);
+        let sum: f64 = judgement.ranking.iter().map(|ranked| ranked.score).sum();
+        prop_assert!(sum <= 1.0 + 1e-9);
+        prop_assert!(judgement.ranking.windows(2).all(|pair| pair[0].score >= pair[1].score));
+        prop_assert!(judgement.ranking.iter().all(|ranked| (0.0..=1.0).contains(&ranked.score)));
+        // Where none is out of the question nothing is left for it.
+        let certain = judged(1e3, &losses, None);
+        let sum: f64 = certain.ranking.iter().map(|ranked| ranked.score).sum();
+        prop_assert!((sum - 1.0).abs() < 1e-9, "{sum}");
+    }
+
+    /// With a pair the expected number of effects lies between none and two, and a better pair makes its members
+    /// likelier and nobody else.
+    #[test]
+    fn a_better_pair_makes_its_members_likelier(losses in prop::collection::vec(1.0..3.0_f64, 5), pair in 0.5..2.0_f64) {
+        let [worse, better] = [1.1 * pair, pair].map(|loss| judged(4.0, &losses, Some(loss)));
+        for judgement in [&worse, &better] {
+            let sum: f64 = judgement.ranking.iter().map(|ranked| ranked.score).sum();
+            prop_assert!((0.0..=2.0 + 1e-9).contains(&sum));
+        }
+        for (place, (id, _)) in SINGLES.iter().enumerate() {
+            let gained = score(&better, id) - score(&worse, id);
+            prop_assert!(if [0, 3].contains(&place) { gained >= -1e-9 } else { gained <= 1e-9 }, "{id}: {gained}");
+        }
+    }
+
+    /// The set holds the best single; what is in it fits at least as well as what is not; a worse rival never enters.
+    #[test]
+    fn credible_sets_are_monotone(losses in prop::collection::vec(1.0..1.6_f64, 5), worse in 1.0..1.5_f64) {
+        let before = judged(3.0, &losses, None);
+        let mut order: Vec<usize> = (0..5).collect();
+        order.sort_by(|a, b| losses[*a].total_cmp(&losses[*b]));
+        let names: Vec<&str> = order.iter().map(|place| SINGLES[*place].0).collect();
+        let n = before.credible_set.len();
+        prop_assert!(n >= 1);
+        prop_assert_eq!(&before.credible_set, &names[..n]);
+        let rival = order[4];
+        let mut changed = losses.clone();
+        changed[rival] *= worse;
+        let after = judged(3.0, &changed, None);
+        let holds = |judgement: &Judgement| judgement.credible_set.iter().any(|id| id == SINGLES[rival].0);
+        prop_assert!(holds(&before) || !holds(&after));
+    }
+}
