@@ -60,8 +60,8 @@ pub struct RecorderSetup {
     pub file_time_max_s: f64,
 }
 
-/// Records until `is_over` says to end. When the disk is full it says so, once, and goes on without a recording: the
-/// vehicle drives on.
+/// Records until `is_over` says to end. When the disk is full it ends the file where that is whole, says so, once, and
+/// goes on without a recording: the vehicle drives on.
 pub fn run(
     bus: &Bus,
     setup: RecorderSetup,
@@ -72,7 +72,8 @@ pub fn run(
     while !is_over() {
         if let Err(error) = recorder.look() {
             warn(&format!("{error}; driving on without a recording"));
-            recorder.file = None;
+            // It says again what has just been said.
+            drop(recorder.file.take().map(RotatingFile::finish));
         }
         recorder.report()?;
         clock::sleep_until(clock::now_ns() + POLL_NS);

@@ -1,6 +1,7 @@
 //! Recordings of drives as MCAP under Foxglove's own schemas, and the drive log back out of them.
 
 mod drive_row;
+mod ending;
 mod grids;
 mod json;
 mod raw;
@@ -234,12 +235,15 @@ impl DriveRecorder {
         self.fault.text().map_or(Ok(()), |problem| Err(self.failed(problem)))
     }
 
-    /// Writes the index and closes the file. Errors: [`RecordError::Write`].
+    /// Writes the index and closes the file. One whose last writes failed is cut back to what is whole and ended there,
+    /// without an index, where that much can still be written. Errors: [`RecordError::Write`].
     pub fn finish(self) -> Result<(), RecordError> {
         let Self { path, writer, fault, .. } = self;
         let problem = |problem: String| RecordError::Write { path: path.clone(), problem };
         let closed = writer.close();
         if let Some(text) = fault.text() {
+            // Best effort: without an end the file still gives all that stands before.
+            drop(ending::end_at(&path, fault.whole_bytes()));
             return Err(problem(text));
         }
         let mut file = closed.map_err(|error| problem(error.to_string()))?;

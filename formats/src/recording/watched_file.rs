@@ -2,22 +2,34 @@
 
 use std::fs::File;
 use std::io::{BufWriter, ErrorKind, Result, Seek, SeekFrom, Write};
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, OnceLock};
 
-/// The first failure of a file, if any; shared with whoever asks.
+/// The first failure of a file, if any, and how much of it is whole; shared with whoever asks.
 #[derive(Clone, Default)]
-pub(super) struct Fault(Arc<OnceLock<String>>);
+pub(super) struct Fault(Arc<Known>);
+
+#[derive(Default)]
+struct Known {
+    problem: OnceLock<String>,
+    whole_bytes: AtomicU64,
+}
 
 impl Fault {
     pub(super) fn text(&self) -> Option<String> {
-        self.0.get().cloned()
+        self.0.problem.get().cloned()
+    }
+
+    /// Bytes that the system has taken over when it was last asked to, before anything failed: an end of whole records.
+    pub(super) fn whole_bytes(&self) -> u64 {
+        self.0.whole_bytes.load(Ordering::Relaxed)
     }
 
     fn note<T>(&self, result: Result<T>) -> Result<T> {
         if let Err(error) = &result
             && error.kind() != ErrorKind::Interrupted
         {
-            self.0.get_or_init(|| error.to_string());
+            self.0.problem.get_or_init(|| error.to_string());
         }
         result
     }
@@ -48,7 +60,11 @@ impl Write for WatchedFile {
     }
 
     fn flush(&mut self) -> Result<()> {
-        self.fault.note(self.file.flush())
+        self.fault.note(self.file.flush())?;
+        if self.fault.text().is_none() {
+            self.fault.0.whole_bytes.store(self.position, Ordering::Relaxed);
+        }
+        Ok(())
     }
 }
 

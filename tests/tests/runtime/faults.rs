@@ -1,68 +1,14 @@
 //! Processes that are killed, stopped and joined by others from outside, and what becomes of the drive.
 
 use bicycle::{Decision, StopReason};
-use runtime::channel::{Bus, COMMAND, DECISION, Inlet, ODOMETRY};
-use runtime::message::{CommandRecord, DecisionRecord, OdometryRecord, Stamp};
+use runtime::channel::{Bus, COMMAND};
+use runtime::message::{CommandRecord, Stamp};
 use runtime::replay::{self, Knowledge};
 use runtime::status::Role;
 use rustix::process::Signal;
 
-use crate::fixture::{Run, eventually};
-
-/// Longest that a machine under load may need for anything here [s].
-const LIMIT_S: f64 = 60.0;
-
-/// Watches a run over its channels, as a stranger would.
-struct Witness {
-    _bus: Bus,
-    odometry: Inlet<Stamp, OdometryRecord>,
-    decisions: Inlet<Stamp, DecisionRecord>,
-    last: Option<OdometryRecord>,
-    decision: Option<(Stamp, DecisionRecord)>,
-}
-
-impl Witness {
-    fn new(run: &Run) -> Self {
-        let bus = Bus::join(&run.name).unwrap();
-        let (odometry, decisions) = (bus.inlet(&ODOMETRY).unwrap(), bus.inlet(&DECISION).unwrap());
-        Self { _bus: bus, odometry, decisions, last: None, decision: None }
-    }
-
-    fn look(&mut self) {
-        let (last, decision) = (&mut self.last, &mut self.decision);
-        self.odometry.poll(|_, records| *last = Some(records[0]));
-        self.decisions.poll(|stamp, records| *decision = Some((*stamp, records[0])));
-    }
-
-    /// Milliseconds until this holds; panics when it never does.
-    fn until(&mut self, what: &str, mut holds: impl FnMut(&Self) -> bool) -> f64 {
-        let found = eventually(LIMIT_S, || {
-            self.look();
-            holds(self).then_some(())
-        });
-        let (took, ()) =
-            found.unwrap_or_else(|| panic!("{what}: not within {LIMIT_S} s; {:?}", self.decision));
-        1e3 * took.as_secs_f64()
-    }
-
-    fn speed_mps(&self) -> f64 {
-        self.last.map_or(0.0, |odometry| odometry.velocity_mps[0].hypot(odometry.velocity_mps[1]))
-    }
-
-    fn decided(&self) -> Option<Decision> {
-        self.decision.and_then(|(_, record)| record.command.decision())
-    }
-
-    fn until_driving(&mut self, why: &str) -> f64 {
-        self.until(why, |witness| {
-            witness.speed_mps() > 0.3 && matches!(witness.decided(), Some(Decision::Drive(_)))
-        })
-    }
-
-    fn until_standing(&mut self, why: &str) -> f64 {
-        self.until(why, |witness| witness.speed_mps() < 0.08)
-    }
-}
+use crate::fixture::Run;
+use crate::witness::Witness;
 
 const PLANNERS: [Role; 3] = [Role::Mapping, Role::Learning, Role::Control];
 
@@ -93,7 +39,7 @@ fn every_process_may_fail_and_the_vehicle_is_safe() {
 
     run.signal(Role::Mapping, Signal::STOP);
     let took = witness.until("old scans stop it", |witness| {
-        witness.decided() == Some(Decision::Stop(StopReason::StaleScan))
+        witness.decision_now() == Some(Decision::Stop(StopReason::StaleScan))
     });
     table.push(("mapping stopped: stop is decided", took));
     table.push(("mapping stopped: stands", witness.until_standing("without maps")));
@@ -107,7 +53,7 @@ fn every_process_may_fail_and_the_vehicle_is_safe() {
 
     run.signal(Role::Plant, Signal::STOP);
     let took = witness.until("old odometry stops it", |witness| {
-        witness.decided() == Some(Decision::Stop(StopReason::StaleOdometry))
+        witness.decision_now() == Some(Decision::Stop(StopReason::StaleOdometry))
     });
     table.push(("odometry ends: stop is decided", took));
     run.signal(Role::Plant, Signal::CONT);

@@ -98,7 +98,8 @@ impl Run {
         std::fs::write(self.folder.path().join(OVER), "").unwrap();
         for (role, mut child) in self.children.drain(..) {
             let ended = eventually(20.0, || child.try_wait().unwrap());
-            assert!(ended.is_some(), "{} does not end", role.name());
+            let (_, status) = ended.unwrap_or_else(|| panic!("{} does not end", role.name()));
+            assert!(status.success(), "{} ended by {status}", role.name());
         }
         std::fs::remove_file(self.folder.path().join(OVER)).unwrap();
     }
@@ -209,13 +210,20 @@ pub fn recorded_setup() -> RecordedSetup {
     }
 }
 
-fn plant_setup(vehicle: &Vehicle) -> PlantSetup<'_> {
+pub fn task() -> Task {
+    Task::rock_field(&RockFieldConfig::default(), SEED).unwrap()
+}
+
+pub fn episode_config(vehicle: &Vehicle) -> EpisodeConfig {
     let mut episode = EpisodeConfig::for_vehicle(vehicle);
     // Faults make it stand for long; that is no end of the drive here.
     (episode.rules.immobile_s, episode.rules.stopped_s, episode.rules.time_limit_s) = (1e3, 1e3, 1e3);
     if let Some(sensor) = &mut episode.range_sensor {
         (sensor.n_azimuths, sensor.n_beams) = (120, 24);
     }
-    let task = Task::rock_field(&RockFieldConfig::default(), SEED).unwrap();
-    PlantSetup { task, vehicle, episode, seed: SEED, command_age_max_s: 0.3 }
+    episode
+}
+
+fn plant_setup(vehicle: &Vehicle) -> PlantSetup<'_> {
+    PlantSetup { task: task(), vehicle, episode: episode_config(vehicle), seed: SEED, command_age_max_s: 0.3 }
 }

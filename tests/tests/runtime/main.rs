@@ -5,10 +5,13 @@
 #![allow(clippy::disallowed_methods, reason = "processes are waited for")]
 
 mod channels;
+mod driver;
 mod faults;
 mod fixture;
 mod hostile;
 mod layouts;
+mod measurements;
+mod witness;
 
 /// Not a test of its own: what the processes of the others begin with.
 #[test]

@@ -1,0 +1,150 @@
+//! A robot's own driver that can be told to misbehave: measurements and time stamps that no vehicle should be driven by.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex};
+use std::thread::JoinHandle;
+
+use bicycle::Odometry;
+use runtime::channel::{Bus, COMMAND, Inlet, MISSION, ODOMETRY, Outlet, RunName, SCAN};
+use runtime::clock::{nanoseconds, now_ns, sleep_until};
+use runtime::message::{CommandRecord, MissionRecord, OdometryRecord, PointRecord, ScanHeader, Stamp};
+use runtime::plant::POINTS_MAX;
+use runtime::watchdog::Watchdog;
+use scenarios::Episode;
+use terrain::Scan;
+
+use crate::fixture::{episode_config, machine, task};
+
+/// What is wrong with what it sends.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Misbehaviour {
+    /// The localisation has corrected itself by so much, east and north [m].
+    pub offset_m: [f64; 2],
+    /// Its clock is ahead by so much [ns].
+    pub ahead_ns: i64,
+    /// The localisation repeats its last word.
+    pub is_frozen: bool,
+    /// The yaw rate is no number.
+    pub is_not_a_number: bool,
+}
+
+/// The driver, on a thread of its own; it ends with this.
+pub struct Driver {
+    behaviour: Arc<Mutex<Misbehaviour>>,
+    is_over: Arc<AtomicBool>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Driver {
+    /// Drives the vehicle of the fixture.
+    pub fn start(run: &RunName) -> Self {
+        let behaviour = Arc::new(Mutex::new(Misbehaviour::default()));
+        let is_over = Arc::new(AtomicBool::new(false));
+        let (run, told, ends) = (run.clone(), Arc::clone(&behaviour), Arc::clone(&is_over));
+        let thread = std::thread::spawn(move || {
+            let mut robot = Robot::new(&run);
+            while !ends.load(Ordering::Relaxed) {
+                let behaviour = *told.lock().unwrap();
+                robot.cycle(&behaviour);
+            }
+        });
+        Self { behaviour, is_over, thread: Some(thread) }
+    }
+
+    /// Behaves like this from the next cycle on.
+    pub fn behave(&self, behaviour: Misbehaviour) {
+        *self.behaviour.lock().unwrap() = behaviour;
+    }
+}
+
+impl Drop for Driver {
+    fn drop(&mut self) {
+        self.is_over.store(true, Ordering::Relaxed);
+        if let Some(thread) = self.thread.take() {
+            drop(thread.join());
+        }
+    }
+}
+
+struct Robot {
+    episode: Episode,
+    began_ns: u64,
+    watchdog: Watchdog,
+    told: Odometry,
+    commands: Inlet<Stamp, CommandRecord>,
+    odometry: Outlet<Stamp, OdometryRecord>,
+    scans: Outlet<ScanHeader, PointRecord>,
+    missions: Outlet<Stamp, MissionRecord>,
+    _bus: Bus,
+}
+
+impl Robot {
+    fn new(run: &RunName) -> Self {
+        let bus = Bus::join(run).unwrap();
+        let (vehicle, _) = machine();
+        let mut config = episode_config(&vehicle);
+        (config.control_hz, config.cycles_per_scan) = (50.0, 10);
+        let episode = Episode::new(task(), &vehicle, config, 1).unwrap();
+        Self {
+            episode,
+            began_ns: now_ns(),
+            watchdog: Watchdog::new(vehicle.limits, 300_000_000),
+            told: Odometry::default(),
+            commands: bus.inlet(&COMMAND).unwrap(),
+            odometry: bus.outlet(&ODOMETRY, 1).unwrap(),
+            scans: bus.outlet(&SCAN, POINTS_MAX).unwrap(),
+            missions: bus.outlet(&MISSION, 1).unwrap(),
+            _bus: bus,
+        }
+    }
+
+    fn cycle(&mut self, behaviour: &Misbehaviour) {
+        let at_ns = self.began_ns + nanoseconds(self.episode.time_s());
+        let now_ns = sleep_until(at_ns);
+        // What it is late by beyond this is lost time: a measurement says when it was true.
+        self.began_ns += now_ns.saturating_sub(at_ns + 50_000_000);
+        let stamped_ns = now_ns.min(at_ns + 50_000_000).saturating_add_signed(behaviour.ahead_ns);
+        let observation = self.episode.observe().clone();
+        if !behaviour.is_frozen {
+            self.told = observation.odometry;
+            for (axis, offset_m) in behaviour.offset_m.into_iter().enumerate() {
+                self.told.position_m[axis] += offset_m;
+            }
+        }
+        let mut record = OdometryRecord::from(&self.told);
+        if behaviour.is_not_a_number {
+            record.yaw_rate_radps = f64::NAN;
+        }
+        self.odometry.send_one(Stamp::default(), record, stamped_ns).unwrap();
+        if let Some(scan) = &observation.scan {
+            self.send_scan(scan, stamped_ns);
+        }
+        if self.episode.n_cycles().is_multiple_of(50) {
+            self.send_mission(now_ns);
+        }
+        self.follow_commands();
+    }
+
+    fn send_scan(&mut self, scan: &Scan, at_ns: u64) {
+        let element = |place: usize| PointRecord::from(&scan.points[place]);
+        let mut loan = self.scans.write(scan.points.len(), element).unwrap();
+        loan.header_mut().origin_m = scan.origin_m;
+        self.scans.send(loan, at_ns).unwrap();
+    }
+
+    fn send_mission(&mut self, at_ns: u64) {
+        let goal_m = self.episode.task().goal_m;
+        let mission = MissionRecord { goal_m, tolerance_m: 1.0, ..MissionRecord::default() };
+        self.missions.send_one(Stamp::default(), mission, at_ns).unwrap();
+    }
+
+    fn follow_commands(&mut self) {
+        let watchdog = &mut self.watchdog;
+        self.commands.poll(|stamp, commands| {
+            if let Some(decision) = commands[0].decision() {
+                watchdog.admit(decision, stamp.published_at_ns);
+            }
+        });
+        self.episode.apply(&self.watchdog.decision(now_ns())).unwrap();
+    }
+}

@@ -1,0 +1,126 @@
+//! What the localisation, the sensors and their clock may do to the vehicle.
+
+use bicycle::{Decision, StopReason};
+use runtime::channel::{Bus, SURFACE};
+use runtime::mapping::JUMPED;
+use runtime::message::SurfaceHeader;
+use runtime::payload::numbers_cell;
+use rustix::process::Signal;
+
+use crate::driver::{Driver, Misbehaviour};
+use crate::fixture::{Run, eventually};
+use crate::witness::Witness;
+use runtime::status::Role;
+
+const PLANNERS: [Role; 3] = [Role::Mapping, Role::Learning, Role::Control];
+
+/// A machine under load may be too slow to decide on the map of before; then it is asked again.
+const ATTEMPTS: usize = 6;
+
+#[test]
+fn measurements_that_cannot_be_trusted_stop_the_vehicle_until_they_can() {
+    let mut run = Run::new();
+    run.start_all(&PLANNERS);
+    let driver = Driver::start(&run.name);
+    let mut witness = Witness::new(&run);
+    witness.until_driving("all is well");
+    let well = Misbehaviour::default();
+    let second_ns = 1_000_000_000;
+    let cases = [
+        (
+            "odometry is not finite",
+            Misbehaviour { is_not_a_number: true, ..well },
+            StopReason::NonFiniteInput,
+        ),
+        ("odometry repeats itself", Misbehaviour { is_frozen: true, ..well }, StopReason::StaleOdometry),
+        ("its clock is ahead", Misbehaviour { ahead_ns: second_ns, ..well }, StopReason::StaleOdometry),
+        (
+            "its clock jumps back",
+            Misbehaviour { ahead_ns: -2 * second_ns, ..well },
+            StopReason::StaleOdometry,
+        ),
+    ];
+    for (fault, behaviour, reason) in cases {
+        driver.behave(behaviour);
+        let took_ms = witness.until_decided(fault, Decision::Stop(reason));
+        println!("{fault:36} {took_ms:7.0} ms");
+        // It does not creep on in between: for as long as the fault lasts, nothing is driven.
+        witness.decided.clear();
+        witness.until(fault, |witness| witness.decided.len() >= 5);
+        let drives = |record: &&_| matches!(command_of(record), Some(Decision::Drive(_)));
+        assert_eq!(witness.decided.iter().find(drives), None, "{fault}");
+        driver.behave(well);
+        witness.until_driving(fault);
+    }
+    // Clocks of two machines are never the same to the millisecond.
+    driver.behave(Misbehaviour { ahead_ns: 10_000_000, ..well });
+    witness.decided.clear();
+    witness.until("a clock a little ahead is no fault", |witness| {
+        let driven =
+            witness.decided.iter().filter(|record| matches!(command_of(record), Some(Decision::Drive(_))));
+        driven.count() >= 10
+    });
+}
+
+fn command_of(record: &runtime::message::DecisionRecord) -> Option<Decision> {
+    record.command.decision()
+}
+
+/// Cells of a surface message that are known.
+fn n_known(cells: &[[f32; 8]]) -> usize {
+    cells.iter().filter(|numbers| numbers_cell(numbers).unwrap().is_known()).count()
+}
+
+#[test]
+fn a_localisation_that_jumps_moves_the_map_and_not_the_vehicle() {
+    let mut run = Run::new();
+    run.start_all(&PLANNERS);
+    let driver = Driver::start(&run.name);
+    let mut witness = Witness::new(&run);
+    let bus = Bus::join(&run.name).unwrap();
+    let mut surfaces = bus.inlet(&SURFACE).unwrap();
+    witness.until_driving("all is well");
+
+    // Mapping follows: what was known is known, elsewhere.
+    let mut n_before = 0;
+    let mut jumped: Option<(SurfaceHeader, usize)> = None;
+    let mut offset_m = [6.0, -9.0];
+    surfaces.poll(|_, cells| n_before = n_known(cells));
+    driver.behave(Misbehaviour { offset_m, ..Misbehaviour::default() });
+    eventually(60.0, || {
+        surfaces.poll(|header, cells| match header.event {
+            JUMPED => jumped = Some((*header, n_known(cells))),
+            _ if jumped.is_none() => n_before = n_known(cells),
+            _ => {}
+        });
+        jumped
+    });
+    let (header, n_after) = jumped.expect("mapping makes out the jump");
+    for axis in [0, 1] {
+        assert!((header.jump_m[axis] - offset_m[axis]).abs() < 0.2, "{:?}", header.jump_m);
+    }
+    assert!(10 * n_after > 7 * n_before, "of {n_before} cells {n_after} are left");
+
+    // Control drives on meanwhile, on the map of before, laid where it belongs.
+    let has_driven = (0..ATTEMPTS).any(|_| {
+        witness.until_driving("after a jump");
+        [Role::Mapping, Role::Learning].into_iter().for_each(|role| run.signal(role, Signal::STOP));
+        offset_m = offset_m.map(|m| -m);
+        // Farther than the map reaches: where the vehicle is said to be now, the old map holds nothing.
+        let at_ns = runtime::clock::now_ns();
+        driver.behave(Misbehaviour { offset_m: offset_m.map(|m| 3.0 * m), ..Misbehaviour::default() });
+        witness.decided.clear();
+        witness.until("three decisions after the jump", |witness| {
+            witness.decided.iter().filter(|record| record.decided_at_ns > at_ns + 100_000_000).count() >= 3
+        });
+        [Role::Mapping, Role::Learning].into_iter().for_each(|role| run.signal(role, Signal::CONT));
+        let lost = Some(Decision::Stop(StopReason::OutsideMap));
+        assert!(witness.decided.iter().all(|record| command_of(record) != lost), "the map stayed behind");
+        let on_old = |record: &&runtime::message::DecisionRecord| {
+            record.decided_at_ns > at_ns + 100_000_000 && record.scan_at_ns < at_ns
+        };
+        let drives = |record| matches!(command_of(record), Some(Decision::Drive(_)));
+        witness.decided.iter().filter(on_old).any(drives)
+    });
+    assert!(has_driven, "never drove on the map of before a jump");
+}
