@@ -129,7 +129,7 @@ fn follow(
     let mut kept = Kept { tally: Tally::default(), known };
     let began = Instant::now();
     while closed.episode.outcome().is_none() {
-        let scan = closed.episode.observe().scan.clone();
+        let measured = closed.episode.observe().clone();
         let cycle = match &scene.script {
             Some(script) => script.cycle(&mut closed.episode)?,
             None => closed.cycle()?,
@@ -138,7 +138,7 @@ fn follow(
         if let Some(map) = closed.navigator.risk_map().filter(|_| cycle.map_ms.is_some()) {
             kept.known.update(&map);
         }
-        recording.cycle(closed, &cycle, scan.as_deref())?;
+        recording.cycle(closed, &cycle, &measured)?;
         progress.update(&told(closed, &cycle));
         kept.tally.is_interrupted = interrupt::interrupted();
         if kept.tally.is_interrupted || scene.script.as_ref().is_some_and(|own| own.is_over(&closed.episode))

@@ -70,11 +70,32 @@ fn drive_that_runs_out_of_time_leaves_picture_recording_and_summary() {
     let log = read_drive_log_mcap(&out.join("drive.mcap")).unwrap().log;
     let run = log.runs().next().unwrap();
     let (x_m, y_m) = (run.column(Column::X).unwrap(), run.column(Column::Y).unwrap());
-    assert!((x_m[0] - summary.start.x_m).hypot(y_m[0] - summary.start.y_m) < 1e-6);
-    // The recorded places are chords of the path; the last cycle's way is not among them: at most 0.1 s of 1 m/s.
-    let chords_m: f64 = (1..x_m.len()).map(|i| (x_m[i] - x_m[i - 1]).hypot(y_m[i] - y_m[i - 1])).sum();
-    let rest_m = summary.path_length_m - chords_m;
-    assert!((0.0..0.15).contains(&rest_m), "{chords_m} m of {} m", summary.path_length_m);
+    // What is recorded is what was measured: a localisation of 7 mm on this machine, five standard deviations.
+    let off_m = (x_m[0] - summary.start.x_m).hypot(y_m[0] - summary.start.y_m);
+    assert!(off_m > 0.0 && off_m < 0.05, "{off_m}");
+    // From the first row to the last it is no farther than the way driven, but for the noise; the last cycle's way, at
+    // most 0.1 s of 1 m/s, is not among them.
+    let chord_m = (x_m[19] - x_m[0]).hypot(y_m[19] - y_m[0]);
+    let rest_m = summary.path_length_m - chord_m;
+    assert!((-0.05..0.25).contains(&rest_m), "{chord_m} m of {} m", summary.path_length_m);
+}
+
+/// A bias of the gyro is nowhere in the motion and has to be in the log, or no diagnosis could find it.
+#[test]
+fn the_recording_holds_what_faulty_sensors_say() {
+    let folder = tempfile::tempdir().unwrap();
+    let mean_rate = |out: &str, words: &[&str]| {
+        let out = folder.path().join(out);
+        let words = [&["--seed", "3", "--time-limit", "3"], words].concat();
+        assert_not_there(&drive(&out, &words).output().unwrap(), "time limit passed");
+        let log = read_drive_log_mcap(&out.join("drive.mcap")).unwrap().log;
+        let run = log.runs().next().unwrap();
+        let rates = run.column(Column::Wz).unwrap();
+        // Before it moves: the first half second.
+        rates[..5].iter().sum::<f64>() / 5.0
+    };
+    let (sound, faulty) = (mean_rate("a", &[]), mean_rate("b", &["--deviation", "gyro_bias=0.2"]));
+    assert!((faulty - sound - 0.2).abs() < 0.02, "{sound} {faulty}");
 }
 
 #[test]

@@ -32,6 +32,7 @@ const SEEN: f64 = 0.995;
 /// Bounds that are no bounds.
 const LEAST_SPEED_MPS: f64 = 0.2;
 const LEAST_LATERAL_MPS2: f64 = 0.3;
+const LEAST_STEERING_RAD: f64 = 0.05;
 /// Odds that are worth a drive.
 const WORTH_DRIVING: f64 = 3.0;
 /// Odds beyond this are told as this.
@@ -57,7 +58,7 @@ pub struct Manoeuvre {
 /// Designs the drive that separates what the diagnosis leaves open: the names of the credible set, which of an unknown
 /// cause are those that come nearest, or where it found nothing, no effect from those that the drives could not have shown. `None` where nothing is open, where the machine
 /// was not driven by speed and steering commands, or where nothing that it may drive would help. It is asked for no more
-/// speed and lateral acceleration than it showed in the nominal drives `sim`, or without any in the real ones.
+/// speed, steering and lateral acceleration than it showed in the nominal drives `sim`, or without any in the real ones.
 ///
 /// # Errors
 /// Drives that could not be diagnosed either.
@@ -97,10 +98,11 @@ impl Envelope {
         };
         let speed = most(&|drive, row| drive.smooth[VX][row]);
         let lateral = most(&|drive, row| (drive.smooth[VX][row] * drive.smooth[WZ][row]).abs());
+        let steering = most(&|drive, row| f64::from(drive.commands[row].steering_rad).abs());
         Self {
             wheelbase_m: machine.wheelbase_m,
             speed_max_mps: speed.min(machine.speed_max_mps).max(LEAST_SPEED_MPS),
-            steering_max_rad: machine.steering_max_rad,
+            steering_max_rad: steering.min(machine.steering_max_rad).max(LEAST_STEERING_RAD),
             lateral_acceleration_max_mps2: lateral.max(LEAST_LATERAL_MPS2),
         }
     }

@@ -35,7 +35,7 @@ pub(super) struct Envelope {
 }
 
 impl Envelope {
-    /// The largest angle that may be commanded at a speed: the machine's own, and v^2 tan(angle) / L within the lateral
+    /// The largest angle that may be commanded at a speed: the one that was commanded before, and v^2 tan(angle) / L within the lateral
     /// acceleration.
     pub(super) fn steering_at(&self, speed_mps: f64) -> f64 {
         let tangent = self.lateral_acceleration_max_mps2 * self.wheelbase_m / (speed_mps * speed_mps);
