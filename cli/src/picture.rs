@@ -29,7 +29,7 @@ pub use collection::draw_collection;
 use colour::Rgb;
 #[cfg(test)]
 pub(crate) use gap::examples as gap_examples;
-pub use gap::{GapPicture, GapPictures, HeldOutSample, HeldOutStrip, draw_gap};
+pub use gap::{GapPicture, GapPictures, HeldOutSample, HeldOutStrip, Reference, draw_gap};
 pub use gap_closed_loop::draw_gap_closed_loop;
 pub use gap_score::draw_gap_score;
 pub use learning::{draw_learning, learning_svg};

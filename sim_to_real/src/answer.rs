@@ -1,5 +1,6 @@
 //! The answer of a diagnosis, as it stands in files.
 
+use crate::steering::Steering;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -124,6 +125,9 @@ pub struct Shrink {
 pub struct Answer {
     /// Name of the case.
     pub case: String,
+    /// What turns the machine; left out of files where it is an angle.
+    #[serde(default, skip_serializing_if = "Steering::is_angle")]
+    pub steering: Steering,
     /// Conclusion.
     pub verdict: Verdict,
     /// Announced effects, strongest first.

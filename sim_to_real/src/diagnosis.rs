@@ -12,6 +12,7 @@ use crate::intervals::named_effects;
 use crate::judgement::{Judgement, Weighed};
 use crate::machine::Machine;
 use crate::residual_table::residual_cells;
+use crate::steering::Steering;
 use crate::without_simulator::of_evidence;
 use bicycle::{DriveLog, Effect};
 
@@ -25,6 +26,7 @@ pub struct Diagnosis {
     /// Error of the calibrated nominal model and of the repaired one on the real drives, in standard deviations.
     pub errors: [f64; 2],
     pub(crate) effects: Vec<Effect>,
+    pub(crate) steering: Steering,
     pub(crate) verdict: Verdict,
     pub(crate) ranking: Vec<Ranked>,
     pub(crate) credible_set: Vec<String>,
@@ -66,6 +68,7 @@ pub fn diagnose(baseline: &Baseline, machine: &Machine, real: &[DriveLog]) -> Re
         errors: [root_mean_square(&before), root_mean_square(&after)],
         predicted_closed: predicted_closed(baseline, &drives, &causes),
         effects: causes,
+        steering: drives[0].evidence.steering(),
         verdict: judgement.verdict,
         ranking: judgement.ranking,
         credible_set: judgement.credible_set,
@@ -125,6 +128,7 @@ impl Diagnosis {
     pub fn answer(&self, case: &str) -> Answer {
         Answer {
             case: case.to_owned(),
+            steering: self.steering,
             verdict: self.verdict,
             effects: self.named.clone(),
             ranking: self.ranking.clone(),

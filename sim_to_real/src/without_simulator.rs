@@ -114,6 +114,7 @@ fn diagnosis(baseline: &Baseline, all: &[&Drive], folds: &Folds<'_>, selection: 
         predicted_closed: baseline.closed(left_out_before, left_out_after),
         verdict: if causes.is_empty() { Verdict::None } else { Verdict::Effects },
         effects: causes,
+        steering: all[0].evidence.steering(),
         ranking: selection.ranking(),
         credible_set,
         floor: baseline.null.error,

@@ -133,7 +133,7 @@ Files in --out:
   score.json       every number, and every case
   score.html       tables and pictures on one page, without network
   confusion.png, reliability.png, closure.png
-  answers/         NAME.json of every case
+  answers/         NAME.json of every case; an interrupted run goes on with those that are there
 
 Exit codes:
   0  every case was scored, however well

@@ -5,7 +5,7 @@ use std::path::Path;
 use bicycle::effect::{CATALOGUE, EffectError};
 use bicycle::{Effect, Model};
 use formats::ConfigText;
-use sim_to_real::{Answer, NamedEffect, Verdict};
+use sim_to_real::{Answer, NamedEffect, Steering, Verdict};
 
 use crate::UsageError;
 use crate::arguments::GapApplyArguments;
@@ -33,6 +33,13 @@ fn read_answer(path: &Path) -> Result<Answer, UsageError> {
 
 /// The announced effects as pieces of a model.
 fn effects(answer: &Answer) -> Result<Vec<Effect>, String> {
+    if answer.steering == Steering::YawRate {
+        return Err(
+            "steering: expected a diagnosis of a machine that steers by an angle, as the controller does, \
+                    found one that is skid-steered: its effects on the steering mean yaw rates"
+                .to_owned(),
+        );
+    }
     match answer.verdict {
         Verdict::None => Ok(Vec::new()),
         Verdict::Unknown => {

@@ -14,7 +14,7 @@ use super::progress::Progress;
 use super::request::Request;
 use super::{baseline, drives, html, machine, predictions, told};
 use crate::arguments::GapDiagnoseArguments;
-use crate::picture::{GapPicture, GapPictures, draw_gap};
+use crate::picture::{GapPicture, GapPictures, Reference, draw_gap};
 use crate::{UsageError, WorkFailed, summary};
 
 /// What a diagnosis is made from.
@@ -93,6 +93,7 @@ fn read(request: &Request, doubts: &mut Vec<String>) -> Result<Inputs, UsageErro
     let machine = machine::read(&request.vehicle, &[&sim[..], &real[..]].concat())?;
     let sim = drives::screened(&machine, &request.sim, sim, doubts)?;
     let real = drives::screened(&machine, &request.real, real, doubts)?;
+    drives::refuse_mixed_steering(&machine, &[(&sim, &request.sim), (&real, &request.real)])?;
     drives::screen_together(&machine, &sim, &real, doubts)?;
     Ok(Inputs { machine, sim, real })
 }
@@ -107,6 +108,8 @@ fn open_heldout(
 ) -> Result<Verified, UsageError> {
     let heldout = drives::read(&request.heldout, doubts)?;
     let heldout = drives::screened(&inputs.machine, &request.heldout, heldout, doubts)?;
+    let of_both = [(&inputs.real[..], &request.real[..]), (&heldout[..], &request.heldout[..])];
+    drives::refuse_mixed_steering(&inputs.machine, &of_both)?;
     let seen_paths: Vec<_> = request.sim.iter().chain(&request.real).collect();
     let seen = [&inputs.sim[..], &inputs.real[..]].concat();
     drives::refuse_seen(&heldout, &request.heldout, &seen, &seen_paths)?;
@@ -143,6 +146,7 @@ impl Report<'_> {
             drives: &self.told_drives(),
             doubts: self.doubts,
             pictures: &pictures,
+            reference: self.reference(),
             program: &format!("surefoot {}, revision {}", env!("CARGO_PKG_VERSION"), summary::revision()),
         });
         Ok(formats::write_bytes_atomic(&folder.join("report.html"), page.as_bytes())?)
@@ -153,6 +157,7 @@ impl Report<'_> {
         let names = predictions::run_names(&verified.heldout, &self.request.heldout);
         let strip = verification.and_then(|v| predictions::strip(&v.predictions, &verified.heldout, &names));
         draw_gap(&GapPictures {
+            reference: self.reference(),
             answer: self.answer,
             findings: &self.diagnosis.findings,
             heldout_residuals: verification.map_or(&[], |verification| &verification.residuals),
@@ -160,6 +165,10 @@ impl Report<'_> {
             heldout: strip.as_ref(),
         })
         .map_err(|reason| WorkFailed(format!("expected pages to encode as PNG, found: {reason}")))
+    }
+
+    fn reference(&self) -> Reference {
+        if self.inputs.sim.is_empty() { Reference::Bicycle } else { Reference::Simulator }
     }
 
     fn say(&self, outputs: &Outputs) {

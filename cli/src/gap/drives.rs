@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use bicycle::DriveLog;
-use sim_to_real::{Gravity, Machine, Suspicion, screen, screen_sets, split_at_breaks};
+use sim_to_real::{Gravity, Machine, Steering, Suspicion, screen, screen_sets, split_at_breaks};
 
 use crate::UsageError;
 
@@ -63,6 +63,31 @@ pub(super) fn screen_together(
             doubts.extend(found.iter().map(ToString::to_string));
             Ok(())
         }
+    }
+}
+
+/// An effect on the steering means an angle or a yaw rate: drives of both cannot be held against one another.
+pub(super) fn refuse_mixed_steering(
+    machine: &Machine,
+    drives: &[(&[DriveLog], &[PathBuf])],
+) -> Result<(), UsageError> {
+    let all = drives.iter().flat_map(|(logs, paths)| logs.iter().zip(*paths));
+    let told = all.filter_map(|(log, path)| Some((Steering::of(machine, log)?, path)));
+    let told: Vec<(Steering, &PathBuf)> = told.collect();
+    let Some(&(first, first_path)) = told.first() else { return Ok(()) };
+    let word = |steering: Steering| match steering {
+        Steering::Angle => "steers by an angle (cmd_steer, steer_meas)",
+        Steering::YawRate => "is skid-steered (cmd_wz, wheel_wz)",
+    };
+    match told.iter().find(|(steering, _)| *steering != first) {
+        None => Ok(()),
+        Some((other, path)) => Err(UsageError(format!(
+            "{}: expected a machine that {} as in {}, found one that {}",
+            path.display(),
+            word(first),
+            first_path.display(),
+            word(*other)
+        ))),
     }
 }
 

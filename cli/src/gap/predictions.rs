@@ -55,23 +55,25 @@ fn quoted(text: &str) -> String {
     }
 }
 
-/// The first held-out run with what both models had predicted for it; `None` without predictions or measurements.
+/// The held-out run with the most predictions, the first of them, with what both models had predicted for it; `None` without predictions or measurements.
 pub(super) fn strip(
     predictions: &[Prediction],
     logs: &[DriveLog],
     run_names: &[String],
 ) -> Option<HeldOutStrip> {
-    let run = logs.first()?.runs().next()?;
+    let n_of = |log: usize| predictions.iter().filter(|p| p.log == log).count();
+    let shown = (0..run_names.len()).rev().max_by_key(|&log| n_of(log))?;
+    let run = logs.iter().flat_map(DriveLog::runs).nth(shown)?;
     let of = |model| {
         let is_shown = move |p: &&Prediction| {
-            p.log == 0 && p.model == model && (p.horizon_s - STRIP_HORIZON_S).abs() < 1e-6
+            p.log == shown && p.model == model && (p.horizon_s - STRIP_HORIZON_S).abs() < 1e-6
         };
         predictions.iter().filter(is_shown)
     };
     let pairs = of(PredictionModel::Nominal).zip(of(PredictionModel::Repaired));
     let same = pairs.take_while(|(nominal, repaired)| nominal.start_s == repaired.start_s);
     let samples: Vec<_> = same.filter_map(|(nominal, repaired)| sample(&run, nominal, repaired)).collect();
-    let drive = run_names.first()?.clone();
+    let drive = run_names.get(shown)?.clone();
     (samples.len() > 1).then_some(HeldOutStrip { drive, horizon_s: STRIP_HORIZON_S, samples })
 }
 

@@ -3,6 +3,7 @@
 
 mod page;
 mod told;
+mod unfinished;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -19,6 +20,7 @@ use super::workers::{Bar, work};
 use crate::arguments::GapScoreArguments;
 use crate::picture::draw_gap_score;
 use crate::{UsageError, WorkFailed, output, summary};
+use unfinished::Unfinished;
 
 /// Room that must be free beforehand: answers, tables and pictures take less [bytes].
 const ROOM_BYTES: u64 = 64 << 20;
@@ -101,20 +103,31 @@ fn diagnose_all(
 ) -> anyhow::Result<(Vec<DiagnosedCase>, Vec<String>)> {
     let answers = arguments.out.join("answers");
     std::fs::create_dir_all(&answers)?;
-    let vehicles = calibrated(&cases, arguments.threads)?;
+    let unfinished = Unfinished::resume(arguments, answers)?;
+    let missing: Vec<&Labelled> =
+        cases.iter().filter(|labelled| unfinished.answer(&labelled.name).is_none()).collect();
+    if missing.len() < cases.len() {
+        println!("  {} of {} cases were answered before", cases.len() - missing.len(), cases.len());
+    }
+    let vehicles = calibrated(&missing, arguments.threads)?;
     let bar = Bar::new(cases.len(), "cases");
     let results = work(cases.len(), arguments.threads, |index| {
         let Labelled { name, label, case } = &cases[index];
-        let answered = answered(case, &vehicles[&nominal(case)]);
-        bar.step(name);
-        let (answer, naming_s) = match answered {
-            Ok(answered) => answered,
-            Err(error) => return Ok(Err(format!("{name}: {error:#}"))),
+        let (answer, naming_s) = match unfinished.answer(name) {
+            Some(kept) => kept,
+            None => match answered(case, &vehicles[&nominal(case)]) {
+                Ok((answer, naming_s)) => {
+                    unfinished.keep(name, (&answer, naming_s))?;
+                    (answer, naming_s)
+                }
+                Err(error) => return Ok(Err(format!("{name}: {error:#}"))),
+            },
         };
-        formats::write_json_atomic(&answers.join(format!("{name}.json")), &answer)?;
+        bar.step(name);
         Ok(Ok(DiagnosedCase { name: name.clone(), label: label.clone(), answer, naming_s: Some(naming_s) }))
     })?;
     bar.finish();
+    unfinished.finish()?;
     let (mut diagnosed, mut failures) = (Vec::new(), Vec::new());
     for result in results {
         match result {
@@ -133,7 +146,7 @@ fn nominal(case: &GapCase) -> Nominal {
     (resolved(&case.vehicle), case.sim.iter().map(resolved).collect())
 }
 
-fn calibrated(cases: &[Labelled], n_threads: usize) -> anyhow::Result<BTreeMap<Nominal, Vehicle>> {
+fn calibrated(cases: &[&Labelled], n_threads: usize) -> anyhow::Result<BTreeMap<Nominal, Vehicle>> {
     let mut all: Vec<Nominal> = cases.iter().map(|labelled| nominal(&labelled.case)).collect();
     all.sort();
     all.dedup();

@@ -5,7 +5,7 @@ use sim_to_real::{Answer, Condition, Estimate, NamedEffect, Shrink, Verdict};
 
 /// The verdict in a sentence.
 pub(crate) fn verdict(answer: &Answer) -> String {
-    let names = answer.effects.iter().map(|effect| effect.id.as_str()).collect::<Vec<_>>().join(" and ");
+    let names = listed(&answer.effects.iter().map(|effect| effect.id.as_str()).collect::<Vec<_>>());
     match answer.verdict {
         Verdict::None => {
             "No gap: the real drives differ from the simulator by no more than its own drives from one another."
@@ -16,6 +16,14 @@ pub(crate) fn verdict(answer: &Answer) -> String {
             format!("A part of the gap comes from {names}; the rest is nothing that the catalogue knows.")
         }
         Verdict::Unknown => "There is a gap, and nothing that the catalogue knows explains it.".to_owned(),
+    }
+}
+
+/// `a`, `a and b`, `a, b and c`.
+fn listed(names: &[&str]) -> String {
+    match names {
+        [all @ .., last] if !all.is_empty() => format!("{} and {last}", all.join(", ")),
+        _ => names.concat(),
     }
 }
 
@@ -106,14 +114,23 @@ pub(crate) fn shrink(shrink: &Shrink) -> Vec<String> {
             error.before, error.after
         ));
     }
-    if let Some(bound) = shrink.learned_bound_closed {
-        lines.push(format!(
-            "a learned residual closes {:.0} %: about the most that any model could",
-            100.0 * bound
-        ));
-    }
+    lines.extend(shrink.learned_bound_closed.map(|bound| learned(bound, shrink.closed)));
     lines
 }
+
+/// What a learned correction on top of the announced effects adds.
+fn learned(bound: f64, closed: Option<f64>) -> String {
+    let percent = 100.0 * bound;
+    if closed.is_some_and(|closed| bound > closed + MORE) {
+        return format!(
+            "with a learned correction on top {percent:.0} %: so much a flexible model finds beyond them"
+        );
+    }
+    format!("a learned correction on top finds nothing to add ({percent:.0} %)")
+}
+
+/// Closed part by which a learned correction has to surpass the announced effects to have found anything [-].
+const MORE: f64 = 0.01;
 
 fn closed(shrink: &Shrink) -> Option<String> {
     let before = shrink.before?;
@@ -137,7 +154,7 @@ pub(super) fn answer(answer: &Answer, drives: &str) -> String {
         lines.push(format!("      {}", meaning(&effect.id)));
     }
     if matches!(answer.verdict, Verdict::Effects | Verdict::EffectsAndUnknown) {
-        lines.extend(others(answer));
+        lines.extend(others(answer).map(|(what, names)| format!("    {what}: {}", names.join(", "))));
     }
     if answer.verdict != Verdict::None {
         lines.push(format!("  where    {}", places(answer)));
@@ -147,11 +164,15 @@ pub(super) fn answer(answer: &Answer, drives: &str) -> String {
     lines.join("\n") + "\n"
 }
 
-/// What else would explain the gap alone.
-fn others(answer: &Answer) -> Option<String> {
+/// What else would explain the gap: in which sense, and the names.
+pub(crate) fn others(answer: &Answer) -> Option<(&'static str, Vec<&str>)> {
     let is_other = |id: &&String| answer.effects.iter().all(|effect| effect.id != **id);
     let others: Vec<&str> = answer.credible_set.iter().filter(is_other).map(String::as_str).collect();
-    (!others.is_empty()).then(|| format!("    alone, these would explain as much: {}", others.join(", ")))
+    let what = match answer.effects.len() {
+        1 => "Alone, these explain the drives about as well",
+        _ => "In place of one of them, these would do as well",
+    };
+    (!others.is_empty()).then_some((what, others))
 }
 
 /// Lines below one another, the first with a name before it.
@@ -178,7 +199,7 @@ mod tests {
         ];
         assert_eq!(&lines[..5], expected);
         let rest = [
-            "    alone, these would explain as much: steer_delay",
+            "    Alone, these explain the drives about as well: steer_delay",
             "  where    change of steering 0.61",
             "  how far  predicted from the real drives alone: 95 % of the gap closes",
             "           held-out rollout error 2.10 before, 0.40 after, 0.35 is the floor",
@@ -198,6 +219,19 @@ mod tests {
         );
         let ratio = Estimate { value: 1.0, low: 0.95, high: 1.05 };
         assert_eq!(parameter("steer_gain", "ratio", &ratio), "ratio 1.00 (0.950 to 1.05)");
+    }
+
+    #[test]
+    fn a_learned_correction_that_adds_nothing_is_no_bound_of_its_own() {
+        assert_eq!(learned(0.8, Some(0.8)), "a learned correction on top finds nothing to add (80 %)");
+        assert_eq!(learned(0.7, Some(0.8)), "a learned correction on top finds nothing to add (70 %)");
+        assert!(learned(0.9, Some(0.8)).starts_with("with a learned correction on top 90 %"));
+    }
+
+    #[test]
+    fn names_are_listed_as_one_speaks() {
+        let told = [&["a"][..], &["a", "b"], &["a", "b", "c"]].map(listed);
+        assert_eq!(told, ["a", "a and b", "a, b and c"]);
     }
 
     #[test]

@@ -14,6 +14,7 @@ use super::MARGIN;
 use super::canvas::{Anchor, Canvas, Stroke, TextStyle};
 use super::colour::Rgb;
 pub use heldout::{HeldOutSample, HeldOutStrip};
+pub use words::Reference;
 
 /// Colours that mean the same on every page.
 const BEFORE: Rgb = Rgb::FAILURE;
@@ -23,6 +24,8 @@ const FLOOR: Rgb = Rgb::INK_SOFT;
 /// A diagnosis, as far as pictures need it.
 #[derive(Clone, Copy, Debug)]
 pub struct GapPictures<'a> {
+    /// What the real drives were held against.
+    pub reference: Reference,
     /// The answer.
     pub answer: &'a Answer,
     /// What the real drives have shown.
@@ -51,17 +54,20 @@ pub struct GapPicture {
 /// # Errors
 /// What the PNG encoder says.
 pub fn draw_gap(pictures: &GapPictures<'_>) -> Result<Vec<GapPicture>, String> {
+    let reference = pictures.reference;
     let pages = [
-        ("ranking.png", words::RANKING, ranking::page(pictures.answer)),
-        ("places.png", words::PLACES, places::page(pictures)),
-        ("residuals.png", words::RESIDUALS, residuals::page(pictures)),
-        ("ground.png", words::GROUND, ground::page(pictures)),
-        ("heldout.png", words::HELDOUT, pictures.heldout.map(heldout::page)),
+        ("ranking.png", words::RANKING.to_owned(), ranking::page(pictures.answer)),
+        ("places.png", reference.places(), places::page(pictures)),
+        ("residuals.png", words::RESIDUALS.to_owned(), residuals::page(pictures)),
+        ("ground.png", words::GROUND.to_owned(), ground::page(pictures)),
+        (
+            "heldout.png",
+            words::HELDOUT.to_owned(),
+            pictures.heldout.map(|strip| heldout::page(strip, reference)),
+        ),
     ];
     let drawn = pages.into_iter().filter_map(|(file, caption, page)| Some((file, caption, page?)));
-    drawn
-        .map(|(file, caption, page)| Ok(GapPicture { file, caption: caption.to_owned(), png: page.png()? }))
-        .collect()
+    drawn.map(|(file, caption, page)| Ok(GapPicture { file, caption, png: page.png()? })).collect()
 }
 
 /// Title and a line below it.

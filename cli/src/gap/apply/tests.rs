@@ -1,6 +1,6 @@
 use std::collections::BTreeMap;
 
-use sim_to_real::{Estimate, Shrink};
+use sim_to_real::{Estimate, Shrink, Steering};
 
 use super::*;
 
@@ -13,6 +13,7 @@ fn named(id: &str, parameters: &[(&str, f64)]) -> NamedEffect {
 fn answer(verdict: Verdict, effects: Vec<NamedEffect>) -> Answer {
     Answer {
         case: "c".to_owned(),
+        steering: Steering::Angle,
         verdict,
         effects,
         ranking: Vec::new(),
@@ -89,4 +90,19 @@ fn a_vehicle_stands_for_its_model() {
             .0
             .contains("none.toml: expected a readable")
     );
+}
+
+/// Its steering effects mean yaw rates, which no angle can follow.
+#[test]
+fn a_skid_steered_machine_is_not_for_a_controller_that_steers_by_an_angle() {
+    let gain = named("steer_gain", &[("ratio", 0.38)]);
+    let skid = Answer { steering: Steering::YawRate, ..answer(Verdict::Effects, vec![gain.clone()]) };
+    let told = effects(&skid).unwrap_err();
+    assert!(told.contains("found one that is skid-steered"), "{told}");
+    assert_eq!(effects(&answer(Verdict::Effects, vec![gain])).unwrap().len(), 1);
+    // Where the file does not say, it is an angle; what a skid-steered diagnosis writes, it reads again.
+    let text = serde_json::to_string(&skid).unwrap();
+    assert_eq!(serde_json::from_str::<Answer>(&text).unwrap().steering, Steering::YawRate);
+    let text = serde_json::to_string(&answer(Verdict::None, Vec::new())).unwrap();
+    assert!(!text.contains("steering") && serde_json::from_str::<Answer>(&text).is_ok(), "{text}");
 }

@@ -10,6 +10,7 @@ fn shown(answer: &Answer) -> String {
         drives: "v: 4 nominal drives",
         doubts: &doubts,
         pictures: &pictures,
+        reference: Reference::Simulator,
         program: "surefoot 1",
     })
 }
@@ -50,4 +51,18 @@ fn none_and_unknown_are_told_without_effects() {
     assert!(!html.contains("<table>"), "{html}");
     let unknown = Answer { verdict: Verdict::Unknown, ..none };
     assert!(shown(&unknown).contains("nothing that the catalogue knows explains it"));
+}
+
+/// Of several effects together no one explains the drives alone, and nothing may say so.
+#[test]
+fn what_else_would_explain_the_drives_depends_on_how_many_effects_are_announced() {
+    let one = answer();
+    assert!(shown(&one).contains("Alone, these explain the drives about as well: <code>steer_delay</code>"));
+    let twice = [one.effects.clone(), one.effects.clone()].concat();
+    let two = Answer { effects: twice, ..one };
+    assert!(
+        shown(&two).contains("In place of one of them, these would do as well: <code>steer_delay</code>")
+    );
+    let none_other = Answer { credible_set: vec!["steer_lag".to_owned()], ..two };
+    assert!(!shown(&none_other).contains("as well:"));
 }

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use sim_to_real::{
     BeforeAfter, Condition, ConditionBin, ConditionTable, Estimate, GroundResidual, NamedEffect, Place,
-    Ranked, ResidualState, Shrink, Verdict,
+    Ranked, ResidualState, Shrink, Steering, Verdict,
 };
 
 use super::{HeldOutSample, HeldOutStrip};
@@ -17,6 +17,7 @@ pub(crate) fn answer() -> Answer {
     let ranking = [("steer_lag", 0.93), ("steer_delay", 0.05), ("backlash", 0.01), ("understeer", 0.001)];
     Answer {
         case: "steering <late>".to_owned(),
+        steering: Steering::Angle,
         verdict: Verdict::Effects,
         effects: vec![NamedEffect { id: "steer_lag".to_owned(), form: None, parameters }],
         ranking: ranking.map(ranked).to_vec(),

@@ -31,12 +31,12 @@ pub(super) fn page(pictures: &GapPictures<'_>) -> Option<Canvas> {
         height: (height * pixels_per_m).round(),
     };
     let mut canvas = Canvas::new(PAGE_WIDTH, TOP + frame.height.max(380.0) + 80.0);
-    let line =
-        "root mean square residual of each rollout, in standard deviations on nominal drives, where it began";
-    draw_header("The residual over the ground", line, &mut canvas);
+    let unit = pictures.reference.unit();
+    let line = format!("root mean square residual of each rollout, in {unit}, where it began");
+    draw_header("The residual over the ground", &line, &mut canvas);
     let worst = worst(residuals);
     let panels: [(&str, Size); 2] = [
-        ("calibrated nominal model", |residual| residual.before),
+        (pictures.reference.model(), |residual| residual.before),
         ("with the announced effects", |residual| residual.after),
     ];
     for (column, (title, value)) in panels.into_iter().enumerate() {
@@ -84,7 +84,7 @@ fn window(residuals: &[GroundResidual]) -> Option<[Range; 2]> {
         let [low, high] = positions.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], position| {
             [low.min(position), high.max(position)]
         });
-        let margin = 0.06 * (high - low) + 0.5;
+        let margin = 0.08 * (high - low).max(1.0);
         (high >= low).then_some(Range { low: low - margin, high: high + margin })
     };
     Some([range(|residual| residual.x_m)?, range(|residual| residual.y_m)?])

@@ -4,7 +4,7 @@ use super::super::PAGE_WIDTH;
 use super::super::axes::{Axes, Range};
 use super::super::canvas::{Canvas, Point, Rect, Stroke};
 use super::super::colour::Rgb;
-use super::{AFTER, BEFORE, draw_header, draw_legend};
+use super::{AFTER, BEFORE, Reference, draw_header, draw_legend};
 
 /// What was measured at an instant and what both models had predicted for it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -38,20 +38,18 @@ const STEP: f64 = 290.0;
 
 type Curve = (fn(&HeldOutSample) -> f64, Stroke);
 
-pub(super) fn page(strip: &HeldOutStrip) -> Canvas {
+pub(super) fn page(strip: &HeldOutStrip, reference: Reference) -> Canvas {
     let mut canvas = Canvas::new(PAGE_WIDTH, TOP + 3.0 * STEP);
     let line = format!(
         "{} · every value as predicted {:.1} s ahead of its measurement",
         strip.drive, strip.horizon_s
     );
     draw_header("A held-out drive", &line, &mut canvas);
+    // Where both predictions are the same, the wider one shows below the other.
     let [measured, nominal, repaired] =
-        [Stroke::solid(Rgb::INK, 4.0), Stroke::solid(BEFORE, 2.5), Stroke::solid(AFTER, 2.5)];
-    let entries = [
-        ("measured", measured),
-        ("calibrated nominal model", nominal),
-        ("with the announced effects", repaired),
-    ];
+        [Stroke::solid(Rgb::INK, 4.0), Stroke::solid(BEFORE, 4.5), Stroke::solid(AFTER, 2.0)];
+    let entries =
+        [("measured", measured), (reference.model(), nominal), ("with the announced effects", repaired)];
     draw_legend(&entries, (LEFT, 122.0), &mut canvas);
     let yaw_rates: [Curve; 3] = [
         (|sample| sample.yaw_rate_radps[0], measured),

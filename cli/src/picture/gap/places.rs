@@ -6,7 +6,7 @@ use super::super::axes::{Axes, Range, number};
 use super::super::canvas::{Anchor, Canvas, Point, Rect, Stroke, TextStyle};
 use super::super::colour::Rgb;
 use super::super::{MARGIN, PAGE_WIDTH};
-use super::{BEFORE, FLOOR, GapPictures, draw_header, draw_legend, words};
+use super::{BEFORE, FLOOR, GapPictures, Reference, draw_header, draw_legend, words};
 
 const BARS: Rect = Rect { x: 260.0, y: 150.0, width: 520.0, height: 0.0 };
 const ROW: f64 = 44.0;
@@ -30,12 +30,12 @@ pub(super) fn page(pictures: &GapPictures<'_>) -> Option<Canvas> {
     let mut canvas = Canvas::new(PAGE_WIDTH, height);
     let line = "share of the squared normalised residual's variance that bins of a condition explain";
     draw_header("Where the residual lies", line, &mut canvas);
-    draw_bars(&tables, Rect { height: bars_height, ..BARS }, &mut canvas);
-    draw_panels(&binned, panels_top, &mut canvas);
+    draw_bars(&tables, (Rect { height: bars_height, ..BARS }, pictures.reference), &mut canvas);
+    draw_panels(&binned, (panels_top, pictures.reference), &mut canvas);
     Some(canvas)
 }
 
-fn draw_bars(tables: &[&ConditionTable], frame: Rect, canvas: &mut Canvas) {
+fn draw_bars(tables: &[&ConditionTable], (frame, reference): (Rect, Reference), canvas: &mut Canvas) {
     let whole = |table: &ConditionTable| (table.share + table.null_share).max(0.0);
     let most = tables.iter().map(|table| whole(table)).fold(0.1, f64::max);
     let n = tables.len() as f64;
@@ -65,11 +65,12 @@ fn draw_bars(tables: &[&ConditionTable], frame: Rect, canvas: &mut Canvas) {
     let entries =
         [("stands out", Stroke::solid(BEFORE, 12.0)), ("within the null", Stroke::solid(Rgb::RULE, 12.0))];
     draw_legend(&entries, (frame.right() + 260.0, frame.y + 30.0), canvas);
-    let null = [("the null: between nominal drives", Stroke::solid(Rgb::INK, 3.0))];
+    let name = format!("the null: {}", reference.floor());
+    let null = [(name.as_str(), Stroke::solid(Rgb::INK, 3.0))];
     draw_legend(&null, (frame.right() + 260.0, frame.y + 64.0), canvas);
 }
 
-fn draw_panels(tables: &[&ConditionTable], top: f64, canvas: &mut Canvas) {
+fn draw_panels(tables: &[&ConditionTable], (top, reference): (f64, Reference), canvas: &mut Canvas) {
     if tables.is_empty() {
         return;
     }
@@ -77,7 +78,7 @@ fn draw_panels(tables: &[&ConditionTable], top: f64, canvas: &mut Canvas) {
     canvas.text((MARGIN, top - 62.0), title, TextStyle::new(22, Anchor::Start).bold());
     let entries = [
         ("real drives", Stroke::solid(BEFORE, 3.0)),
-        ("nominal drives", Stroke { dash: "7 5", ..Stroke::solid(FLOOR, 3.0) }),
+        (reference.floor(), Stroke { dash: "7 5", ..Stroke::solid(FLOOR, 3.0) }),
     ];
     draw_legend(&entries, (560.0, top - 62.0), canvas);
     for (place, table) in tables.iter().enumerate() {

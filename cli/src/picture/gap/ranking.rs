@@ -12,11 +12,14 @@ const LEFT: f64 = 240.0;
 const TOP: f64 = 170.0;
 const WIDTH: f64 = 700.0;
 const ROW: f64 = 40.0;
-/// Effects that are shown.
+/// Effects that are shown: at least and at most so many, in between those that are likelier than this.
+const LEAST: usize = 5;
 const MOST: usize = 14;
+const LIKELY: f64 = 5e-4;
 
 pub(super) fn page(answer: &Answer) -> Option<Canvas> {
-    let shown = &answer.ranking[..answer.ranking.len().min(MOST)];
+    let n_likely = answer.ranking.iter().take_while(|ranked| ranked.score >= LIKELY).count();
+    let shown = &answer.ranking[..n_likely.clamp(LEAST, MOST).min(answer.ranking.len())];
     if shown.is_empty() {
         return None;
     }
@@ -25,7 +28,7 @@ pub(super) fn page(answer: &Answer) -> Option<Canvas> {
     let n_more = answer.ranking.len() - shown.len();
     let more =
         if n_more > 0 { format!(" · {n_more} less likely ones are not shown") } else { String::new() };
-    let line = format!("probability that an effect is the cause{more}");
+    let line = format!("probability that an effect is a part of the cause{more}");
     draw_header("Which effect", &line, &mut canvas);
     let entries = [
         ("announced", Stroke::solid(BEFORE, 12.0)),

@@ -34,13 +34,15 @@ pub(super) fn page(pictures: &GapPictures<'_>) -> Option<Canvas> {
         return None;
     }
     let mut canvas = Canvas::new(PAGE_WIDTH, TOP + STEP[1] * rows.len() as f64 - 50.0);
-    let line = "root mean square residual over its standard deviation on nominal drives, by how far ahead is predicted";
-    draw_header("How large the residual is", line, &mut canvas);
+    let unit = pictures.reference.unit();
+    let line = format!("root mean square residual in {unit}, by how far ahead is predicted");
+    draw_header("How large the residual is", &line, &mut canvas);
     let floor = Stroke { dash: "7 5", ..Stroke::solid(FLOOR, 3.0) };
+    let below = format!("floor: {}", pictures.reference.floor());
     let entries = [
-        ("calibrated nominal model", Stroke::solid(BEFORE, 3.0)),
+        (pictures.reference.model(), Stroke::solid(BEFORE, 3.0)),
         ("with the announced effects", Stroke::solid(AFTER, 3.0)),
-        ("floor: nominal drives", floor),
+        (below.as_str(), floor),
     ];
     draw_legend(&entries, (MARGIN, 122.0), &mut canvas);
     for (row, (title, cells)) in rows.iter().enumerate() {

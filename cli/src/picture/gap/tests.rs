@@ -1,7 +1,10 @@
 use sim_to_real::{Answer, Findings};
 
 use super::examples::{answer, cells, findings, ground, strip};
-use super::{GapPicture, GapPictures, draw_gap, ground as ground_page, places, residuals};
+use super::{
+    GapPicture, GapPictures, Reference, draw_gap, ground as ground_page, heldout as heldout_page, places,
+    residuals,
+};
 
 /// Where pictures go when somebody wants to look at them.
 fn keep(drawn: &[GapPicture]) {
@@ -16,6 +19,7 @@ fn keep(drawn: &[GapPicture]) {
 fn every_page_is_drawn_when_there_is_something_on_it() {
     let (answer, findings, cells, ground, strip) = (answer(), findings(), cells(), ground(), strip());
     let pictures = GapPictures {
+        reference: Reference::Simulator,
         answer: &answer,
         findings: &findings,
         heldout_residuals: &cells,
@@ -37,6 +41,7 @@ fn every_page_is_drawn_when_there_is_something_on_it() {
 fn pages_without_anything_on_them_are_left_out() {
     let empty = Answer { ranking: Vec::new(), ..answer() };
     let nothing = GapPictures {
+        reference: Reference::Bicycle,
         answer: &empty,
         findings: &Findings::default(),
         heldout_residuals: &[],
@@ -48,6 +53,28 @@ fn pages_without_anything_on_them_are_left_out() {
     assert_eq!(draw_gap(&only_heldout).unwrap()[0].file, "residuals.png");
 }
 
+/// Without nominal drives no page may speak of them.
+#[test]
+fn pages_name_what_the_drives_were_held_against() {
+    let (answer, findings, cells, strip) = (answer(), findings(), cells(), strip());
+    let told = |reference: Reference| {
+        let pictures = GapPictures {
+            reference,
+            answer: &answer,
+            findings: &findings,
+            heldout_residuals: &cells,
+            ground: None,
+            heldout: Some(&strip),
+        };
+        let pages = [places::page(&pictures), residuals::page(&pictures), ground_page::page(&pictures)];
+        let pages = pages.into_iter().flatten().chain([heldout_page::page(&strip, reference)]);
+        pages.map(|page| page.svg()).collect::<String>() + &reference.places()
+    };
+    let (simulator, bicycle) = (told(Reference::Simulator), told(Reference::Bicycle));
+    assert!(simulator.contains("calibrated nominal model") && simulator.contains("floor: nominal drives"));
+    assert!(bicycle.contains("kinematic bicycle") && !bicycle.contains("nominal"), "{bicycle}");
+}
+
 #[test]
 fn numbers_that_are_none_do_not_reach_the_page() {
     let mut findings = findings();
@@ -56,6 +83,7 @@ fn numbers_that_are_none_do_not_reach_the_page() {
     findings.map[0].before = f64::NAN;
     let answer = answer();
     let pictures = GapPictures {
+        reference: Reference::Simulator,
         answer: &answer,
         findings: &findings,
         heldout_residuals: &[],

@@ -2,10 +2,51 @@
 
 use sim_to_real::{Condition, ResidualState};
 
+/// What the real drives were held against.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Reference {
+    /// The model that was calibrated on nominal drives.
+    Simulator,
+    /// The bare kinematic bicycle, for want of nominal drives.
+    Bicycle,
+}
+
+impl Reference {
+    /// The model without the announced effects.
+    pub(super) fn model(self) -> &'static str {
+        match self {
+            Self::Simulator => "calibrated nominal model",
+            Self::Bicycle => "kinematic bicycle",
+        }
+    }
+
+    /// What is as large between drives without a gap.
+    pub(super) fn floor(self) -> &'static str {
+        match self {
+            Self::Simulator => "nominal drives",
+            Self::Bicycle => "noise of the measurements",
+        }
+    }
+
+    /// What a residual is divided by.
+    pub(super) fn unit(self) -> &'static str {
+        match self {
+            Self::Simulator => "standard deviations on nominal drives",
+            Self::Bicycle => "standard deviations of what a repaired model leaves",
+        }
+    }
+
+    /// Below the page of places.
+    pub(super) fn places(self) -> String {
+        format!(
+            "Where: how much of the residual each condition explains, less what it explains of the null ({}).",
+            self.floor()
+        )
+    }
+}
+
 pub(super) const RANKING: &str =
-    "Which effect: the probability of every effect of the catalogue to be the cause.";
-pub(super) const PLACES: &str =
-    "Where: how much of the residual each condition explains, less what it explains between nominal drives.";
+    "Which effect: the probability of every effect of the catalogue to be a part of the cause.";
 pub(super) const RESIDUALS: &str =
     "How large: the residual of every predicted quantity, by how far ahead it is predicted.";
 pub(super) const GROUND: &str =
