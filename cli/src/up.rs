@@ -3,32 +3,56 @@
 mod roles;
 
 use std::ffi::OsString;
+use std::path::Path;
 use std::process::Command;
 
-use runtime::channel::Bus;
+use runtime::RuntimeError;
+use runtime::channel::{Bus, ChannelError};
 use runtime::status::Role;
-use runtime::supervisor::{RunEnd, Supervisor};
+use runtime::supervisor::{RestartPolicy, RunEnd, RunReport, Supervisor};
 
 use crate::arguments::{MapSource, Method, UpArguments};
-use crate::{UsageError, WorkFailed, interrupt};
+use crate::{UsageError, WorkFailed, failure, interrupt};
 
 pub(crate) fn run(arguments: &UpArguments) -> anyhow::Result<()> {
     refuse_what_needs_one_process(arguments)?;
     interrupt::catch_interrupts()?;
     match arguments.role.role() {
-        Some(role) => roles::run(arguments, role),
+        Some(role) => {
+            tell_panics_in_one_line(role);
+            roles::run(arguments, role).map_err(refused)
+        }
         None => supervise(arguments),
     }
 }
 
-/// Who knows the truth must sit in the plant's process.
+/// Who knows the truth must sit in the plant's process; who follows a file of commands needs no processes.
 fn refuse_what_needs_one_process(arguments: &UpArguments) -> Result<(), UsageError> {
     let refused = match (&arguments.drive.method, arguments.drive.map_source()) {
         (Some(Method::Truth), _) => "--method truth",
         (_, MapSource::Oracle) => "--oracle-map",
+        _ if arguments.drive.commands.is_some() => "--commands",
         _ => return Ok(()),
     };
     Err(UsageError(format!("{refused}: expected only with surefoot drive, found with surefoot up")))
+}
+
+/// Whatever happens to a process, it says so in one line that names it.
+fn tell_panics_in_one_line(role: Role) {
+    std::panic::set_hook(Box::new(move |panic| {
+        let told = panic.to_string();
+        let line = told.split_whitespace().collect::<Vec<_>>().join(" ");
+        crate::report(&format!("surefoot {}: {line}", role.name()));
+    }));
+}
+
+/// Too little shared memory is no fault that a restart would cure.
+fn refused(error: anyhow::Error) -> anyhow::Error {
+    let is_memory = |cause: &(dyn std::error::Error + 'static)| {
+        matches!(cause.downcast_ref(), Some(ChannelError::Memory { .. }))
+            || matches!(cause.downcast_ref(), Some(RuntimeError::Channel(ChannelError::Memory { .. })))
+    };
+    if error.chain().any(is_memory) { UsageError(failure::one_line(&error)).into() } else { error }
 }
 
 fn supervise(arguments: &UpArguments) -> anyhow::Result<()> {
@@ -43,13 +67,14 @@ fn supervise(arguments: &UpArguments) -> anyhow::Result<()> {
         command
     };
     let bus = Bus::join(&arguments.run)?;
-    let mut supervisor = Supervisor::new(&bus, &Role::ALL, &command)?;
+    let mut supervisor = Supervisor::new(&bus, &Role::ALL, RestartPolicy::default(), &command)?;
     let end = supervisor.run(&interrupt::interrupted, &mut |lines, mission| {
         if let Some(mission) = mission {
             println!("{:.1} s", mission.time_s);
         }
         lines.iter().for_each(|line| println!("  {line}"));
     });
+    keep(&supervisor.report(), &arguments.drive.out)?;
     match end {
         RunEnd::Plant(0) => {
             let time_s = supervisor.mission().map_or(0.0, |mission| mission.time_s);
@@ -60,6 +85,16 @@ fn supervise(arguments: &UpArguments) -> anyhow::Result<()> {
         RunEnd::Interrupted => Err(WorkFailed("goal not reached: interrupted by the user".into()).into()),
         RunEnd::GaveUp { role, why } => Err(WorkFailed(format!("{}: {why}", role.name())).into()),
     }
+}
+
+/// Shows how the run went, and leaves it as `runtime.json`.
+fn keep(report: &RunReport, out: &Path) -> anyhow::Result<()> {
+    if let Some(control) = &report.control {
+        println!("{control}");
+    }
+    report.processes.iter().for_each(|process| println!("{process}"));
+    std::fs::create_dir_all(out)?;
+    Ok(formats::write_json_atomic(&out.join("runtime.json"), report)?)
 }
 
 /// The words of the command line without those that say which process to be.

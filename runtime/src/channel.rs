@@ -116,7 +116,7 @@ pub const COMMAND: Channel<Stamp, CommandRecord> = Channel {
 pub const DECISION: Channel<Stamp, DecisionRecord> = Channel {
     name: "decision",
     depth: 16,
-    n_readers: 4,
+    n_readers: 6,
     silence_ns: 400 * MILLISECOND_NS,
     check: payload::check_anything,
 };

@@ -17,11 +17,14 @@ pub mod message;
 pub mod payload;
 pub mod plant;
 pub mod recorder;
+pub mod realtime;
 pub mod replay;
 pub mod risk_maker;
 pub mod setup;
 pub mod status;
 pub mod supervisor;
 pub mod watchdog;
+pub mod timing;
+pub mod usage;
 
 pub use error::RuntimeError;

@@ -36,7 +36,7 @@ const ODOMETRY_KEPT: usize = 64;
 /// Farthest that a scan may lie from the odometry that it is placed by [ns].
 const SCAN_APART_NS: u64 = 15_000_000;
 /// Silence of learning after which physics speaks [ns].
-const LEARNING_SILENCE_NS: u64 = SECOND_NS / 2;
+const LEARNING_SILENCE_NS: u64 = SECOND_NS * 4 / 10;
 
 /// What maps.
 pub struct MappingSetup<'a> {
@@ -260,7 +260,7 @@ pub(crate) fn risk_elements(config: &Config) -> usize {
 }
 
 /// Writes a maker's map where its readers will read it; nothing before there is one.
-pub(crate) fn send_risk(
+pub fn send_risk(
     maker: &mut RiskMaker,
     outlet: &mut Outlet<RiskHeader, [f32; 4]>,
     valid_at_ns: u64,

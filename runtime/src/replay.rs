@@ -15,7 +15,7 @@ use crate::message::{CommandRecord, DecisionRecord, Source};
 use crate::payload::risk_views;
 use crate::setup::{MachineSetup, SetupError};
 use maps::{Maps, Unmade};
-pub use records::{Key, ReadError, Records};
+pub use records::{Key, ReadError, Records, recorded_decision, recorded_stamp};
 
 /// What a replay came to.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize)]

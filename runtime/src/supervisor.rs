@@ -3,21 +3,40 @@
 use std::process::{Child, Command, ExitStatus};
 
 use rustix::process::{Pid, Signal, kill_process};
+use serde::Serialize;
 
 use crate::RuntimeError;
-use crate::channel::{Bus, Inlet, MISSION};
+use crate::channel::{Bus, DECISION, Inlet, MISSION};
 use crate::clock::{self, SECOND_NS};
-use crate::message::{MissionRecord, Stamp, StatusRecord};
+use crate::message::{DecisionRecord, MissionRecord, Stamp, StatusRecord};
 use crate::status::Role;
+use crate::timing::{ControlTiming, Timing};
+use crate::usage::{ProcessUsage, Usage};
 
-/// Restarts within [`RESTART_WINDOW_NS`] after which a process is given up, and with it the run.
-pub const RESTARTS_MAX: usize = 8;
-/// See [`RESTARTS_MAX`].
-const RESTART_WINDOW_NS: u64 = 60 * SECOND_NS;
-/// Wait before the first restart; each one that follows soon doubles it [ns].
-const BACK_OFF_NS: u64 = SECOND_NS / 5;
-/// Longest wait before a restart [ns].
-const BACK_OFF_MAX_NS: u64 = 5 * SECOND_NS;
+/// How soon and how often what died is started again.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct RestartPolicy {
+    /// Restarts within `window_ns`; at the next death the run is given up.
+    pub restarts_max: usize,
+    /// See `restarts_max` [ns].
+    pub window_ns: u64,
+    /// Wait before the first restart; each one that follows within the window doubles it [ns].
+    pub back_off_ns: u64,
+    /// Longest wait before a restart [ns].
+    pub back_off_max_ns: u64,
+}
+
+impl Default for RestartPolicy {
+    fn default() -> Self {
+        Self {
+            restarts_max: 8,
+            window_ns: 60 * SECOND_NS,
+            back_off_ns: SECOND_NS / 5,
+            back_off_max_ns: 5 * SECOND_NS,
+        }
+    }
+}
+
 /// Time between two looks [ns].
 const POLL_NS: u64 = SECOND_NS / 50;
 /// Time that processes have to end when they are told to [ns].
@@ -47,6 +66,16 @@ struct Kept {
     due_at_ns: u64,
     status: Inlet<Stamp, StatusRecord>,
     last: Option<(Stamp, StatusRecord)>,
+    usage: Usage,
+}
+
+/// How a run kept its times, and what its processes took.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct RunReport {
+    /// Control's times; `None` when nothing was decided.
+    pub control: Option<ControlTiming>,
+    /// Every process.
+    pub processes: Vec<ProcessUsage>,
 }
 
 /// The processes of a run.
@@ -54,6 +83,9 @@ pub struct Supervisor<'a> {
     kept: Vec<Kept>,
     missions: Inlet<Stamp, MissionRecord>,
     mission: Option<MissionRecord>,
+    decisions: Inlet<Stamp, DecisionRecord>,
+    timing: Timing,
+    policy: RestartPolicy,
     command: &'a dyn Fn(Role) -> Command,
 }
 
@@ -62,16 +94,28 @@ impl<'a> Supervisor<'a> {
     pub fn new(
         bus: &Bus,
         roles: &[Role],
+        policy: RestartPolicy,
         command: &'a dyn Fn(Role) -> Command,
     ) -> Result<Self, RuntimeError> {
         let kept = |&role: &Role| {
             let status = bus.inlet(&role.status())?;
-            Ok(Kept { role, child: None, deaths_at_ns: Vec::new(), due_at_ns: 0, status, last: None })
+            Ok(Kept {
+                role,
+                child: None,
+                deaths_at_ns: Vec::new(),
+                due_at_ns: 0,
+                status,
+                last: None,
+                usage: Usage::default(),
+            })
         };
         Ok(Self {
             kept: roles.iter().map(kept).collect::<Result<_, RuntimeError>>()?,
             missions: bus.inlet(&MISSION)?,
             mission: None,
+            decisions: bus.inlet(&DECISION)?,
+            timing: Timing::default(),
+            policy,
             command,
         })
     }
@@ -89,12 +133,13 @@ impl<'a> Supervisor<'a> {
             if is_over() {
                 break RunEnd::Interrupted;
             }
-            if let Some(end) = self.kept.iter_mut().find_map(|kept| kept.tend(now_ns, self.command)) {
+            if let Some(end) = self.tend(now_ns) {
                 break end;
             }
             self.listen();
             if now_ns.saturating_sub(shown_at_ns) >= SECOND_NS {
                 shown_at_ns = now_ns;
+                self.kept.iter_mut().for_each(|kept| kept.account(now_ns));
                 show(&self.lines(now_ns), self.mission.as_ref());
             }
             clock::sleep_until(now_ns + POLL_NS);
@@ -109,8 +154,20 @@ impl<'a> Supervisor<'a> {
         self.mission.as_ref()
     }
 
+    /// How the run kept its times so far, and what its processes took.
+    pub fn report(&self) -> RunReport {
+        let usage = |kept: &Kept| kept.usage.report(kept.role.name(), kept.deaths_at_ns.len());
+        RunReport { control: self.timing.report(), processes: self.kept.iter().map(usage).collect() }
+    }
+
+    fn tend(&mut self, now_ns: u64) -> Option<RunEnd> {
+        let Self { kept, policy, command, .. } = self;
+        kept.iter_mut().find_map(|kept| kept.tend(now_ns, policy, command))
+    }
+
     fn listen(&mut self) {
-        let mission = &mut self.mission;
+        let (mission, timing) = (&mut self.mission, &mut self.timing);
+        self.decisions.poll(|stamp, records| records.iter().for_each(|record| timing.take(stamp, record)));
         self.missions.poll(|_, missions| *mission = missions.first().copied().or(*mission));
         for kept in &mut self.kept {
             let last = &mut kept.last;
@@ -148,7 +205,12 @@ impl<'a> Supervisor<'a> {
 
 impl Kept {
     /// Starts it when it is due, and looks whether it still runs.
-    fn tend(&mut self, now_ns: u64, command: &dyn Fn(Role) -> Command) -> Option<RunEnd> {
+    fn tend(
+        &mut self,
+        now_ns: u64,
+        policy: &RestartPolicy,
+        command: &dyn Fn(Role) -> Command,
+    ) -> Option<RunEnd> {
         let Some(child) = &mut self.child else {
             if now_ns < self.due_at_ns {
                 return None;
@@ -163,12 +225,12 @@ impl Kept {
         };
         match child.try_wait() {
             Ok(None) => None,
-            Ok(Some(status)) => self.bury(status, now_ns),
+            Ok(Some(status)) => self.bury(status, now_ns, policy),
             Err(error) => Some(RunEnd::GaveUp { role: self.role, why: error.to_string() }),
         }
     }
 
-    fn bury(&mut self, status: ExitStatus, now_ns: u64) -> Option<RunEnd> {
+    fn bury(&mut self, status: ExitStatus, now_ns: u64, policy: &RestartPolicy) -> Option<RunEnd> {
         self.child = None;
         match status.code() {
             Some(code @ (0 | 1)) if self.role == Role::Plant => return Some(RunEnd::Plant(code)),
@@ -179,14 +241,21 @@ impl Kept {
             _ => {}
         }
         self.deaths_at_ns.push(now_ns);
-        let recent = |at_ns: &&u64| now_ns.saturating_sub(**at_ns) < RESTART_WINDOW_NS;
+        let recent = |at_ns: &&u64| now_ns.saturating_sub(**at_ns) < policy.window_ns;
         let n_recent = self.deaths_at_ns.iter().filter(recent).count();
-        if n_recent > RESTARTS_MAX {
-            let why = format!("it ended {n_recent} times within a minute, the last time by {status}");
+        if n_recent > policy.restarts_max {
+            let window_s = policy.window_ns / SECOND_NS;
+            let why = format!("it ended {n_recent} times within {window_s} s, the last time by {status}");
             return Some(RunEnd::GaveUp { role: self.role, why });
         }
-        self.due_at_ns = now_ns + (BACK_OFF_NS << (n_recent - 1).min(16)).min(BACK_OFF_MAX_NS);
+        self.due_at_ns = now_ns + (policy.back_off_ns << (n_recent - 1).min(16)).min(policy.back_off_max_ns);
         None
+    }
+
+    fn account(&mut self, now_ns: u64) {
+        if let Some(child) = &self.child {
+            self.usage.look(child.id(), now_ns);
+        }
     }
 
     fn signal(&mut self, signal: Signal) {
@@ -240,6 +309,12 @@ impl std::fmt::Display for StatusLine {
             formatter,
             "  missed {}  lost {}  refused {}  restarts {}",
             status.n_missed, status.n_lost, status.n_refused, self.n_restarts
-        )
+        )?;
+        match self.role {
+            Role::Control => write!(formatter, "  futures {:.0}", status.figure),
+            Role::Recorder if status.figure < 0.0 => write!(formatter, "  no recording"),
+            Role::Recorder => write!(formatter, "  {:.1} MB", 1e-6 * status.figure),
+            _ => Ok(()),
+        }
     }
 }

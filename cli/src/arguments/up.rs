@@ -29,6 +29,10 @@ pub struct UpArguments {
           allow_hyphen_values = true, help_heading = "Processes")]
     pub command_age: f64,
 
+    /// Pin processes to cores, ask for SCHED_FIFO and lock memory; each says on standard error what was not permitted
+    #[arg(long, help_heading = "Processes")]
+    pub realtime: bool,
+
     /// Set for the processes that `--role all` starts: end when it does
     #[arg(long, hide = true)]
     pub supervised: bool,
@@ -87,6 +91,11 @@ Examples:
       All processes, over a generated rock field.
   surefoot up --role control --run north
       One of them, in its own terminal, for the run `north`.
+  surefoot up --realtime --rate 50
+      As regular as the system permits, 50 decisions a second.
+
+`--role all` leaves drive-000.mcap, drive-001.mcap and so on, summary.json and runtime.json: how control kept its
+times (jitter, lateness, misses, age of its maps) and what each process took of processor and memory.
 
 Exit codes:
   0  the goal was reached, or the process was told to end

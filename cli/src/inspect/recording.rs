@@ -7,6 +7,9 @@ use std::path::Path;
 
 use mcap::io::MessageReader;
 use mcap::sans_io::LinearReaderOptions;
+use runtime::message::Stamp;
+use runtime::timing::Timing;
+use runtime::{recorder, replay};
 use serde_json::{Value, json};
 
 use crate::UsageError;
@@ -14,12 +17,29 @@ use crate::UsageError;
 /// Longest record that is believed: far above what recorders write.
 const RECORD_BYTES_MAX: usize = 1 << 28;
 
+/// Topics of messages as they went over the channels.
+const CHANNELS: &str = "/channel/";
+
 #[derive(Default)]
 struct Topic {
     schema: String,
     encoding: String,
     messages: u64,
     bytes: u64,
+    /// Of a channel: the last number of every publisher's life, and how many numbers are missing between.
+    last: BTreeMap<u64, u64>,
+    lost: Option<u64>,
+}
+
+impl Topic {
+    /// Numbers of a channel's messages have no gaps, unless the recorder came too late for some.
+    fn count(&mut self, stamp: &Stamp) {
+        let missing = self
+            .last
+            .insert(stamp.epoch_ns, stamp.sequence)
+            .map_or(0, |last| stamp.sequence.saturating_sub(last + 1));
+        *self.lost.get_or_insert(0) += missing;
+    }
 }
 
 pub(super) fn look(path: &Path) -> Result<Value, UsageError> {
@@ -32,6 +52,7 @@ pub(super) fn look(path: &Path) -> Result<Value, UsageError> {
         .with_record_length_limit(RECORD_BYTES_MAX)
         .with_prevalidate_chunk_crcs(true);
     let mut topics: BTreeMap<String, Topic> = BTreeMap::new();
+    let mut timing = Timing::default();
     let (mut setup, mut ended_early, mut times_ns) = (Value::Null, None, None);
     for message in MessageReader::new_with_options(BufReader::new(file), options) {
         let message = match message {
@@ -50,6 +71,14 @@ pub(super) fn look(path: &Path) -> Result<Value, UsageError> {
         topic.encoding.clone_from(&channel.message_encoding);
         topic.messages += 1;
         topic.bytes += message.data.len() as u64;
+        if channel.topic.starts_with(CHANNELS) {
+            replay::recorded_stamp(&message.data).iter().for_each(|stamp| topic.count(stamp));
+        }
+        if channel.topic == recorder::topic::DECISION
+            && let Some((stamp, decision)) = replay::recorded_decision(&message.data)
+        {
+            timing.take(&stamp, &decision);
+        }
         let (first, last) = times_ns.unwrap_or((message.log_time, message.log_time));
         times_ns = Some((first.min(message.log_time), last.max(message.log_time)));
     }
@@ -66,11 +95,12 @@ pub(super) fn look(path: &Path) -> Result<Value, UsageError> {
         "complete": ended_early.is_none(),
         "ended_early": ended_early,
         "setup": setup,
+        "control": timing.report(),
         "topics": topics,
     }))
 }
 
 fn told(topic: &Topic) -> Value {
-    let Topic { schema, encoding, messages, bytes } = topic;
-    json!({ "schema": schema, "encoding": encoding, "messages": messages, "bytes": bytes })
+    let Topic { schema, encoding, messages, bytes, lost, .. } = topic;
+    json!({ "schema": schema, "encoding": encoding, "messages": messages, "bytes": bytes, "lost": lost })
 }

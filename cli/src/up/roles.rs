@@ -7,6 +7,7 @@ use runtime::control::{self, ControlSetup};
 use runtime::learning::{self, LearningSetup};
 use runtime::mapping::{self, MappingSetup};
 use runtime::plant::{self, PlantReport, PlantSetup};
+use runtime::realtime;
 use runtime::recorder::{self, RecorderSetup};
 use runtime::setup::{MachineSetup, RecordedSetup};
 use runtime::status::Role;
@@ -36,6 +37,9 @@ pub(super) fn run(arguments: &UpArguments, role: Role) -> anyhow::Result<()> {
     if arguments.supervised {
         set_parent_process_death_signal(Some(Signal::TERM))?;
     }
+    if arguments.realtime {
+        eprintln!("surefoot {}: {}", role.name(), realtime::settle(role));
+    }
     let machine = scene::machine(&arguments.drive)?;
     let is_over = &interrupt::interrupted;
     match role {
@@ -62,7 +66,11 @@ pub(super) fn run(arguments: &UpArguments, role: Role) -> anyhow::Result<()> {
             learning::run(&Bus::join(&arguments.run)?, &setup, is_over)?;
         }
         Role::Control => {
-            let Machine { model, config, .. } = machine;
+            let Machine { model, mut config, .. } = machine;
+            if arguments.realtime {
+                // It has one core of its own.
+                config.controller.n_threads = 1;
+            }
             let setup =
                 ControlSetup { model, config, seed: arguments.drive.seed, period_s: 1.0 / arguments.rate };
             control::run(&Bus::join(&arguments.run)?, setup, is_over)?;

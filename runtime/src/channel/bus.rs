@@ -1,5 +1,6 @@
 //! A process among the others of its run.
 
+use std::os::unix::fs::MetadataExt;
 use std::str::FromStr;
 
 use iceoryx2::config::Config;
@@ -49,7 +50,11 @@ impl std::fmt::Display for RunName {
 impl RunName {
     /// Start of the names of its files in shared memory.
     pub fn prefix(&self) -> String {
-        format!("surefoot_{}_", self.0)
+        format!("{}{}_", Self::prefix_of_all(), self.0)
+    }
+
+    const fn prefix_of_all() -> &'static str {
+        "surefoot_"
     }
 
     /// Folder of the files by which its processes find one another.
@@ -153,15 +158,26 @@ fn open_error(channel: &'static str, error: impl std::fmt::Display) -> ChannelEr
 fn check_memory(needed_bytes: f64) -> Result<(), ChannelError> {
     // A system that will not say has no such limit.
     let Ok(space) = rustix::fs::statvfs(SHARED_MEMORY) else { return Ok(()) };
-    let free_bytes = space.f_bavail as f64 * space.f_frsize as f64;
+    let free_bytes = space.f_bavail as f64 * space.f_frsize as f64 - reserved_bytes();
     if free_bytes >= needed_bytes {
         return Ok(());
     }
     Err(ChannelError::Memory {
         place: SHARED_MEMORY,
         needed_mb: needed_bytes * 1e-6,
-        free_mb: free_bytes * 1e-6,
+        free_mb: free_bytes.max(0.0) * 1e-6,
     })
+}
+
+/// What runs have reserved and not written to yet: it still counts as free.
+fn reserved_bytes() -> f64 {
+    let ours = RunName::prefix_of_all();
+    let untouched_bytes = |file: std::fs::DirEntry| {
+        let about = file.metadata().ok().filter(|_| file.file_name().to_string_lossy().starts_with(ours))?;
+        Some(about.len().saturating_sub(512 * about.blocks()) as f64)
+    };
+    let files = std::fs::read_dir(SHARED_MEMORY).into_iter().flatten();
+    files.filter_map(|file| untouched_bytes(file.ok()?)).sum()
 }
 
 #[cfg(test)]

@@ -151,6 +151,16 @@ fn split<H: Header, T: AnyBitPattern>(bytes: &[u8]) -> Option<(H, Vec<T>)> {
 #[cfg(test)]
 mod tests {
     use super::*;
+/// A decision as it stands in a recording under [`topic::DECISION`]; `None` for other bytes.
+pub fn recorded_decision(bytes: &[u8]) -> Option<(Stamp, DecisionRecord)> {
+    one(bytes)
+}
+
+/// Whose a message of a recording is and of when, under any topic of a channel; `None` for other bytes.
+pub fn recorded_stamp(bytes: &[u8]) -> Option<Stamp> {
+    bytemuck::try_pod_read_unaligned(bytes.get(..size_of::<Stamp>())?).ok()
+}
+
 
     #[test]
     fn messages_are_read_back_as_they_were_and_garbage_is_none() {

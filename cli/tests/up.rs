@@ -1,0 +1,195 @@
+//! `surefoot up`, `replay` and `inspect` as a user meets them: a whole drive, a recording that breaks off, and bad input.
+
+#![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output, Stdio};
+
+use serde_json::Value;
+
+fn surefoot(words: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_surefoot"));
+    command.args(words).stdin(Stdio::null());
+    command
+}
+
+fn text(bytes: &[u8]) -> String {
+    String::from_utf8(bytes.to_vec()).unwrap()
+}
+
+/// A name that no other run on this machine has.
+fn run_name(what: &str) -> String {
+    format!("cli-{what}-{}", std::process::id())
+}
+
+/// Exit code 2, nothing on standard output, and one line on standard error that holds every given part.
+fn assert_refused(words: &[&str], parts: &[&str]) {
+    let output = surefoot(words).output().unwrap();
+    let told = text(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "{words:?}: {told}");
+    assert_eq!(told.lines().count(), 1, "{words:?}: {told}");
+    assert!(output.stdout.is_empty(), "{words:?}");
+    for part in parts {
+        assert!(told.contains(part), "{words:?}: {part:?} is missing in {told:?}");
+    }
+}
+
+#[test]
+fn what_up_cannot_do_is_refused_before_anything_starts() {
+    assert_refused(&["up", "--role", "pilot"], &["--role", "expected all, plant", "\"pilot\""]);
+    assert_refused(&["up", "--rate", "51"], &["--rate", "1 to 50 Hz", "51"]);
+    assert_refused(&["up", "--run", "../x"], &["--run", "1 to 32 letters", "../x"]);
+    assert_refused(&["up", "--method", "truth"], &["--method truth", "surefoot drive"]);
+    assert_refused(&["up", "--oracle-map"], &["--oracle-map", "surefoot drive"]);
+    assert_refused(&["up", "--commands", "/nowhere.csv"], &["--commands", "surefoot drive"]);
+    assert_refused(&["up", "--deviation", "mass=nan"], &["mass.factor", "NaN"]);
+    assert_refused(&["up", "--vehicle", "/nowhere.toml"], &["/nowhere.toml", "No such file"]);
+}
+
+#[test]
+fn files_that_are_none_are_refused_with_what_was_expected() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = |name: &str, bytes: &[u8]| {
+        let path = folder.path().join(name);
+        std::fs::write(&path, bytes).unwrap();
+        path.to_str().unwrap().to_owned()
+    };
+    let garbage = file("garbage.mcap", b"this is no recording at all, whatever its name says");
+    let empty = file("empty.mcap", b"");
+    let other = file("notes.txt", b"notes");
+    for command in ["inspect", "replay"] {
+        assert_refused(&[command, "/nowhere.mcap"], &["/nowhere.mcap", "expected", "No such file"]);
+        assert_refused(&[command, &garbage], &["garbage.mcap", "expected a recording"]);
+        assert_refused(&[command, &empty], &["empty.mcap", "expected a recording"]);
+    }
+    assert_refused(&["inspect", &other], &["notes.txt", "expected a recording"]);
+    assert_refused(&["replay", &other], &["notes.txt", "expected a recording"]);
+}
+
+/// Drives over the arena with a heavier machine than the model believes in; returns the folder and what was said.
+fn drive_arena(out: &Path) -> Output {
+    let words =
+        ["up", "--world", "arena", "--method", "physics", "--threads", "1", "--deviation", "mass=1.1"];
+    let run = run_name("arena");
+    surefoot(&words).args(["--run", &run, "--out"]).arg(out).output().unwrap()
+}
+
+fn json(path: &Path) -> Value {
+    serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap()
+}
+
+/// `command FILE --json ..`: exit code, what was written, what was said on standard error.
+fn look(command: &str, file: &Path) -> (Option<i32>, Value, String) {
+    let folder = tempfile::tempdir().unwrap();
+    let found = folder.path().join("found.json");
+    let output = surefoot(&[command]).arg(file).arg("--json").arg(&found).output().unwrap();
+    (output.status.code(), json(&found), text(&output.stderr))
+}
+
+/// One drive for all of this: it takes as long as the vehicle does.
+#[test]
+fn a_drive_of_processes_is_recorded_and_made_again_and_what_is_cut_off_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = drive_arena(folder.path());
+    // On a machine that has no time for it, the vehicle may come nowhere; it is recorded all the same.
+    let code = output.status.code();
+    assert!(matches!(code, Some(0 | 1)), "{code:?} {}", text(&output.stderr));
+    assert_eq!(text(&output.stdout).contains("goal reached after"), code == Some(0));
+
+    let run = json(&folder.path().join("runtime.json"));
+    assert!(run["control"]["n_decisions"].as_u64().unwrap() > 20, "{run}");
+    assert_eq!(run["control"]["period_ms"], 100.0);
+    assert_eq!(run["processes"].as_array().unwrap().len(), 5);
+    assert!(run["processes"][0]["resident_max_mb"].as_f64().unwrap() > 1.0, "{run}");
+
+    let recording = folder.path().join("drive-000.mcap");
+    let (code, whole, _) = look("inspect", &recording);
+    assert_eq!((code, &whole["complete"]), (Some(0), &Value::Bool(true)), "{whole}");
+    assert_eq!(whole["topics"]["/channel/decision"]["lost"], 0);
+    assert!(whole["control"]["lateness"]["p99_9_ms"].as_f64().unwrap() >= 0.0, "{whole}");
+    let (code, again, told) = look("replay", &recording);
+    assert_eq!((code, &again["first_difference"]), (Some(0), &Value::Null), "{again} {told}");
+    assert_eq!(again["n_identical"], again["n_decisions"]);
+
+    assert_cut(&recording, folder.path());
+    assert_lost_scans_are_named(&recording, folder.path());
+}
+
+/// A file that ends early says so, and gives what stands before.
+fn assert_cut(recording: &Path, folder: &Path) {
+    let bytes = std::fs::read(recording).unwrap();
+    let cut = folder.join("cut.mcap");
+    std::fs::write(&cut, &bytes[..bytes.len() / 2]).unwrap();
+    let (code, found, _) = look("inspect", &cut);
+    assert_eq!((code, &found["complete"]), (Some(0), &Value::Bool(false)), "{found}");
+    assert!(found["ended_early"].as_str().unwrap().contains("ended"), "{found}");
+    let (code, again, told) = look("replay", &cut);
+    assert!(again["ended_early"].as_str().unwrap().contains("cut.mcap"), "{again}");
+    assert_eq!(again["first_difference"], Value::Null, "{again}");
+    assert!(again["n_identical"].as_u64().unwrap() > 5, "{again} {told}");
+    // What was decided on something that lies behind the cut is not counted as made again.
+    assert_eq!(code, Some(i32::from(again["n_unmade"] != 0)), "{again} {told}");
+}
+
+/// A recording without some of its scans: it is named which, and nothing that hangs on them passes as made again.
+fn assert_lost_scans_are_named(recording: &Path, folder: &Path) {
+    let thinned = folder.join("thinned.mcap");
+    let n_left_out = leave_out(recording, &thinned, "/channel/scan", 10..12);
+    assert_eq!(n_left_out, 2);
+    let (code, found, _) = look("inspect", &thinned);
+    assert_eq!((code, &found["topics"]["/channel/scan"]["lost"]), (Some(0), &2.into()), "{found}");
+    let (code, again, told) = look("replay", &thinned);
+    let missing = again["missing"].to_string();
+    assert!(missing.contains("scan "), "{again}");
+    assert_eq!(code, Some(1));
+    assert!(told.contains("not made again, for want of"), "{told}");
+    assert_eq!(again["first_difference"], Value::Null, "{again}");
+}
+
+/// Copies a recording but for some messages of a topic, by their place in it.
+fn leave_out(from: &Path, to: &Path, topic: &str, places: std::ops::Range<usize>) -> usize {
+    let bytes = std::fs::read(from).unwrap();
+    let mut writer = mcap::Writer::new(std::io::BufWriter::new(std::fs::File::create(to).unwrap())).unwrap();
+    let (mut place, mut n_left_out) = (0, 0);
+    for message in mcap::MessageStream::new(&bytes).unwrap() {
+        let message = message.unwrap();
+        if message.channel.topic == topic {
+            place += 1;
+            if places.contains(&place) {
+                n_left_out += 1;
+                continue;
+            }
+        }
+        writer.write(&message).unwrap();
+    }
+    writer.finish().unwrap();
+    n_left_out
+}
+
+#[test]
+fn who_reads_only_the_first_line_has_read_enough() {
+    let surefoot = env!("CARGO_BIN_EXE_surefoot");
+    let script = format!("{surefoot} inspect rc_car | head -1; exit ${{PIPESTATUS[0]}}");
+    let output = Command::new("bash").args(["-c", &script]).output().unwrap();
+    assert_eq!((output.status.code(), text(&output.stderr)), (Some(0), String::new()));
+    assert_eq!(text(&output.stdout), "{\n");
+}
+
+/// In a container with little shared memory. Where the system lets nobody make one, there is nothing to see.
+#[test]
+fn too_little_shared_memory_is_said_in_one_line() {
+    let run = run_name("small");
+    let script = "mount -t tmpfs -o size=2m tmpfs /dev/shm || exit 77; exec \"$0\" \"$@\"";
+    let mut command = Command::new("unshare");
+    command.args(["--user", "--map-root-user", "--mount", "sh", "-c", script]);
+    command.args([env!("CARGO_BIN_EXE_surefoot"), "up", "--role", "mapping", "--method", "physics"]);
+    let Ok(output) = command.args(["--run", &run]).output() else { return };
+    let told = text(&output.stderr);
+    if output.status.code() == Some(77) || told.contains("unshare") {
+        return;
+    }
+    assert_eq!(output.status.code(), Some(2), "{told}");
+    assert_eq!(told.lines().count(), 1, "{told}");
+    assert!(told.contains("/dev/shm: expected") && told.contains("MB free"), "{told}");
+    drop(std::fs::remove_dir_all(PathBuf::from("/tmp/surefoot").join(run)));
+}
