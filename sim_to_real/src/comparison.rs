@@ -68,9 +68,10 @@ impl<'a> Comparison<'a> {
         both.map(noise).collect()
     }
 
-    /// Mean robust loss of a model.
+    /// Mean robust loss of a model; infinite where a rollout runs away beyond all numbers.
     pub(crate) fn loss(&self, effects: &[Effect]) -> f64 {
-        mean_loss(&self.residuals(effects))
+        let loss = mean_loss(&self.residuals(effects));
+        if loss.is_finite() { loss } else { f64::INFINITY }
     }
 }
 
