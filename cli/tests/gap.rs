@@ -4,7 +4,7 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::{Command, Output, Stdio};
 use std::sync::LazyLock;
 
 use bicycle::{Column, DriveLog};
@@ -259,22 +259,45 @@ fn what_cannot_be_asked_is_refused() {
     assert!(names(folder.path()).iter().all(|name| name == "surefoot-out"));
 }
 
+/// Whether a file is as its writer meant it to end.
+fn is_whole(path: &Path) -> bool {
+    let bytes = fs::read(path).unwrap();
+    match path.extension().and_then(|extension| extension.to_str()) {
+        Some("json") => serde_json::from_slice::<Answer>(&bytes).is_ok(),
+        Some("png") => bytes.ends_with(b"IEND\xaeB`\x82"),
+        Some("html") => bytes.ends_with(b"</html>\n"),
+        Some("csv") => bytes.ends_with(b"\n"),
+        _ => panic!("{}", path.display()),
+    }
+}
+
+/// Killed in the middle of calibrating, naming, bounding or writing: every file is not there yet or whole, and the next
+/// run over what was left behind succeeds.
 #[test]
 fn an_interrupted_run_leaves_nothing_half_written() {
     let folder = tempfile::tempdir().unwrap();
-    let mut command = Command::new(env!("CARGO_BIN_EXE_surefoot"));
-    let words =
-        ["gap", "diagnose", &open(CASE), "--out", "r", "--json", "a.json", "--baseline-cache", "cache"];
-    let mut child = command.current_dir(folder.path()).args(words).spawn().unwrap();
-    std::thread::sleep(std::time::Duration::from_millis(700));
-    child.kill().unwrap();
-    child.wait().unwrap();
-    for json in ["a.json", "r/answer.json", "r/prediction.json"] {
-        let path = folder.path().join(json);
-        // Either not there yet or whole.
-        assert!(
-            !path.exists() || serde_json::from_slice::<Answer>(&fs::read(&path).unwrap()).is_ok(),
-            "{json}"
-        );
+    let case = write_case(folder.path(), "late", &open(&format!("{CASE}/real_heldout.csv")));
+    let kept = cache();
+    let words = |cache: &'static str| {
+        let cache = if cache.is_empty() { kept.clone() } else { cache.to_owned() };
+        let words = ["gap", "diagnose", &case, "--out", "r", "--json", "a.json", "--predictions", "p.csv"];
+        [&words.map(str::to_owned)[..], &["--baseline-cache".to_owned(), cache]].concat()
+    };
+    for (cache, after_ms) in [("empty", 700), ("", 300), ("", 900), ("", 1500), ("", 2100), ("", 2700)] {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_surefoot"));
+        command.current_dir(folder.path()).args(words(cache));
+        let mut child = command.stdout(Stdio::null()).spawn().unwrap();
+        std::thread::sleep(std::time::Duration::from_millis(after_ms));
+        child.kill().unwrap();
+        child.wait().unwrap();
+        let report = fs::read_dir(folder.path().join("r")).into_iter().flatten();
+        let files = report.map(|entry| entry.unwrap().path());
+        let others = ["a.json", "p.csv"].map(|name| folder.path().join(name));
+        for path in files.chain(others).filter(|path| path.extension().is_some() && path.exists()) {
+            assert!(is_whole(&path), "{} after {after_ms} ms", path.display());
+        }
     }
+    let output = surefoot(folder.path(), &words("").iter().skip(1).map(String::as_str).collect::<Vec<_>>());
+    assert!(output.status.success());
+    assert!(is_whole(&folder.path().join("r/report.html")) && is_whole(&folder.path().join("p.csv")));
 }

@@ -125,6 +125,26 @@ fn score_of_answers(folder: &Path) {
     assert!(told(&refused).contains("other.json: expected SHA-256"), "{}", told(&refused));
 }
 
+/// Killed while it drives: neither set nor labels are there, and what is left in between is no set.
+#[test]
+fn an_interrupted_seal_leaves_neither_set_nor_labels() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = |name: &str| folder.path().join(name);
+    let [out, labels] = ["set", "labels.json"].map(|name| file(name).to_str().unwrap().to_owned());
+    let words = ["gap", "seal", "--cases", "4", "--seed", "5", "--out", &out, "--labels", &labels];
+    let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_surefoot"));
+    let mut child = command.args(words).spawn().unwrap();
+    let has_begun = (0..600).any(|_| {
+        std::thread::sleep(std::time::Duration::from_millis(20));
+        file(".set.partial/vehicles/veh_01/sim_1.csv").exists()
+    });
+    child.kill().unwrap();
+    child.wait().unwrap();
+    assert!(has_begun && !file("set").exists() && !file("labels.json").exists());
+    let refused = surefoot(&["gap", "score", &out, "--labels", &labels]);
+    assert_eq!(refused.status.code(), Some(2), "{}", told(&refused));
+}
+
 #[test]
 fn bad_usage_is_refused_in_one_line() {
     let folder = tempfile::tempdir().unwrap();

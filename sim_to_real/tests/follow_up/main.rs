@@ -31,14 +31,11 @@ fn designed_drive_separates(wrong: Wrong, truth: &str) {
         [0.0, 2.0].iter().zip(10..).map(|(phase, seed)| drive(&dull(24.0, *phase), wrong, seed)).collect();
     let open = diagnose(&BASELINE, &machine(), &real).unwrap();
     let names = open.answer("dull").credible_set;
-    println!("{names:?} {:?} {:?}", open.errors, open.answer("").verdict);
     assert!(names.len() > 1 && names.iter().any(|name| name == truth), "{names:?}");
     let manoeuvre = design_manoeuvre(&BASELINE, &machine(), &open, (&NOMINAL, &real)).unwrap().unwrap();
-    println!("{}", manoeuvre.advice("manoeuvre.csv"));
     assert!(manoeuvre.odds > 10.0 * manoeuvre.odds_so_far);
     real.push(drive(&manoeuvre.commands, wrong, 20));
     let settled = diagnose(&BASELINE, &machine(), &real).unwrap().answer("settled");
-    println!("{:?} {:?}", settled.credible_set, settled.effects);
     assert_eq!(settled.credible_set, [truth], "{settled:?}");
     assert_eq!(settled.verdict, Verdict::Effects);
 }
@@ -59,13 +56,11 @@ fn what_dull_drives_cannot_show_is_told_and_brought_out() {
     let nothing = diagnose(&BASELINE, &machine(), &real).unwrap();
     assert_eq!(nothing.answer("").verdict, Verdict::None);
     let told = unseen_effects(&BASELINE, &machine(), &nothing, &real).unwrap().join("\n");
-    println!("{told}");
     assert!(
         told.contains("speed_lag") && told.contains("friction") && told.contains("2.5 to 2.5 m/s"),
         "{told}"
     );
     let manoeuvre = design_manoeuvre(&BASELINE, &machine(), &nothing, (&NOMINAL, &real)).unwrap().unwrap();
-    println!("{}", manoeuvre.advice("manoeuvre.csv"));
     assert_eq!(manoeuvre.separates[0], "none");
     assert!(manoeuvre.duration_s() < 35.0);
     let log = manoeuvre.commands_log();
@@ -88,7 +83,6 @@ fn what_depends_on_the_state_can_be_learned() {
     let heldout = [drive(&lively(30.0, 52), wrong, 52)];
     let diagnosis = diagnose(&BASELINE, &machine(), &real).unwrap();
     let bound = learned_bound(&BASELINE, &machine(), &diagnosis, (&real, &heldout)).unwrap();
-    println!("{bound:?} {:?}", diagnosis.answer("").effects);
     assert!(bound.closed.unwrap() > 0.8, "{bound:?}");
     let again = learned_bound(&BASELINE, &machine(), &diagnosis, (&real, &heldout)).unwrap();
     assert_eq!(bound.error.to_bits(), again.error.to_bits());
@@ -101,7 +95,6 @@ fn from_nothing_nothing_is_learned() {
     let diagnosis = diagnose(&BASELINE, &machine(), &real).unwrap();
     let bound = learned_bound(&BASELINE, &machine(), &diagnosis, (&real, &heldout)).unwrap();
     let unlearned = sim_to_real::verify(&BASELINE, &machine(), &diagnosis, &heldout).unwrap().errors[1];
-    println!("{bound:?} {unlearned}");
     assert_eq!(bound.closed, None);
     assert!(bound.error < 1.1 * unlearned, "{bound:?} {unlearned}");
 }
