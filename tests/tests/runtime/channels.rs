@@ -1,12 +1,16 @@
 //! What a channel promises, within one process: no copy, gaps counted, one publisher.
 
+use bicycle::Model;
+use navigator::{Assessor, Belief};
 use runtime::channel::{Bus, ODOMETRY, RISK, Refusal};
-use runtime::message::{Grid, OdometryRecord, RiskHeader, Stamp};
-use runtime::payload::{RiskParts, risk_views};
-use terrain::GridGeometry;
-use traversability::{Risk, RiskMap};
+use runtime::mapping::{LEARNED, send_risk};
+use runtime::message::{Grid, OdometryRecord, RiskHeader, Stamp, SurfaceHeader};
+use runtime::payload::{RiskParts, cell_numbers, risk_views};
+use runtime::risk_maker::RiskMaker;
+use terrain::{GridGeometry, SurfaceCell, TerrainClass};
+use traversability::{CvarLevel, Risk, RiskMap};
 
-use crate::fixture::Run;
+use crate::fixture::{ALPHA, Run, machine};
 
 #[test]
 fn a_risk_map_is_written_once_and_read_where_it_was_written() {
@@ -40,6 +44,47 @@ fn a_risk_map_is_written_once_and_read_where_it_was_written() {
     );
     assert_eq!((view.risks[777].pitch_rad, view.risks[0]), (0.25, known.risks[0]));
     assert_eq!(view.ground, known.ground);
+}
+
+/// The way that every risk map goes: learning writes it, control reads it. Whoever copied it or put it into another form
+/// on that way would have to allocate as much as it is long.
+#[test]
+fn a_risk_map_is_sent_and_read_without_memory_of_its_own() {
+    let run = Run::new();
+    let bus = Bus::join(&run.name).unwrap();
+    let (vehicle, config) = machine();
+    let limits = Model::of(&vehicle).limits;
+    let level = CvarLevel::new(ALPHA).unwrap();
+    let assessor = Assessor::new(&vehicle, &limits, &config, &Belief::Physics, level).unwrap();
+    let mut maker = RiskMaker::new(assessor, LEARNED, 0);
+    maker.set_goal([8.0, 0.0]);
+    let (n_rows, n_cols) = (config.elevation.n_rows, config.elevation.n_cols);
+    let origin = [n_cols, n_rows].map(|n| -(n as i64) / 2);
+    let geometry = GridGeometry { resolution_m: config.elevation.resolution_m, origin, n_rows, n_cols };
+    let header = SurfaceHeader { grid: Grid::from(&geometry), ..SurfaceHeader::default() };
+    let ground = cell_numbers(&SurfaceCell::certain(0.0, TerrainClass::Open, 0.0));
+    let mut outlet = None;
+    let mut inlet = bus.inlet(&RISK).unwrap();
+    let mut n_bytes = 0;
+    // The first time, what is kept for the next is allocated.
+    let counts = [0, 1].map(|_| {
+        maker.update(&header, &vec![ground; geometry.n_cells()]).unwrap().unwrap();
+        let n = maker.n_elements().unwrap();
+        let outlet = outlet.get_or_insert_with(|| bus.outlet(&RISK, n).unwrap());
+        allocation_counter::measure(|| {
+            send_risk(&mut maker, outlet, 1).unwrap();
+            let message = inlet.newest().unwrap();
+            let (map, time_to_goal) = risk_views(message.user_header(), message.payload()).unwrap();
+            let place = message.payload().as_ptr_range();
+            assert!(
+                place.contains(&map.risks.as_ptr().cast()) && place.contains(&map.ground.as_ptr().cast())
+            );
+            assert!(place.contains(&time_to_goal.seconds.as_ptr().cast()));
+            n_bytes = size_of_val(message.payload());
+        })
+    });
+    assert!(n_bytes > 100_000, "a map worth the name: {n_bytes}");
+    assert!(counts[1].bytes_total < n_bytes as u64 / 50, "{:?} for {n_bytes} bytes", counts[1]);
 }
 
 #[test]

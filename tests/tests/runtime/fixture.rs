@@ -22,6 +22,10 @@ use traversability::CvarLevel;
 const ROLE: &str = "SUREFOOT_TEST_ROLE";
 const RUN: &str = "SUREFOOT_TEST_RUN";
 const FOLDER: &str = "SUREFOOT_TEST_FOLDER";
+const FILE_BYTES: &str = "SUREFOOT_TEST_FILE_BYTES";
+const FILE_TIME: &str = "SUREFOOT_TEST_FILE_TIME";
+/// What recorders have to say goes into a file of this name.
+const SAID: &str = "said";
 /// A file of this name tells the processes to end.
 const OVER: &str = "over";
 pub const ALPHA: f64 = 0.6;
@@ -51,6 +55,20 @@ pub fn machine() -> (Vehicle, Config) {
     (vehicle, config)
 }
 
+/// When a recorder under test begins a new file, and how large its disk is.
+#[derive(Clone, Copy, Debug)]
+pub struct RecorderLimits {
+    pub file_bytes_max: u64,
+    pub file_time_max_s: f64,
+    pub disk_bytes: Option<u64>,
+}
+
+impl Default for RecorderLimits {
+    fn default() -> Self {
+        Self { file_bytes_max: 1 << 30, file_time_max_s: 600.0, disk_bytes: None }
+    }
+}
+
 /// The processes of one run; they end with it.
 pub struct Run {
     pub name: RunName,
@@ -64,15 +82,41 @@ impl Run {
     }
 
     pub fn start(&mut self, role: Role) {
-        let child = Command::new(std::env::current_exe().unwrap())
+        let program = Command::new(std::env::current_exe().unwrap());
+        self.spawn(role, program, &RecorderLimits::default());
+    }
+
+    /// Starts a recorder within limits. What is beyond its disk is refused by the system, as by a full one.
+    pub fn start_recorder(&mut self, limits: &RecorderLimits) {
+        let program = match limits.disk_bytes {
+            None => Command::new(std::env::current_exe().unwrap()),
+            Some(bytes) => {
+                let script = format!("trap '' XFSZ; ulimit -f {}; exec \"$0\" \"$@\"", bytes / 512);
+                let mut shell = Command::new("sh");
+                shell.args(["-c", &script]).arg(std::env::current_exe().unwrap());
+                shell
+            }
+        };
+        self.spawn(Role::Recorder, program, limits);
+    }
+
+    fn spawn(&mut self, role: Role, mut program: Command, limits: &RecorderLimits) {
+        let child = program
             .args(["--exact", "process_of_its_own", "--nocapture"])
             .env(ROLE, role.name())
             .env(RUN, self.name.to_string())
             .env(FOLDER, self.folder.path())
+            .env(FILE_BYTES, limits.file_bytes_max.to_string())
+            .env(FILE_TIME, limits.file_time_max_s.to_string())
             .stdout(Stdio::null())
             .spawn()
             .unwrap();
         self.children.push((role, child));
+    }
+
+    /// What recorders had to say.
+    pub fn said_by_recorder(&self) -> Option<String> {
+        std::fs::read_to_string(self.folder.path().join(SAID)).ok()
     }
 
     pub fn start_all(&mut self, roles: &[Role]) {
@@ -159,6 +203,10 @@ pub fn begin_as_told() {
     be(role, &run.parse().unwrap(), &folder, &|| over.exists());
 }
 
+fn told<T: std::str::FromStr<Err: std::fmt::Debug>>(variable: &str) -> T {
+    std::env::var(variable).unwrap().parse().unwrap()
+}
+
 fn be(role: Role, run: &RunName, folder: &Path, is_over: &dyn Fn() -> bool) {
     let (vehicle, config) = machine();
     let (model, level) = (Model::of(&vehicle), CvarLevel::new(ALPHA).unwrap());
@@ -184,10 +232,12 @@ fn be(role: Role, run: &RunName, folder: &Path, is_over: &dyn Fn() -> bool) {
             let setup = RecorderSetup {
                 folder: folder.to_owned(),
                 setup: recorded_setup(),
-                file_bytes_max: 1 << 30,
-                file_time_max_s: 600.0,
+                file_bytes_max: told(FILE_BYTES),
+                file_time_max_s: told(FILE_TIME),
             };
-            recorder::run(&bus, setup, is_over, &mut |line| panic!("{line}")).unwrap();
+            let said = folder.join(SAID);
+            let mut say = |line: &str| std::fs::write(&said, format!("{line}\n")).unwrap();
+            recorder::run(&bus, setup, is_over, &mut say).unwrap();
         }
     }
 }

@@ -11,6 +11,8 @@ mod fixture;
 mod hostile;
 mod layouts;
 mod measurements;
+mod recordings;
+mod supervision;
 mod witness;
 
 /// Not a test of its own: what the processes of the others begin with.

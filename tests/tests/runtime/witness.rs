@@ -2,10 +2,13 @@
 //! driven on.
 
 use std::collections::BTreeMap;
+use std::time::Instant;
 
 use bicycle::Decision;
 use runtime::channel::{Bus, DECISION, Inlet, ODOMETRY};
 use runtime::message::{DecisionRecord, OdometryRecord, Source, Stamp};
+use runtime::status::Role;
+use rustix::process::Signal;
 
 use crate::fixture::{Run, eventually, machine};
 
@@ -76,6 +79,31 @@ impl Witness {
         let (took, ()) =
             found.unwrap_or_else(|| panic!("{what}: not within {LIMIT_S} s; {:?}", self.decision));
         1e3 * took.as_secs_f64()
+    }
+
+    /// Stops a process and lets it go on again in turns of so many milliseconds, until this holds; how long that took.
+    pub fn in_turns(
+        &mut self,
+        run: &Run,
+        role: Role,
+        turns_ms: [u64; 2],
+        mut holds: impl FnMut(&Self) -> bool,
+    ) -> f64 {
+        self.decided.clear();
+        let began = Instant::now();
+        let mut has_held = false;
+        while !has_held {
+            assert!(began.elapsed().as_secs_f64() < LIMIT_S, "{} late: {:?}", role.name(), self.decision);
+            for (signal, turn_ms) in [Signal::STOP, Signal::CONT].into_iter().zip(turns_ms) {
+                run.signal(role, signal);
+                eventually(turn_ms as f64 * 1e-3, || {
+                    self.look();
+                    has_held |= holds(self);
+                    None::<()>
+                });
+            }
+        }
+        1e3 * began.elapsed().as_secs_f64()
     }
 
     pub fn until_decided(&mut self, what: &str, decision: Decision) -> f64 {

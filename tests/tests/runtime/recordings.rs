@@ -1,0 +1,111 @@
+//! Recorders that rotate, die and run out of disk while the vehicle drives.
+
+use std::path::PathBuf;
+
+use navigator::Belief;
+use runtime::replay::{self, Knowledge, Records, ReplayReport};
+use runtime::status::Role;
+
+use crate::fixture::{RecorderLimits, Run};
+use crate::witness::Witness;
+
+const OTHERS: [Role; 4] = [Role::Plant, Role::Mapping, Role::Learning, Role::Control];
+
+/// A machine under load may not let a recorder write for a second.
+const ATTEMPTS: usize = 4;
+
+fn read(files: &[PathBuf]) -> Records {
+    replay::read(files).unwrap()
+}
+
+fn made_again(records: &Records) -> ReplayReport {
+    let knowledge = Knowledge { belief: Belief::Physics, checkpoint: 0 };
+    replay::replay(records, &knowledge).unwrap()
+}
+
+fn last_decision_ns(records: &Records) -> u64 {
+    records.decisions.values().map(|record| record.decided_at_ns).max().unwrap_or(0)
+}
+
+#[test]
+fn a_recorder_begins_new_files_and_its_death_costs_a_second_at_most() {
+    let mut run = Run::new();
+    run.start_all(&OTHERS);
+    let mut witness = Witness::new(&run);
+    witness.until_driving("all processes up");
+    let lost_s: Vec<f64> = (0..ATTEMPTS)
+        .map_while(|attempt| {
+            let n_before = run.recordings().len();
+            // Every second, and every 60 kB.
+            let limits =
+                RecorderLimits { file_time_max_s: 1.0, file_bytes_max: 60_000, ..Default::default() };
+            run.start_recorder(&limits);
+            witness.until("a few files", |_| run.recordings().len() >= n_before + 4);
+            witness.until("the file after", |witness| witness.decided.len() % 7 == 6);
+            run.kill(Role::Recorder);
+            witness.look();
+            let seen_ns = witness.decision.unwrap().1.decided_at_ns;
+            let lost_s = seen_ns.saturating_sub(last_decision_ns(&read(&run.recordings()))) as f64 * 1e-9;
+            println!("recorder killed, time {attempt}: {lost_s:.2} s lost");
+            Some(lost_s)
+        })
+        .take_while(|lost_s| *lost_s > 1.0)
+        .collect();
+    assert!(lost_s.len() < ATTEMPTS, "lost more than a second every time: {lost_s:?}");
+    run.end();
+
+    // All files but the one that the recorder died in are whole, and together they are one drive.
+    let files = run.recordings();
+    let broken = files.iter().filter(|file| read(&[(*file).clone()]).ended_early.is_some()).count();
+    assert!(broken <= lost_s.len() + 1, "{broken} of {} files break off", files.len());
+    let report = made_again(&read(&files));
+    assert_eq!(report.first_difference, None, "{report:?}");
+}
+
+#[test]
+fn files_that_follow_one_another_hold_every_decision_once() {
+    let mut run = Run::new();
+    run.start_all(&OTHERS);
+    run.start_recorder(&RecorderLimits { file_time_max_s: 0.8, ..Default::default() });
+    let mut witness = Witness::new(&run);
+    witness.until("a few files", |_| run.recordings().len() >= 4);
+    run.end();
+    let files = run.recordings();
+    let records = read(&files);
+    assert_eq!(records.ended_early, None);
+    let cycles: Vec<u64> = records.decisions.values().map(|record| record.cycle).collect();
+    let follow = cycles.windows(2).all(|pair| pair[1] == pair[0] + 1);
+    assert!(follow && !cycles.is_empty(), "a decision fell between two files: {cycles:?}");
+    let each: usize = files.iter().map(|file| read(&[file.clone()]).decisions.len()).sum();
+    assert_eq!(each, cycles.len(), "one is in two files");
+    let report = made_again(&records);
+    assert_eq!(report.first_difference, None, "{report:?}");
+}
+
+#[test]
+fn a_full_disk_ends_the_recording_and_not_the_drive() {
+    let mut run = Run::new();
+    run.start_all(&OTHERS);
+    let mut witness = Witness::new(&run);
+    witness.until_driving("all processes up");
+    run.start_recorder(&RecorderLimits { disk_bytes: Some(512 << 10), ..Default::default() });
+    witness.until("the disk is full", |_| run.said_by_recorder().is_some());
+    let said = run.said_by_recorder().unwrap();
+    assert!(said.contains("drive-000.mcap: the recording ends here, a write failed: "), "{said}");
+    assert!(said.ends_with("; driving on without a recording\n") && said.lines().count() == 1, "{said}");
+
+    // The vehicle drives on, and the recorder lives on, without writing.
+    witness.decided.clear();
+    witness.until("ten more decisions", |witness| witness.decided.len() >= 10);
+    witness.until_driving("without a recording");
+    run.end();
+
+    // What fitted is whole: it ends as a recording does, and is made again.
+    let files = run.recordings();
+    assert_eq!(files.len(), 1);
+    let records = read(&files);
+    assert_eq!(records.ended_early, None);
+    let report = made_again(&records);
+    assert_eq!(report.first_difference, None, "{report:?}");
+    assert!(report.n_decisions > 5, "{report:?}");
+}

@@ -1,0 +1,71 @@
+//! Processes that keep dying, and processes that refuse their input.
+
+use std::cell::RefCell;
+use std::process::Command;
+
+use runtime::channel::Bus;
+use runtime::clock::now_ns;
+use runtime::status::Role;
+use runtime::supervisor::{RestartPolicy, RunEnd, Supervisor};
+
+use crate::fixture::Run;
+
+/// Soon enough for a test.
+const POLICY: RestartPolicy = RestartPolicy {
+    restarts_max: 3,
+    back_off_ns: 20_000_000,
+    back_off_max_ns: 60_000_000,
+    window_ns: 60_000_000_000,
+};
+
+/// How it ended, and when each process was started [ms].
+fn supervise(roles: &[Role], script: &str) -> (RunEnd, Vec<(Role, u64)>) {
+    let run = Run::new();
+    let bus = Bus::join(&run.name).unwrap();
+    let (starts, began_ns) = (RefCell::new(Vec::new()), now_ns());
+    let command = |role: Role| {
+        starts.borrow_mut().push((role, (now_ns() - began_ns) / 1_000_000));
+        let mut command = Command::new("sh");
+        command.args(["-c", script, role.name()]);
+        command
+    };
+    let mut supervisor = Supervisor::new(&bus, roles, POLICY, &command).unwrap();
+    let end = supervisor.run(&|| now_ns() - began_ns > 30_000_000_000, &mut |_, _| ());
+    (end, starts.into_inner())
+}
+
+#[test]
+fn what_keeps_dying_is_started_again_ever_later_and_then_given_up() {
+    let (end, starts) = supervise(&[Role::Control], "exit 1");
+    let RunEnd::GaveUp { role: Role::Control, why } = end else { panic!("{end:?}") };
+    assert_eq!(why, "it ended 4 times within 60 s, the last time by exit status: 1");
+    assert_eq!(starts.len(), 4, "once, and three times again");
+    // At least as late as stated: 20, 40, then at the most 60 ms.
+    for (pair, least_ms) in starts.windows(2).zip([20, 40, 60]) {
+        assert!(pair[1].1 - pair[0].1 >= least_ms, "{starts:?}");
+    }
+}
+
+#[test]
+fn a_killed_process_counts_as_dead_and_says_by_what() {
+    let (end, _) = supervise(&[Role::Mapping], "kill -9 $$");
+    let RunEnd::GaveUp { role: Role::Mapping, why } = end else { panic!("{end:?}") };
+    assert!(why.contains("signal: 9"), "{why}");
+}
+
+#[test]
+fn what_refuses_its_input_is_not_started_again_and_takes_the_others_along() {
+    let script = "[ $0 = mapping ] && exit 2; exec sleep 30";
+    let (end, starts) = supervise(&[Role::Learning, Role::Mapping], script);
+    assert_eq!(end, RunEnd::GaveUp { role: Role::Mapping, why: "it refused its input".to_owned() });
+    assert_eq!(starts.iter().map(|(role, _)| *role).collect::<Vec<_>>(), [Role::Learning, Role::Mapping]);
+}
+
+#[test]
+fn the_end_of_the_vehicle_ends_the_run() {
+    for code in [0, 1] {
+        let script = format!("[ $0 = plant ] && exit {code}; exec sleep 30");
+        let (end, _) = supervise(&[Role::Plant, Role::Control], &script);
+        assert_eq!(end, RunEnd::Plant(code));
+    }
+}
