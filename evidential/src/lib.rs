@@ -41,9 +41,10 @@ pub use features::{FeatureLayout, Standardisation};
 pub use label::{Label, LabelConfig, LabelError, Response, Responses, Reversing, estimate_responses, labels};
 pub use method::{Method, Prior};
 pub use predictor::{Evidence, Prediction, Predictor, PredictorError};
-pub use shipped::{ShippedError, shipped};
+pub use shipped::{ShippedData, ShippedError, shipped, shipped_data};
 pub use sweep::{Grid, Selection, SelectionError, Selections, Trial, fingerprint};
 pub use training::{
-    Epoch, Outcome, Percentiles, Phase, Settings, SettingsError, TrainError, TrainingEnd, train,
+    Assessment, Epoch, Outcome, Percentiles, Phase, Refined, Refinement, Settings, SettingsError, TrainError,
+    TrainingEnd, assess, refine, train,
 };
 pub use vehicle::VehicleMismatch;

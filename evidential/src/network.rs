@@ -4,14 +4,14 @@ mod dense;
 
 use std::collections::BTreeMap;
 
-use candle_core::{Device, Result, Tensor, Var};
+use candle_core::{Device, Result, Tensor, Var, bail};
 use rand::RngExt;
 use rand_xoshiro::Xoshiro256PlusPlus;
 use traversability::N_BINS;
 
 use crate::flow::LogDensity;
 use crate::random::stream;
-use crate::{Architecture, checkpoint};
+use crate::{Architecture, Checkpoint, checkpoint};
 use dense::{Activation, Dense};
 
 /// Key of the random stream that initialises the networks.
@@ -77,6 +77,11 @@ fn uniform(shape: &[usize], bound: f32, rng: &mut Xoshiro256PlusPlus) -> Result<
     Var::from_vec(values, shape, &Device::Cpu)
 }
 
+/// Weights and biases of layers.
+fn arrays<'a>(layers: impl Iterator<Item = &'a Layer>) -> Vec<Var> {
+    layers.flat_map(|layer| [layer.weights.clone(), layer.biases.clone()]).collect()
+}
+
 fn forward_pair(layers: &[Layer; 2], inputs: &Tensor) -> Result<Tensor> {
     layers[1].forward(&layers[0].forward(inputs)?)
 }
@@ -105,6 +110,25 @@ impl Network {
         Ok(Self { encoder, heads, evidence })
     }
 
+    /// Networks with the weights of a checkpoint, which is known to be whole.
+    pub(crate) fn of(checkpoint: &Checkpoint) -> Result<Self> {
+        let network = Self::new(&checkpoint.sidecar.architecture, 0)?;
+        let kept = |name: &str| match checkpoint.tensors.get(name) {
+            Some(tensor) => Tensor::from_slice(&tensor.values, tensor.shape.as_slice(), &Device::Cpu),
+            None => bail!("expected weights of the name {name}"),
+        };
+        for (name, layer) in network.named_layers() {
+            layer.weights.set(&kept(&format!("{name}.weight"))?)?;
+            layer.biases.set(&kept(&format!("{name}.bias"))?)?;
+        }
+        if let Some(evidence) = &network.evidence {
+            evidence.flow_centres.set(&kept("flow.centre")?)?;
+            let shapes = [kept("flow.alpha")?, kept("flow.beta")?];
+            evidence.flow_shapes.set(&Tensor::stack(&shapes, 0)?)?;
+        }
+        Ok(network)
+    }
+
     /// Latents [rows, latent] of inputs [rows, inputs].
     pub(crate) fn latents(&self, inputs: &Tensor) -> Result<Tensor> {
         let mut values = inputs.clone();
@@ -125,15 +149,19 @@ impl Network {
     /// Everything that the loss asks for, one example per row: logits of all heads, then with evidence the logits of
     /// the evidence scales and the log density.
     pub(crate) fn outputs(&self, inputs: &Tensor) -> Result<Tensor> {
-        let latents = self.latents(inputs)?;
+        self.outputs_of_latents(&self.latents(inputs)?)
+    }
+
+    /// The same of latents.
+    pub(crate) fn outputs_of_latents(&self, latents: &Tensor) -> Result<Tensor> {
         let mut parts = Vec::with_capacity(Architecture::N_HEADS + 2);
         for head in &self.heads {
-            parts.push(forward_pair(head, &latents)?);
+            parts.push(forward_pair(head, latents)?);
         }
         if let Some(evidence) = &self.evidence {
-            parts.push(forward_pair(&evidence.scale, &latents)?);
+            parts.push(forward_pair(&evidence.scale, latents)?);
         }
-        if let Some(densities) = self.log_densities(&latents)? {
+        if let Some(densities) = self.log_densities(latents)? {
             parts.push(densities.unsqueeze(1)?);
         }
         Tensor::cat(&parts, 1)
@@ -141,12 +169,16 @@ impl Network {
 
     /// All trainable arrays, always in the same order.
     pub(crate) fn variables(&self) -> Vec<Var> {
-        let pairs = self.heads.iter().chain(self.evidence.as_ref().map(|evidence| &evidence.scale));
-        let layers = self.encoder.iter().chain(pairs.flatten());
-        let mut variables: Vec<Var> =
-            layers.flat_map(|layer| [layer.weights.clone(), layer.biases.clone()]).collect();
+        let mut variables = arrays(self.encoder.iter());
+        variables.extend(self.head_variables());
         variables.extend(self.flow_variables());
         variables
+    }
+
+    /// Trainable arrays of the heads, that of the evidence scales among them.
+    pub(crate) fn head_variables(&self) -> Vec<Var> {
+        let pairs = self.heads.iter().chain(self.evidence.as_ref().map(|evidence| &evidence.scale));
+        arrays(pairs.flatten())
     }
 
     /// The flow's trainable arrays; none without a flow.

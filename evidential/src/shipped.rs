@@ -2,7 +2,7 @@
 
 use bicycle::Geometry;
 
-use crate::{Checkpoint, CheckpointError, Method, VehicleMismatch};
+use crate::{Checkpoint, CheckpointError, Dataset, DatasetFileError, Method, VehicleMismatch};
 
 /// The two files of a checkpoint.
 struct Files {
@@ -35,6 +35,14 @@ const FILES: &[Files] = &[
     },
 ];
 
+/// What the networks learned from, and what they were chosen by: of each, 512 footprints.
+pub struct ShippedData {
+    /// Of the data that they were trained on.
+    pub familiar: Dataset,
+    /// Of the data that they were chosen by, on other maps.
+    pub validation: Dataset,
+}
+
 /// Why no networks that come with the program will do.
 #[derive(Debug, thiserror::Error)]
 pub enum ShippedError {
@@ -55,6 +63,9 @@ pub enum ShippedError {
     /// They are broken.
     #[error(transparent)]
     Checkpoint(#[from] CheckpointError),
+    /// The data that come with the program are broken.
+    #[error(transparent)]
+    Data(#[from] DatasetFileError),
 }
 
 /// The networks of a method that were trained on a vehicle of this geometry.
@@ -73,9 +84,39 @@ pub fn shipped(method: Method, geometry: &Geometry) -> Result<Checkpoint, Shippe
     Err(refused)
 }
 
+/// The data that come with the program, to learn on beside and to judge by; `None` for networks of another vehicle,
+/// layout or prior.
+///
+/// # Errors
+/// They are broken.
+pub fn shipped_data(checkpoint: &Checkpoint) -> Result<Option<ShippedData>, ShippedError> {
+    let familiar = Dataset::from_bytes(include_bytes!("../weights/familiar.safetensors"))?;
+    let validation = Dataset::from_bytes(include_bytes!("../weights/validation.safetensors"))?;
+    let fits = [&familiar, &validation].into_iter().all(|data| {
+        checkpoint.require_vehicle(&data.origin.vehicle).is_ok()
+            && checkpoint.require_layout(&data.origin.layout).is_ok()
+            && checkpoint.require_prior(&data.origin.prior).is_ok()
+    });
+    Ok(fits.then_some(ShippedData { familiar, validation }))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn data_fit_every_network_and_what_is_judged_by_was_driven_on_other_maps() {
+        for files in FILES {
+            let checkpoint = Checkpoint::from_bytes(files.weights, files.sidecar).unwrap();
+            let data = shipped_data(&checkpoint).unwrap().unwrap();
+            assert_eq!((data.familiar.examples.len(), data.validation.examples.len()), (512, 512));
+            let provenance = [&data.familiar, &data.validation].map(|data| &data.origin.provenance);
+            assert!(provenance[0].contains("Train") && provenance[1].contains("Validation"));
+            let mut other = checkpoint;
+            other.sidecar.vehicle = "another".to_owned();
+            assert!(shipped_data(&other).unwrap().is_none());
+        }
+    }
 
     #[test]
     fn all_that_is_shipped_can_be_used_and_is_small() {

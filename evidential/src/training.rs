@@ -6,6 +6,7 @@
 
 mod error;
 mod evaluation;
+mod refinement;
 mod samples;
 mod settings;
 mod steps;
@@ -24,6 +25,7 @@ use crate::{
 pub use error::TrainError;
 use evaluation::Evaluation;
 pub use evaluation::Percentiles;
+pub use refinement::{Assessment, Refined, Refinement, assess, refine};
 use samples::{Samples, gather};
 pub use settings::{Settings, SettingsError};
 use steps::{Best, Place, RunningMean, adam, order, pass};

@@ -269,6 +269,29 @@ static_assert(offsetof(SurefootMissionRecord, tolerance_m) == 16, "MissionRecord
 static_assert(offsetof(SurefootMissionRecord, time_s) == 24, "MissionRecord.time_s");
 static_assert(offsetof(SurefootMissionRecord, outcome) == 32, "MissionRecord.outcome");
 
+/* Header of networks learned while driving; the payload is weights, then sidecar, as the bytes of their files. Known to the channels as surefoot.CheckpointHeader. */
+typedef struct SurefootCheckpointHeader {
+    /* Whose and of when. */
+    SurefootStamp stamp;
+    /* First 8 bytes of the SHA-256 of the weights. */
+    uint64_t checkpoint;
+    /* Bytes of the weights; the sidecar follows. */
+    uint64_t n_weight_bytes;
+    /* Footprints learned from, and judged by. */
+    uint64_t n_examples[2];
+    /* EMD2 on held-out footprints of the drive, of the networks before and of these. */
+    double recent_emd2[2];
+    /* EMD2 on the original validation data, of the original networks and of these. */
+    double original_emd2[2];
+} SurefootCheckpointHeader;
+static_assert(sizeof(SurefootCheckpointHeader) == 104, "CheckpointHeader");
+static_assert(offsetof(SurefootCheckpointHeader, stamp) == 0, "CheckpointHeader.stamp");
+static_assert(offsetof(SurefootCheckpointHeader, checkpoint) == 40, "CheckpointHeader.checkpoint");
+static_assert(offsetof(SurefootCheckpointHeader, n_weight_bytes) == 48, "CheckpointHeader.n_weight_bytes");
+static_assert(offsetof(SurefootCheckpointHeader, n_examples) == 56, "CheckpointHeader.n_examples");
+static_assert(offsetof(SurefootCheckpointHeader, recent_emd2) == 72, "CheckpointHeader.recent_emd2");
+static_assert(offsetof(SurefootCheckpointHeader, original_emd2) == 88, "CheckpointHeader.original_emd2");
+
 /* How a process is doing, twice a second. Known to the channels as surefoot.Status. */
 typedef struct SurefootStatusRecord {
     /* 1 plant, 2 mapping, 3 learning, 4 control, 5 recorder. */

@@ -374,6 +374,38 @@ assert MissionRecord.time_s.offset == 24
 assert MissionRecord.outcome.offset == 32
 
 
+class CheckpointHeader(ctypes.Structure):
+    """Header of networks learned while driving; the payload is weights, then sidecar, as the bytes of their files."""
+
+    _fields_ = [
+        # Whose and of when.
+        ("stamp", Stamp),
+        # First 8 bytes of the SHA-256 of the weights.
+        ("checkpoint", ctypes.c_uint64),
+        # Bytes of the weights; the sidecar follows.
+        ("n_weight_bytes", ctypes.c_uint64),
+        # Footprints learned from, and judged by.
+        ("n_examples", ctypes.c_uint64 * 2),
+        # EMD2 on held-out footprints of the drive, of the networks before and of these.
+        ("recent_emd2", ctypes.c_double * 2),
+        # EMD2 on the original validation data, of the original networks and of these.
+        ("original_emd2", ctypes.c_double * 2),
+    ]
+
+    @staticmethod
+    def type_name() -> str:
+        return "surefoot.CheckpointHeader"
+
+
+assert ctypes.sizeof(CheckpointHeader) == 104
+assert CheckpointHeader.stamp.offset == 0
+assert CheckpointHeader.checkpoint.offset == 40
+assert CheckpointHeader.n_weight_bytes.offset == 48
+assert CheckpointHeader.n_examples.offset == 56
+assert CheckpointHeader.recent_emd2.offset == 72
+assert CheckpointHeader.original_emd2.offset == 88
+
+
 class StatusRecord(ctypes.Structure):
     """How a process is doing, twice a second."""
 

@@ -77,6 +77,11 @@ impl Assessor {
         self.layer.note_stuck(pose);
     }
 
+    /// The poses that are remembered, the oldest first.
+    pub fn stuck(&self) -> &[StuckPose] {
+        self.layer.stuck()
+    }
+
     /// The localisation moved by a step, and what is remembered in its frame moves along.
     pub fn shift_stuck(&mut self, step_m: [f64; 2]) {
         self.layer.shift_stuck(step_m);

@@ -131,6 +131,11 @@ impl RiskLayer {
         self.stuck.push(pose);
     }
 
+    /// The poses that are remembered, the oldest first.
+    pub fn stuck(&self) -> &[StuckPose] {
+        &self.stuck
+    }
+
     /// The localisation moved by a step, and what was remembered in its frame moves along.
     pub fn shift_stuck(&mut self, step_m: [f64; 2]) {
         for pose in &mut self.stuck {

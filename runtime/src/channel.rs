@@ -9,8 +9,8 @@ use std::fmt::Debug;
 use iceoryx2::prelude::ZeroCopySend;
 
 use crate::message::{
-    CommandRecord, DecisionRecord, MissionRecord, OdometryRecord, PointRecord, RiskHeader, ScanHeader, Stamp,
-    StatusRecord, StuckRecord, SurfaceHeader,
+    CheckpointHeader, CommandRecord, DecisionRecord, MissionRecord, OdometryRecord, PointRecord, RiskHeader,
+    ScanHeader, Stamp, StatusRecord, StuckRecord, SurfaceHeader,
 };
 use crate::payload;
 pub use bus::{Bus, RunName, RunNameError};
@@ -46,7 +46,7 @@ macro_rules! header {
         }
     )* };
 }
-header!(ScanHeader, SurfaceHeader, RiskHeader);
+header!(ScanHeader, SurfaceHeader, RiskHeader, CheckpointHeader);
 
 /// An element of a payload.
 pub trait Element: ZeroCopySend + bytemuck::Pod + Default + Debug + 'static {}
@@ -135,6 +135,15 @@ pub const MISSION: Channel<Stamp, MissionRecord> = Channel {
     n_readers: 6,
     silence_ns: 2500 * MILLISECOND_NS,
     check: payload::check_mission,
+};
+
+/// Networks that were learned while driving: learning.
+pub const CHECKPOINT: Channel<CheckpointHeader, u8> = Channel {
+    name: "checkpoint",
+    depth: 2,
+    n_readers: 3,
+    silence_ns: 12_000 * MILLISECOND_NS,
+    check: payload::check_checkpoint,
 };
 
 /// How a process is doing. Several publish at once: one channel for each role.

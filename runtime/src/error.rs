@@ -14,6 +14,15 @@ pub enum RuntimeError {
     /// The simulated vehicle.
     #[error(transparent)]
     Episode(#[from] scenarios::EpisodeError),
+    /// Learning while driving.
+    #[error(transparent)]
+    Online(#[from] crate::online::OnlineError),
+    /// Networks that were learned cannot be kept.
+    #[error(transparent)]
+    Checkpoint(#[from] evidential::CheckpointError),
+    /// The system refuses a thread.
+    #[error("threads: {0}")]
+    Threads(#[from] rayon::ThreadPoolBuildError),
     /// The recording.
     #[error(transparent)]
     Record(#[from] formats::RecordError),

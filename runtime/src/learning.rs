@@ -9,6 +9,7 @@ use crate::channel::{Bus, Inlet, MISSION, Outlet, RISK, STUCK, SURFACE};
 use crate::clock;
 use crate::mapping::{LEARNED, risk_elements, send_risk};
 use crate::message::{MissionRecord, RiskHeader, Stamp, StuckRecord, SurfaceHeader};
+use crate::online::{Judge, School, SchoolSetup, Told};
 use crate::risk_maker::RiskMaker;
 use crate::status::{Health, Meter, Role};
 
@@ -41,8 +42,34 @@ pub fn run(bus: &Bus, setup: &LearningSetup<'_>, is_over: &dyn Fn() -> bool) -> 
     Ok(())
 }
 
+/// Judges until `is_over` says to end, and learns from the drive meanwhile. `tell` hears of every round.
+pub fn run_and_learn(
+    bus: &Bus,
+    setup: &LearningSetup<'_>,
+    school: SchoolSetup,
+    is_over: &dyn Fn() -> bool,
+    tell: &mut dyn FnMut(Told<'_>),
+) -> Result<(), RuntimeError> {
+    let judge = Judge {
+        vehicle: setup.vehicle.clone(),
+        limits: setup.limits,
+        config: setup.config.clone(),
+        level: setup.level,
+        unfamiliar: school.unfamiliar,
+    };
+    let mut learning = Learning::new(bus, setup)?;
+    learning.school = Some(School::new(bus, school, judge)?);
+    while !is_over() {
+        learning.attend(tell)?;
+        learning.look()?;
+        clock::sleep_until(clock::now_ns() + POLL_NS);
+    }
+    Ok(())
+}
+
 struct Learning {
     maker: RiskMaker,
+    school: Option<School>,
     surfaces: Inlet<SurfaceHeader, [f32; 8]>,
     missions: Inlet<Stamp, MissionRecord>,
     stuck: Inlet<Stamp, StuckRecord>,
@@ -59,6 +86,7 @@ impl Learning {
         let assessor = Assessor::new(vehicle, limits, config, belief, *level)?;
         Ok(Self {
             maker: RiskMaker::new(assessor, LEARNED, *checkpoint),
+            school: None,
             surfaces: bus.inlet(&SURFACE)?,
             missions: bus.inlet(&MISSION)?,
             stuck: bus.inlet(&STUCK)?,
@@ -68,6 +96,25 @@ impl Learning {
             n_malformed: 0,
             took_s: 0.0,
         })
+    }
+
+    /// Listens to the drive, and judges by what was learned as soon as there is something better.
+    fn attend(&mut self, tell: &mut dyn FnMut(Told<'_>)) -> Result<(), RuntimeError> {
+        let Some(school) = &mut self.school else { return Ok(()) };
+        school.listen();
+        match school.news() {
+            Some(Ok(news)) => {
+                school.publish(&news)?;
+                let checkpoint = news.change.as_ref().map(|(checkpoint, ..)| checkpoint.as_ref());
+                tell(Told::Round(&news.round, checkpoint));
+                if let Some((_, hash, assessor)) = news.change {
+                    self.maker.judge_by(assessor, hash);
+                }
+            }
+            Some(Err(why)) => tell(Told::Ended(&why)),
+            None => {}
+        }
+        school.repeat()
     }
 
     fn look(&mut self) -> Result<(), RuntimeError> {
@@ -81,6 +128,9 @@ impl Learning {
             match maker.update(header, surface.payload())? {
                 Ok(()) => send_risk(maker, &mut self.outlet, header.stamp.valid_at_ns)?,
                 Err(_) => self.n_malformed += 1,
+            }
+            if let Some(school) = &mut self.school {
+                school.note_surface(header, surface.payload());
             }
             self.last_surface = Some(header.stamp);
             self.took_s = clock::age_s(clock::now_ns(), began_ns);

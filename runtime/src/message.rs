@@ -217,6 +217,24 @@ record! {
 }
 
 record! {
+    /// Header of networks learned while driving; the payload is weights, then sidecar, as the bytes of their files.
+    CheckpointHeader = "surefoot.CheckpointHeader" {
+        /// Whose and of when.
+        stamp: Stamp,
+        /// First 8 bytes of the SHA-256 of the weights.
+        checkpoint: u64,
+        /// Bytes of the weights; the sidecar follows.
+        n_weight_bytes: u64,
+        /// Footprints learned from, and judged by.
+        n_examples: [u64; 2],
+        /// EMD2 on held-out footprints of the drive, of the networks before and of these.
+        recent_emd2: [f64; 2],
+        /// EMD2 on the original validation data, of the original networks and of these.
+        original_emd2: [f64; 2],
+    }
+}
+
+record! {
     /// How a process is doing, twice a second.
     StatusRecord = "surefoot.Status" {
         /// 1 plant, 2 mapping, 3 learning, 4 control, 5 recorder.
@@ -255,6 +273,7 @@ pub fn layouts() -> Vec<RecordLayout> {
         DecisionRecord::layout(),
         StuckRecord::layout(),
         MissionRecord::layout(),
+        CheckpointHeader::layout(),
         StatusRecord::layout(),
     ]
 }

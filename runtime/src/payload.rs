@@ -8,8 +8,8 @@ use xxhash_rust::xxh3::xxh3_64;
 
 use crate::channel::Refusal;
 use crate::message::{
-    CommandRecord, MissionRecord, OdometryRecord, PointRecord, RiskHeader, ScanHeader, Stamp, StuckRecord,
-    SurfaceHeader,
+    CheckpointHeader, CommandRecord, MissionRecord, OdometryRecord, PointRecord, RiskHeader, ScanHeader,
+    Stamp, StuckRecord, SurfaceHeader,
 };
 
 /// Yaw bins beyond which nobody believes a map.
@@ -208,6 +208,12 @@ pub(crate) fn check_stuck(_: &Stamp, payload: &[StuckRecord]) -> Result<(), Refu
     let stuck = check_one(payload)?;
     let numbers = stuck.position_m.iter().chain([&stuck.yaw_rad]);
     require(numbers.clone().all(|value| value.is_finite()), Refusal::NonFinite)
+}
+
+pub(crate) fn check_checkpoint(header: &CheckpointHeader, payload: &[u8]) -> Result<(), Refusal> {
+    require(header.n_weight_bytes <= payload.len() as u64, Refusal::Malformed)?;
+    let errors = header.recent_emd2.iter().chain(&header.original_emd2);
+    require(errors.clone().all(|value| value.is_finite()), Refusal::NonFinite)
 }
 
 pub(crate) fn check_mission(_: &Stamp, payload: &[MissionRecord]) -> Result<(), Refusal> {

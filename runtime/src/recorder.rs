@@ -9,11 +9,11 @@ use bytemuck::NoUninit;
 
 use crate::RuntimeError;
 use crate::channel::{
-    Bus, COMMAND, DECISION, Header, Inlet, MISSION, ODOMETRY, RISK, RISK_PHYSICS, SCAN, STUCK, SURFACE,
+    Bus, CHECKPOINT, COMMAND, DECISION, Header, Inlet, MISSION, ODOMETRY, RISK, RISK_PHYSICS, SCAN, STUCK, SURFACE,
 };
 use crate::clock::{self, SECOND_NS};
 use crate::message::{
-    CommandRecord, DecisionRecord, MissionRecord, OdometryRecord, PointRecord, RiskHeader, ScanHeader, Stamp,
+    CheckpointHeader, CommandRecord, DecisionRecord, MissionRecord, OdometryRecord, PointRecord, RiskHeader, ScanHeader, Stamp,
     StuckRecord, SurfaceHeader,
 };
 use crate::setup::RecordedSetup;
@@ -44,6 +44,8 @@ pub mod topic {
     pub const STUCK: &str = "/channel/stuck";
     /// [`crate::channel::MISSION`].
     pub const MISSION: &str = "/channel/mission";
+    /// [`crate::channel::CHECKPOINT`].
+    pub const CHECKPOINT: &str = "/channel/checkpoint";
     /// What is needed to repeat the run, as JSON.
     pub const SETUP: &str = "/setup";
 }
@@ -97,6 +99,7 @@ struct Inlets {
     missions: Inlet<Stamp, MissionRecord>,
     commands: Inlet<Stamp, CommandRecord>,
     decisions: Inlet<Stamp, DecisionRecord>,
+    checkpoints: Inlet<CheckpointHeader, u8>,
 }
 
 impl Recorder {
@@ -110,6 +113,7 @@ impl Recorder {
             missions: bus.inlet(&MISSION)?,
             commands: bus.inlet(&COMMAND)?,
             decisions: bus.inlet(&DECISION)?,
+            checkpoints: bus.inlet(&CHECKPOINT)?,
         };
         let meter = Meter::new(bus, Role::Recorder)?;
         let file = Some(RotatingFile::create(setup, clock::now_ns())?);
@@ -144,6 +148,9 @@ impl Recorder {
                 keep(&mut result, views.risk(file.recorder(), header, payload));
             });
         }
+        inlets.checkpoints.poll(|header, bytes| {
+            keep(&mut result, write(file, topic::CHECKPOINT, header, bytes, CheckpointHeader::layout));
+        });
         inlets.stuck.poll(|header, records| {
             keep(&mut result, write(file, topic::STUCK, header, records, StuckRecord::layout));
         });

@@ -81,6 +81,17 @@ impl Knowledge {
     pub fn learned(checkpoint: Arc<Checkpoint>, unfamiliar: evidential::Unfamiliar, hash: u64) -> Self {
         Self { belief: Belief::Learned { checkpoint, unfamiliar }, checkpoint: hash }
     }
+
+    /// What was believed by these networks: the original ones, or some that were learned while driving.
+    fn of(&self, checkpoint: u64, records: &Records) -> Option<Belief> {
+        match &self.belief {
+            Belief::Learned { unfamiliar, .. } if checkpoint != self.checkpoint => {
+                let checkpoint = Arc::clone(records.checkpoints.get(&checkpoint)?);
+                Some(Belief::Learned { checkpoint, unfamiliar: *unfamiliar })
+            }
+            belief => (checkpoint == self.checkpoint).then(|| belief.clone()),
+        }
+    }
 }
 
 /// Reads recordings that follow one another.

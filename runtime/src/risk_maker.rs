@@ -37,6 +37,17 @@ impl RiskMaker {
         }
     }
 
+    /// Judges the ground by other networks from now on, the next time as a whole. What driving has proved stays.
+    pub fn judge_by(&mut self, mut assessor: Assessor, checkpoint: u64) {
+        self.assessor.stuck().iter().for_each(|pose| assessor.note_stuck(*pose));
+        (self.assessor, self.checkpoint, self.mirror) = (assessor, checkpoint, None);
+    }
+
+    /// The networks that it judges by, as [`RiskHeader::checkpoint`].
+    pub fn checkpoint(&self) -> u64 {
+        self.checkpoint
+    }
+
     /// Where the times to the goal shall lead from now on.
     pub fn set_goal(&mut self, goal_m: [f64; 2]) {
         self.goal_m = Some(goal_m);

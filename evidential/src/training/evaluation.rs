@@ -52,18 +52,9 @@ impl Evaluation {
     pub(super) fn new(network: &Network, samples: &Samples, terms: &LossTerms) -> Result<Self> {
         let mut by_drive: BTreeMap<u32, Errors> = BTreeMap::new();
         let mut learned_weights = Vec::new();
-        let mut drives = samples.drives().iter();
-        for start in (0..samples.n).step_by(CHUNK) {
-            let (inputs, targets) = samples.chunk(start, CHUNK)?;
-            let outputs = network.outputs(&inputs)?;
-            let width = outputs.dim(1)?;
-            let outputs = outputs.flatten_all()?.to_vec1::<f32>()?;
-            let rows = outputs.chunks_exact(width).zip(targets.chunks_exact(N_TARGETS)).zip(&mut drives);
-            for ((output, target), &drive) in rows {
-                let Scored { emd2, learned_weight } = terms.score(output, target);
-                by_drive.entry(drive).or_default().add(&emd2);
-                learned_weights.extend(learned_weight);
-            }
+        for (scored, &drive) in scores(network, samples, terms)?.iter().zip(samples.drives()) {
+            by_drive.entry(drive).or_default().add(&scored.emd2);
+            learned_weights.extend(scored.learned_weight);
         }
         let (emd2, standard_error) = means(by_drive.values());
         Ok(Self { emd2, standard_error, learned_weights })
@@ -73,6 +64,20 @@ impl Evaluation {
     pub(super) fn total(&self) -> f64 {
         self.emd2.iter().sum()
     }
+}
+
+/// How well each example is met.
+pub(super) fn scores(network: &Network, samples: &Samples, terms: &LossTerms) -> Result<Vec<Scored>> {
+    let mut scores = Vec::with_capacity(samples.n);
+    for start in (0..samples.n).step_by(CHUNK) {
+        let (inputs, targets) = samples.chunk(start, CHUNK)?;
+        let outputs = network.outputs(&inputs)?;
+        let width = outputs.dim(1)?;
+        let outputs = outputs.flatten_all()?.to_vec1::<f32>()?;
+        let rows = outputs.chunks_exact(width).zip(targets.chunks_exact(N_TARGETS));
+        scores.extend(rows.map(|(output, target)| terms.score(output, target)));
+    }
+    Ok(scores)
 }
 
 /// Errors of one drive, added up per parameter.

@@ -46,9 +46,22 @@ impl Samples {
         samples
     }
 
+    /// Takes in the samples of another dataset, behind its own.
+    pub(super) fn append(&mut self, other: Self) {
+        self.n += other.n;
+        self.inputs.extend(other.inputs);
+        self.targets.extend(other.targets);
+        self.drives.extend(other.drives);
+    }
+
+    /// Targets of the examples named.
+    pub(super) fn targets(&self, indices: &[u32]) -> Result<Tensor> {
+        gather(&self.targets, self.n, indices)
+    }
+
     /// Inputs and targets of the examples named.
     pub(super) fn batch(&self, indices: &[u32]) -> Result<(Tensor, Tensor)> {
-        Ok((gather(&self.inputs, self.n, indices)?, gather(&self.targets, self.n, indices)?))
+        Ok((gather(&self.inputs, self.n, indices)?, self.targets(indices)?))
     }
 
     /// Drive of every example.

@@ -202,11 +202,22 @@ impl Author<'_> {
         cells: &[[f32; 8]],
         (records, machine): (&Records, &MachineSetup),
     ) -> Result<Result<Made, Unmade>, NavigatorError> {
-        if self.maker.as_ref().is_none_or(|(epoch_ns, _)| *epoch_ns != key.epoch_ns) {
+        let is_new = self.maker.as_ref().is_none_or(|(epoch_ns, _)| *epoch_ns != key.epoch_ns);
+        let is_by_others =
+            self.maker.as_ref().is_none_or(|(_, maker)| maker.checkpoint() != header.checkpoint);
+        if is_new || is_by_others {
             let MachineSetup { vehicle, model, config } = machine;
-            let Knowledge { belief, checkpoint } = &self.knowledge;
-            let assessor = Assessor::new(vehicle, &model.limits, config, belief, self.level)?;
-            self.maker = Some((key.epoch_ns, RiskMaker::new(assessor, self.number, *checkpoint)));
+            let Some(belief) = self.knowledge.of(header.checkpoint, records) else {
+                return Ok(Err(Unmade { what: format!("networks {:016x}", header.checkpoint) }));
+            };
+            let assessor = Assessor::new(vehicle, &model.limits, config, &belief, self.level)?;
+            match &mut self.maker {
+                Some((_, maker)) if !is_new => maker.judge_by(assessor, header.checkpoint),
+                _ => {
+                    let maker = RiskMaker::new(assessor, self.number, header.checkpoint);
+                    self.maker = Some((key.epoch_ns, maker));
+                }
+            }
         }
         let Some((_, maker)) = &mut self.maker else { return Ok(Err(Unmade { what: String::new() })) };
         maker.set_goal(header.goal_m);

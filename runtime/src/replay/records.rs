@@ -1,19 +1,23 @@
 //! The messages of a recording, each under its name.
 
 use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
 use std::fs::File;
 use std::io::BufReader;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use bytemuck::AnyBitPattern;
+use evidential::Checkpoint;
 use mcap::io::MessageReader;
 use mcap::sans_io::LinearReaderOptions;
 
 use crate::channel::Header;
 use crate::message::{
-    DecisionRecord, OdometryRecord, PointRecord, RiskHeader, ScanHeader, Source, Stamp, StuckRecord,
-    SurfaceHeader,
+    CheckpointHeader, DecisionRecord, OdometryRecord, PointRecord, RiskHeader, ScanHeader, Source, Stamp,
+    StuckRecord, SurfaceHeader,
 };
+use crate::online::hash_of;
 use crate::recorder::topic;
 use crate::setup::RecordedSetup;
 
@@ -52,6 +56,8 @@ pub struct Records {
     pub stuck: BTreeMap<Key, (Stamp, StuckRecord)>,
     /// Decisions.
     pub decisions: BTreeMap<Key, DecisionRecord>,
+    /// Networks that were learned while driving, by [`RiskHeader::checkpoint`].
+    pub checkpoints: BTreeMap<u64, Arc<Checkpoint>>,
     /// Why reading ended early, if it did.
     pub ended_early: Option<String>,
 }
@@ -118,6 +124,18 @@ impl Records {
                 let (header, _): (SurfaceHeader, Vec<u8>) = split(bytes)?;
                 self.surfaces.insert(header.stamp.source().into(), header);
             }
+            topic::CHECKPOINT => {
+                let (header, bytes): (CheckpointHeader, Vec<u8>) = split(bytes)?;
+                if let Entry::Vacant(place) = self.checkpoints.entry(header.checkpoint) {
+                    let (weights, sidecar) = bytes.split_at_checked(header.n_weight_bytes as usize)?;
+                    let checkpoint = Checkpoint::from_bytes(weights, sidecar).ok()?;
+                    // What it calls itself must be what it is.
+                    if hash_of(&checkpoint).ok()? != header.checkpoint {
+                        return None;
+                    }
+                    place.insert(Arc::new(checkpoint));
+                }
+            }
             topic::RISK | topic::RISK_PHYSICS => {
                 let (header, _): (RiskHeader, Vec<u8>) = split(bytes)?;
                 let author = usize::from(name == topic::RISK_PHYSICS);
@@ -131,6 +149,16 @@ impl Records {
 
 fn put<T>(records: &mut BTreeMap<Key, (Stamp, T)>, (stamp, record): (Stamp, T)) {
     records.insert(stamp.source().into(), (stamp, record));
+}
+
+/// A decision as it stands in a recording under [`topic::DECISION`]; `None` for other bytes.
+pub fn recorded_decision(bytes: &[u8]) -> Option<(Stamp, DecisionRecord)> {
+    one(bytes)
+}
+
+/// Whose a message of a recording is and of when, under any topic of a channel; `None` for other bytes.
+pub fn recorded_stamp(bytes: &[u8]) -> Option<Stamp> {
+    bytemuck::try_pod_read_unaligned(bytes.get(..size_of::<Stamp>())?).ok()
 }
 
 fn one<T: AnyBitPattern>(bytes: &[u8]) -> Option<(Stamp, T)> {
@@ -151,16 +179,6 @@ fn split<H: Header, T: AnyBitPattern>(bytes: &[u8]) -> Option<(H, Vec<T>)> {
 #[cfg(test)]
 mod tests {
     use super::*;
-/// A decision as it stands in a recording under [`topic::DECISION`]; `None` for other bytes.
-pub fn recorded_decision(bytes: &[u8]) -> Option<(Stamp, DecisionRecord)> {
-    one(bytes)
-}
-
-/// Whose a message of a recording is and of when, under any topic of a channel; `None` for other bytes.
-pub fn recorded_stamp(bytes: &[u8]) -> Option<Stamp> {
-    bytemuck::try_pod_read_unaligned(bytes.get(..size_of::<Stamp>())?).ok()
-}
-
 
     #[test]
     fn messages_are_read_back_as_they_were_and_garbage_is_none() {
