@@ -119,7 +119,7 @@ fn a_drive_of_processes_is_recorded_and_made_again_and_what_is_cut_off_is_named(
 fn assert_cut(recording: &Path, folder: &Path) {
     let bytes = std::fs::read(recording).unwrap();
     let cut = folder.join("cut.mcap");
-    std::fs::write(&cut, &bytes[..bytes.len() / 2]).unwrap();
+    std::fs::write(&cut, &bytes[..bytes.len() / 3]).unwrap();
     let (code, found, _) = look("inspect", &cut);
     assert_eq!((code, &found["complete"]), (Some(0), &Value::Bool(false)), "{found}");
     assert!(found["ended_early"].as_str().unwrap().contains("ended"), "{found}");
@@ -134,7 +134,7 @@ fn assert_cut(recording: &Path, folder: &Path) {
 /// A recording without some of its scans: it is named which, and nothing that hangs on them passes as made again.
 fn assert_lost_scans_are_named(recording: &Path, folder: &Path) {
     let thinned = folder.join("thinned.mcap");
-    let n_left_out = leave_out(recording, &thinned, "/channel/scan", 10..12);
+    let n_left_out = leave_out(recording, &thinned, "/channel/scan", 5..7);
     assert_eq!(n_left_out, 2);
     let (code, found, _) = look("inspect", &thinned);
     assert_eq!((code, &found["topics"]["/channel/scan"]["lost"]), (Some(0), &2.into()), "{found}");
@@ -146,7 +146,7 @@ fn assert_lost_scans_are_named(recording: &Path, folder: &Path) {
     assert_eq!(again["first_difference"], Value::Null, "{again}");
 }
 
-/// Copies a recording but for some messages of a topic, by their place in it.
+/// Copies the beginning of a recording but for some messages of a topic, by their place in it.
 fn leave_out(from: &Path, to: &Path, topic: &str, places: std::ops::Range<usize>) -> usize {
     let bytes = std::fs::read(from).unwrap();
     let mut writer = mcap::Writer::new(std::io::BufWriter::new(std::fs::File::create(to).unwrap())).unwrap();
@@ -158,6 +158,9 @@ fn leave_out(from: &Path, to: &Path, topic: &str, places: std::ops::Range<usize>
             if places.contains(&place) {
                 n_left_out += 1;
                 continue;
+            }
+            if place > 2 * places.end {
+                break;
             }
         }
         writer.write(&message).unwrap();
