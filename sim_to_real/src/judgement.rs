@@ -14,6 +14,8 @@ const PRICE_OF_TWO: f64 = 0.24;
 const PRICE_OF_A_SECOND_SENSOR: f64 = 0.15;
 /// Difference in energy that makes one explanation e times as probable as another.
 pub(crate) const TEMPERATURE: f64 = 0.035;
+/// An effect is announced only when nothing at all is this much worse in energy.
+const BEYOND_DOUBT: f64 = 0.06;
 /// Explanations this much less probable than the best are told apart from it.
 const TOLD_APART: f64 = 0.05;
 /// Where the data tell nothing apart, this many names are enough to say so.
@@ -69,7 +71,8 @@ impl Weighed {
             .map(|explanation| (explanation.loss.ln() + price(explanation, null), explanation))
             .collect();
         all.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let best = all[0].1;
+        let is_beyond_doubt = all[0].0 + BEYOND_DOUBT < self.none.loss.ln();
+        let best = if is_beyond_doubt { all[0].1 } else { &self.none };
         let (verdict, announced) = self.verdict(best, null);
         let credible_set = self.credible_set(best);
         Judgement { verdict, announced, ranking: ranking(&all), credible_set }
