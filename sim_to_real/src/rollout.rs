@@ -50,9 +50,14 @@ impl Simulator {
     fn asked(&self, drive: &Drive) -> Vec<[f32; 2]> {
         let mut memory = vec![0.0; self.stepper.n_slots()];
         self.stepper.settle(drive.commands[0], &mut memory);
+        // A speed that was measured is what the sensor made of it.
+        let per_reading = match drive.evidence.speed_input {
+            SpeedInput::Measured => 1.0 / self.sensors.velocity_ratio,
+            SpeedInput::Commanded | SpeedInput::CommandedAcceleration => 1.0,
+        };
         let ask = |(step, command): (usize, &bicycle::Command)| {
-            let command =
-                [command.speed_mps, command.steering_rad].map(|value| Real(Scalar, f64::from(value)));
+            let speed_mps = f64::from(command.speed_mps) * per_reading;
+            let command = [speed_mps, f64::from(command.steering_rad)].map(|value| Real(Scalar, value));
             let reached_speed = Real(Scalar, drive.smooth[VX][step]);
             self.stepper.asked(command, reached_speed, &mut memory, step).map(|value| value.1 as f32)
         };

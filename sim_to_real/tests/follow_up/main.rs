@@ -4,7 +4,7 @@
 
 mod plant;
 
-use bicycle::DriveLog;
+use bicycle::{Column, DriveLog};
 use plant::{NOTHING, Wrong, drive, dull, lively};
 use sim_to_real::{Baseline, Machine, Verdict, design_manoeuvre, diagnose, learned_bound, unseen_effects};
 use std::sync::LazyLock;
@@ -97,4 +97,31 @@ fn from_nothing_nothing_is_learned() {
     let unlearned = sim_to_real::verify(&BASELINE, &machine(), &diagnosis, &heldout).unwrap().errors[1];
     assert_eq!(bound.closed, None);
     assert!(bound.error < 1.1 * unlearned, "{bound:?} {unlearned}");
+}
+
+/// Drives without a commanded speed, whose speed sensor reads too much by a factor.
+fn misread(logs: &[DriveLog], factor: f64) -> Vec<DriveLog> {
+    let rebuilt = |log: &DriveLog| {
+        let mut without = DriveLog::default();
+        for row in log.runs().next().unwrap().drive_rows() {
+            let speed = factor * row.value(Column::Vx);
+            let row = row.with(Column::CmdSpeed, f64::NAN).with(Column::Vx, speed);
+            without.push("", &row).unwrap();
+        }
+        without
+    };
+    logs.iter().map(rebuilt).collect()
+}
+
+/// Where the measured speed drives the model, a sensor that misreads it looks like wheels of another size: of the two
+/// the drives judge the sensor alone, and nothing else may be named.
+#[test]
+fn what_the_columns_cannot_judge_is_not_named() {
+    let nominal = misread(&NOMINAL, 1.0);
+    let baseline = Baseline::calibrate(&machine(), &nominal, &|_| ()).unwrap();
+    let real: Vec<DriveLog> = [70, 71].map(|seed| drive(&lively(24.0, seed), NOTHING, seed)).to_vec();
+    let found = diagnose(&baseline, &machine(), &misread(&real, 1.08)).unwrap().answer("misread");
+    assert_eq!(found.credible_set, ["odom_scale"], "{:?}", found.effects);
+    assert_eq!(found.effects[0].id, "odom_scale");
+    assert!(found.ranking.iter().all(|ranked| ranked.id != "speed_scale" || ranked.score == 0.0));
 }
