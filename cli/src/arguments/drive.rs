@@ -250,8 +250,9 @@ Files written to --out:
   drive.png     terrain with hill shading, risk map, vegetation and obstacles,
                 the path driven coloured by speed, start and goal; below it
                 speed, roll and pitch over time
-  drive.mcap    poses, commands, elevation and risk grids, best rollouts and
-                controller diagnostics; opens in Foxglove
+  drive.mcap    poses, commands, the drive log of what the sensors said, elevation
+                and risk grids, best rollouts and controller diagnostics; opens
+                in Foxglove
   summary.json  outcome, time to goal, path length, largest roll and pitch,
                 control and map milliseconds, stops by reason, and all that is
                 needed to repeat the drive
