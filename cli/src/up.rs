@@ -1,5 +1,7 @@
 //! `surefoot up`: one process of the machine, or all of them.
 
+mod learn;
+mod live;
 mod roles;
 
 use std::ffi::OsString;
@@ -11,7 +13,7 @@ use runtime::channel::{Bus, ChannelError};
 use runtime::status::Role;
 use runtime::supervisor::{RestartPolicy, RunEnd, RunReport, Supervisor};
 
-use crate::arguments::{MapSource, Method, UpArguments};
+use crate::arguments::{MapSource, Method, UpArguments, UpRole};
 use crate::{UsageError, WorkFailed, failure, interrupt};
 
 pub(crate) fn run(arguments: &UpArguments) -> anyhow::Result<()> {
@@ -22,6 +24,7 @@ pub(crate) fn run(arguments: &UpArguments) -> anyhow::Result<()> {
             tell_panics_in_one_line(role);
             roles::run(arguments, role).map_err(refused)
         }
+        None if arguments.role == UpRole::Live => live::run(arguments),
         None => supervise(arguments),
     }
 }
@@ -66,6 +69,7 @@ fn supervise(arguments: &UpArguments) -> anyhow::Result<()> {
         command.stdout(std::process::Stdio::null());
         command
     };
+    let _live = arguments.live.map(|_| live::Viewer::start(&program, &words)).transpose()?;
     let bus = Bus::join(&arguments.run)?;
     let mut supervisor = Supervisor::new(&bus, &Role::ALL, RestartPolicy::default(), &command)?;
     let end = supervisor.run(&interrupt::interrupted, &mut |lines, mission| {

@@ -17,6 +17,14 @@ pub enum RuntimeError {
     /// Learning while driving.
     #[error(transparent)]
     Online(#[from] crate::online::OnlineError),
+    /// The live view.
+    #[error("live view: expected to serve on {address}, found: {problem}")]
+    Live {
+        /// Host and port.
+        address: String,
+        /// What the system said.
+        problem: String,
+    },
     /// Networks that were learned cannot be kept.
     #[error(transparent)]
     Checkpoint(#[from] evidential::CheckpointError),

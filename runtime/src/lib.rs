@@ -12,6 +12,7 @@ mod error;
 pub mod frame;
 pub mod layout;
 pub mod learning;
+pub mod live;
 pub mod mapping;
 pub mod message;
 pub mod online;

@@ -1,11 +1,16 @@
 //! `surefoot up`.
 
+use std::net::SocketAddr;
+
 use clap::{Args, ValueEnum};
 use runtime::channel::RunName;
 use runtime::status::Role;
 
 use super::DriveArguments;
 use super::values;
+
+/// Where the live view is served: on this machine, at the port that Foxglove looks for.
+pub const LIVE_DEFAULT: &str = "127.0.0.1:8765";
 
 /// What to run, and for which machine.
 #[derive(Args, Clone, Debug)]
@@ -33,6 +38,29 @@ pub struct UpArguments {
     #[arg(long, help_heading = "Processes")]
     pub realtime: bool,
 
+    /// Serve a live view to Foxglove, by a process of its own: poses, maps, commands, the way to the goal, statuses
+    ///
+    /// Open it with "Open connection", Foxglove WebSocket, ws://127.0.0.1:8765. A slow client loses frames; nothing waits
+    /// for one. There is no password: an address that others can reach shows them everything.
+    #[arg(long, value_name = "HOST:PORT", num_args = 0..=1, require_equals = true,
+          default_missing_value = LIVE_DEFAULT, help_heading = "Live view")]
+    pub live: Option<SocketAddr>,
+
+    /// Go on learning from the drive; networks that prove better are used and kept in OUT/learned
+    ///
+    /// What the vehicle does over what is asked of it becomes labels, as with `surefoot collect`; networks are fitted to
+    /// them in the background, at the lowest priority. They are used when they are better on stretches of the drive that
+    /// nothing is learned from, by more than the standard error, and at most 2 % worse on the original validation data;
+    /// else they are dropped, and those that prove worse later are rolled back. Left out, a drive knows what it knew at
+    /// its start, and the same processes drive alike every time. Needs a --method with networks.
+    #[arg(long, help_heading = "Learning")]
+    pub learn: bool,
+
+    /// Data that the networks were chosen by, as `surefoot collect --split validation` leaves them [default: a sample
+    /// that comes with the program, for its own networks]
+    #[arg(long, value_name = "FILE", help_heading = "Learning")]
+    pub validation: Option<std::path::PathBuf>,
+
     /// Set for the processes that `--role all` starts: end when it does
     #[arg(long, hide = true)]
     pub supervised: bool,
@@ -57,13 +85,15 @@ pub enum UpRole {
     Control,
     /// Everything into a recording
     Recorder,
+    /// The live view that `--live` serves
+    Live,
 }
 
 impl UpRole {
-    /// The one process; `None` for all.
+    /// The one part of the machine; `None` for all, and for the view of it.
     pub fn role(self) -> Option<Role> {
         match self {
-            Self::All => None,
+            Self::All | Self::Live => None,
             Self::Plant => Some(Role::Plant),
             Self::Mapping => Some(Role::Mapping),
             Self::Learning => Some(Role::Learning),

@@ -6,6 +6,7 @@ use runtime::channel::Bus;
 use runtime::control::{self, ControlSetup};
 use runtime::learning::{self, LearningSetup};
 use runtime::mapping::{self, MappingSetup};
+use runtime::online::Told;
 use runtime::plant::{self, PlantReport, PlantSetup};
 use runtime::realtime;
 use runtime::recorder::{self, RecorderSetup};
@@ -18,6 +19,7 @@ use sha2::{Digest, Sha256};
 use std::sync::Arc;
 use traversability::CvarLevel;
 
+use super::learn;
 use crate::arguments::UpArguments;
 use crate::drive::scene::{self, Machine};
 use crate::summary::revision;
@@ -30,6 +32,7 @@ const STANDING_MAX_S: f64 = 30.0;
 pub(super) fn prepare(arguments: &UpArguments) -> Result<(), UsageError> {
     let machine = scene::machine(&arguments.drive)?;
     scene::task(&arguments.drive, &machine.vehicle)?;
+    learn::school(arguments, &machine)?;
     Ok(())
 }
 
@@ -63,7 +66,14 @@ pub(super) fn run(arguments: &UpArguments, role: Role) -> anyhow::Result<()> {
                 level: level(arguments)?,
                 limits: machine.model.limits,
             };
-            learning::run(&Bus::join(&arguments.run)?, &setup, is_over)?;
+            let bus = Bus::join(&arguments.run)?;
+            match learn::school(arguments, &machine)? {
+                None => learning::run(&bus, &setup, is_over)?,
+                Some(school) => {
+                    let tell = &mut |told: Told<'_>| learn::tell(told, &arguments.drive.out);
+                    learning::run_and_learn(&bus, &setup, school, is_over, tell)?;
+                }
+            }
         }
         Role::Control => {
             let Machine { model, mut config, .. } = machine;

@@ -7,28 +7,24 @@ mod json;
 mod raw;
 mod read;
 mod scene;
+mod topics;
 mod watched_file;
 
 use std::collections::BTreeMap;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
 use bicycle::{Command, Decision, DriveRow};
-use foxglove::messages::{
-    FrameTransform, Grid, PointCloud, PoseInFrame, PosesInFrame, SceneUpdate, Timestamp,
-};
-use foxglove::{
-    Channel, Context, Encode, FoxgloveError, McapCompression, McapWriteOptions, McapWriterHandle,
-};
+use foxglove::messages::Timestamp;
+use foxglove::{Context, FoxgloveError, McapCompression, McapWriteOptions, McapWriterHandle};
 use serde::Serialize;
 use terrain::{GridMap, Pose, Scan, SurfaceCell};
 use traversability::RiskMapView;
 
-use drive_row::DriveLogRow;
-use json::JsonChannels;
 use raw::RawChannels;
 use watched_file::{Fault, WatchedFile};
+
+pub use topics::DriveTopics;
 
 pub use read::{McapDriveLog, McapReadError, read_drive_log_mcap};
 
@@ -78,41 +74,8 @@ pub struct DriveRecorder {
     writer: McapWriterHandle<WatchedFile>,
     fault: Fault,
     flushed_at_ns: Option<u64>,
-    channels: Channels,
-    json: JsonChannels,
+    topics: DriveTopics,
     raw: RawChannels,
-}
-
-/// Topics under Foxglove's schemas.
-struct Channels {
-    transform: Channel<FrameTransform>,
-    pose: Channel<PoseInFrame>,
-    goal: Channel<PoseInFrame>,
-    path: Channel<PosesInFrame>,
-    rollouts: Channel<SceneUpdate>,
-    elevation: Channel<Grid>,
-    risk: Channel<Grid>,
-    scan: Channel<PointCloud>,
-    drive_log: Channel<DriveLogRow>,
-}
-
-impl Channels {
-    fn new(context: &Arc<Context>) -> Self {
-        fn channel<T: Encode>(context: &Arc<Context>, topic: &str) -> Channel<T> {
-            context.channel_builder(topic).build()
-        }
-        Self {
-            transform: channel(context, "/tf"),
-            pose: channel(context, "/pose"),
-            goal: channel(context, "/goal"),
-            path: channel(context, "/path"),
-            rollouts: channel(context, "/rollouts"),
-            elevation: channel(context, "/elevation"),
-            risk: channel(context, "/risk"),
-            scan: channel(context, "/scan"),
-            drive_log: channel(context, drive_row::TOPIC),
-        }
-    }
 }
 
 impl DriveRecorder {
@@ -141,51 +104,49 @@ impl DriveRecorder {
         let writer = context.mcap_writer_with_options(options).create(file).map_err(problem)?;
         writer.write_metadata("surefoot", about).map_err(problem)?;
         writer.flush().map_err(problem)?;
-        let channels = Channels::new(&context);
-        let (json, raw) = (JsonChannels::new(Arc::clone(&context)), RawChannels::new(context));
-        Ok(Self { path: path.to_owned(), writer, fault, flushed_at_ns: None, channels, json, raw })
+        let (topics, raw) = (DriveTopics::new(&context), RawChannels::new(context));
+        Ok(Self { path: path.to_owned(), writer, fault, flushed_at_ns: None, topics, raw })
     }
 
     /// Where the vehicle is. Errors, here and below: [`RecordError::Write`].
     pub fn pose(&mut self, at_ns: u64, pose: &Pose) -> Result<(), RecordError> {
-        self.channels.transform.log_with_time(&scene::transform(at_ns, pose), at_ns);
-        self.channels.pose.log_with_time(&scene::pose_in_frame(at_ns, pose), at_ns);
+        self.topics.pose(at_ns, pose);
         self.wrote(at_ns)
     }
 
     /// Where the vehicle should go.
     pub fn goal(&mut self, at_ns: u64, pose: &Pose) -> Result<(), RecordError> {
-        self.channels.goal.log_with_time(&scene::pose_in_frame(at_ns, pose), at_ns);
+        self.topics.goal(at_ns, pose);
         self.wrote(at_ns)
     }
 
     /// Where the vehicle has been.
     pub fn path(&mut self, at_ns: u64, poses: &[Pose]) -> Result<(), RecordError> {
-        self.channels.path.log_with_time(&scene::poses_in_frame(at_ns, poses), at_ns);
+        self.topics.path(at_ns, poses);
         self.wrote(at_ns)
     }
 
     /// Rolled-out futures as points of the map frame [m], best first.
     pub fn rollouts(&mut self, at_ns: u64, best_first: &[Vec<[f64; 3]>]) -> Result<(), RecordError> {
-        self.channels.rollouts.log_with_time(&scene::rollouts(at_ns, best_first), at_ns);
+        self.topics.rollouts(at_ns, best_first);
         self.wrote(at_ns)
     }
 
     /// What the vehicle knows of the ground.
     pub fn elevation(&mut self, at_ns: u64, map: &GridMap<SurfaceCell>) -> Result<(), RecordError> {
-        self.channels.elevation.log_with_time(&grids::elevation(at_ns, map), at_ns);
+        self.topics.elevation(at_ns, map);
         self.wrote(at_ns)
     }
 
     /// The risk map at the yaw bin that holds `yaw_rad`, usually the vehicle's.
     pub fn risk(&mut self, at_ns: u64, map: &RiskMapView<'_>, yaw_rad: f64) -> Result<(), RecordError> {
-        self.channels.risk.log_with_time(&grids::risk(at_ns, map, yaw_rad), at_ns);
+        self.topics.risk(at_ns, map, yaw_rad);
         self.wrote(at_ns)
     }
 
     /// A sweep of the range sensor, in the body frame.
     pub fn scan(&mut self, at_ns: u64, scan: &Scan) -> Result<(), RecordError> {
-        self.channels.scan.log_with_time(&scene::point_cloud(at_ns, scan), at_ns);
+        self.topics.scan(at_ns, scan);
         self.wrote(at_ns)
     }
 
@@ -207,7 +168,7 @@ impl DriveRecorder {
 
     /// One row of the drive log, which [`read_drive_log_mcap`] finds again bit by bit.
     pub fn drive_row(&mut self, at_ns: u64, run: &str, row: &DriveRow) -> Result<(), RecordError> {
-        self.channels.drive_log.log_with_time(&DriveLogRow::new(run, row), at_ns);
+        self.topics.drive_row(at_ns, run, row);
         self.wrote(at_ns)
     }
 
@@ -251,8 +212,7 @@ impl DriveRecorder {
     }
 
     fn json(&mut self, topic: &'static str, at_ns: u64, value: &impl Serialize) -> Result<(), RecordError> {
-        let logged = self.json.log(topic, at_ns, value);
-        logged.map_err(|problem| RecordError::NoJson { topic, problem })?;
+        self.topics.json(topic, at_ns, value)?;
         self.wrote(at_ns)
     }
 
