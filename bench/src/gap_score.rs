@@ -42,7 +42,7 @@ pub struct Score {
     pub n_cases: usize,
     /// Shares of right answers.
     pub shares: Vec<Share>,
-    /// First names of single effects by size, style, plant and effect.
+    /// First names of single effects by size, style, whether the gap is seen on held-out drives, plant and effect.
     pub first_names_by: Vec<Share>,
     /// Number of explanations in the credible set of single effects.
     pub credible_set_size: Quantiles,

@@ -62,7 +62,7 @@ pub(super) fn overall(hits: &[Hit]) -> Vec<Share> {
     ]
 }
 
-/// First names of single effects by size, style, plant and effect.
+/// First names of single effects by size, style, whether the gap is seen on held-out drives, plant and effect.
 pub(super) fn broken_down(hits: &[Hit]) -> Vec<Share> {
     let mut groups: BTreeMap<(usize, String), Vec<bool>> = BTreeMap::new();
     for hit in hits {
@@ -70,6 +70,7 @@ pub(super) fn broken_down(hits: &[Hit]) -> Vec<Share> {
         let keys = [
             format!("size {}", hit.magnitude),
             format!("style {}", hit.style),
+            format!("gap on held-out drives {}", if hit.closed.is_some() { "seen" } else { "within noise" }),
             format!("plant {}", hit.plant),
             hit.truth.concat(),
         ];
