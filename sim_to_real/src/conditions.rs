@@ -28,6 +28,11 @@ pub(crate) const MEASURED: [Condition; 9] = [
     Condition::Heading,
 ];
 
+/// Place of the speed among them.
+const SPEED: usize = 0;
+/// Quantities along the vehicle: what is short of its speed is short in these.
+const LONGITUDINAL: [usize; 2] = [0, 3];
+
 /// A rollout's conditions and residuals.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -103,7 +108,12 @@ fn values(drive: &Drive, start: usize, steps: usize) -> [f64; MEASURED.len()] {
 pub(crate) fn condition_tables(real: &[StartRecord], null: &[StartRecord]) -> Vec<ConditionTable> {
     let mut tables: Vec<ConditionTable> =
         (0..MEASURED.len()).filter_map(|place| condition_table(place, real, null)).collect();
-    tables.push(constant_table(real, null));
+    let mut constant = constant_table(real, null);
+    let with_speed = share_in_proportion_to_speed(real);
+    constant.share -= with_speed;
+    tables.push(constant);
+    let of_speed = tables.iter_mut().find(|table| table.condition == Condition::Speed);
+    of_speed.into_iter().for_each(|table| table.share += with_speed);
     tables.sort_by(|a, b| b.share.total_cmp(&a.share));
     tables
 }
@@ -159,6 +169,22 @@ fn constant_table(real: &[StartRecord], null: &[StartRecord]) -> ConditionTable 
         null_share,
         bins: Vec::new(),
     }
+}
+
+/// The constant share that belongs to the speed: of the quantities along the vehicle whose residual is in proportion to
+/// the speed rather than the same at every speed, as that of a wheel of another size is.
+fn share_in_proportion_to_speed(records: &[StartRecord]) -> f64 {
+    let all: Vec<&Window> = windows(records).collect();
+    let along = |quantity: usize| {
+        let sum = |of: &dyn Fn(f64, f64) -> f64| {
+            all.iter().map(|window| of(window.residual[quantity], window.values[SPEED])).sum::<f64>()
+        };
+        let the_same = sum(&|residual, _| residual).powi(2) / all.len().max(1) as f64;
+        let in_proportion = sum(&|residual, speed| residual * speed).powi(2)
+            / sum(&|_, speed| speed * speed).max(f64::MIN_POSITIVE);
+        if in_proportion > the_same { the_same } else { 0.0 }
+    };
+    LONGITUDINAL.into_iter().map(along).sum::<f64>() / squares(&all).max(f64::MIN_POSITIVE)
 }
 
 /// The share of the squared residual that the means of bins make beyond the mean of all.

@@ -80,3 +80,24 @@ fn an_offset_is_everywhere_the_same_and_in_no_condition() {
     assert!((tables[0].share - 25.0 / 30.0).abs() < 0.02, "{}", tables[0].share);
     assert!(tables[1].share < 0.01, "{tables:?}");
 }
+
+/// A wheel of another size is off in proportion to the speed, a drag by the same at every speed: both have a mean, and
+/// the first belongs to the speed. With speeds of 3 +- 1 the square of 2 v is 4 (9 + 1), of 6 it is 36; noise adds 5.
+#[test]
+fn a_shortfall_in_proportion_to_the_speed_belongs_to_the_speed() {
+    let off = |shortfall: fn(f64) -> f64| {
+        let mut real = records(600, 9, |_| 0.0);
+        for window in real.iter_mut().flat_map(|record| &mut record.windows) {
+            window.values[0] += 3.0;
+            window.residual[0] += shortfall(window.values[0]);
+        }
+        let tables = condition_tables(&real, &records(600, 10, |_| 0.0));
+        (tables[0].condition, tables[0].share, tables[1].share)
+    };
+    let (condition, share, next) = off(|speed| 2.0 * speed);
+    assert_eq!(condition, Condition::Speed);
+    assert!((share - 40.0 / 45.0).abs() < 0.03 && next < 0.02, "{share} {next}");
+    let (condition, share, next) = off(|_| 6.0);
+    assert_eq!(condition, Condition::Constant);
+    assert!((share - 36.0 / 41.0).abs() < 0.03 && next < 0.02, "{share} {next}");
+}
