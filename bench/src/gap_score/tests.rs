@@ -2,7 +2,7 @@ use std::collections::BTreeMap;
 
 use formats::GapKind;
 use serde_json::json;
-use sim_to_real::{Condition, Estimate, NamedEffect, Place, Ranked, Shrink, Verdict};
+use sim_to_real::{Condition, Estimate, NamedEffect, Place, Ranked, Shrink, Steering, Verdict};
 
 use super::*;
 
@@ -22,6 +22,7 @@ fn answer(verdict: Verdict, announced: &[&str], ranking: &[(&str, f64)]) -> Answ
     let named = |id: &&str| NamedEffect { id: (*id).to_owned(), form: None, parameters: BTreeMap::new() };
     Answer {
         case: "c".to_owned(),
+        steering: Steering::Angle,
         verdict,
         effects: announced.iter().map(named).collect(),
         ranking: ranking.iter().map(|(id, score)| Ranked { id: (*id).to_owned(), score: *score }).collect(),
