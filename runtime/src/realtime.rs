@@ -3,7 +3,7 @@
 use rustix::mm::{MlockAllFlags, mlockall};
 use rustix::thread::{CpuSet, sched_getaffinity, sched_setaffinity};
 use thread_priority::{
-    RealtimeThreadSchedulePolicy, ThreadPriority, ThreadPriorityValue, ThreadSchedulePolicy,
+    Error, RealtimeThreadSchedulePolicy, ThreadPriority, ThreadPriorityValue, ThreadSchedulePolicy,
     set_thread_priority_and_policy, thread_native_id,
 };
 
@@ -59,9 +59,11 @@ fn scheduled(role: Role) -> String {
     let fifo = ThreadSchedulePolicy::Realtime(RealtimeThreadSchedulePolicy::Fifo);
     match set_thread_priority_and_policy(thread_native_id(), ThreadPriority::Crossplatform(value), fifo) {
         Ok(()) => format!("SCHED_FIFO {level}"),
-        Err(error) => {
-            format!("no SCHED_FIFO: {error:?}; it takes CAP_SYS_NICE or a limit `rtprio` of {level}")
+        Err(Error::OS(code)) => {
+            let error = std::io::Error::from_raw_os_error(code);
+            format!("no SCHED_FIFO: {error}; it takes CAP_SYS_NICE or a limit `rtprio` of {level}")
         }
+        Err(error) => format!("no SCHED_FIFO: {error:?}"),
     }
 }
 

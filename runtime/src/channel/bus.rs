@@ -78,6 +78,9 @@ impl Bus {
         // Failures come back as values; what else it says is for its own developers.
         set_log_level(LogLevel::Fatal);
         let refused = |problem: String| ChannelError::Join { run: run.to_string(), problem };
+        // Of the reasons why it may fail, this one has a name: another user's folder.
+        let folder = run.folder();
+        std::fs::create_dir_all(&folder).map_err(|error| refused(format!("{folder}: {error}")))?;
         let config = config(run).map_err(refused)?;
         let builder = NodeBuilder::new().config(&config).signal_handling_mode(SignalHandlingMode::Disabled);
         let node = builder.create::<ipc::Service>().map_err(|error| refused(error.to_string()))?;

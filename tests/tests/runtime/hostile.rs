@@ -93,6 +93,24 @@ fn broken_commands_never_come_through() {
 }
 
 #[test]
+fn what_is_older_than_what_was_taken_does_not_count_again() {
+    let run = Run::new();
+    let bus = Bus::join(&run.name).unwrap();
+    let mut inlet = bus.inlet(&COMMAND).unwrap();
+    let hostile = Hostile::new(&run.name, &COMMAND, 1);
+    let drive = CommandRecord { speed_mps: 1.0, decision: 1, ..CommandRecord::default() };
+    let first = stamp(7);
+    let earlier = |stamp: Stamp| Stamp { valid_at_ns: first.valid_at_ns - 1, ..stamp };
+    for (stamp, received, out_of_order) in
+        [(first, 1, 0), (first, 1, 1), (stamp(6), 1, 2), (earlier(stamp(8)), 1, 3), (stamp(9), 2, 3)]
+    {
+        hostile.send(stamp, &[drive]);
+        let counts = polled(&mut inlet);
+        assert_eq!((counts.received, counts.of(Refusal::OutOfOrder)), (received, out_of_order), "{stamp:?}");
+    }
+}
+
+#[test]
 fn maps_with_huge_counts_and_wrong_lengths_never_come_through() {
     let run = Run::new();
     let bus = Bus::join(&run.name).unwrap();

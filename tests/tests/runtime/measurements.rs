@@ -6,6 +6,7 @@ use runtime::mapping::JUMPED;
 use runtime::message::SurfaceHeader;
 use runtime::payload::numbers_cell;
 use rustix::process::Signal;
+use terrain::Cell;
 
 use crate::driver::{Driver, Misbehaviour};
 use crate::fixture::{Run, eventually};
@@ -66,9 +67,18 @@ fn command_of(record: &runtime::message::DecisionRecord) -> Option<Decision> {
     record.command.decision()
 }
 
-/// Cells of a surface message that are known.
-fn n_known(cells: &[[f32; 8]]) -> usize {
-    cells.iter().filter(|numbers| numbers_cell(numbers).unwrap().is_known()).count()
+/// How many cells of a surface message are known, and the middle of these, east and north [m].
+fn known(header: &SurfaceHeader, cells: &[[f32; 8]]) -> (usize, [f64; 2]) {
+    let grid = header.grid.geometry().unwrap();
+    let is_known = |(_, numbers): &(usize, &[f32; 8])| numbers_cell(numbers).unwrap().is_known();
+    let place_m = |index: usize| {
+        let Cell { row, col } = grid.cell(index);
+        [(grid.origin[0], col), (grid.origin[1], row)]
+            .map(|(first, k)| grid.resolution_m * (first + k as i64) as f64)
+    };
+    let places: Vec<[f64; 2]> = cells.iter().enumerate().filter(is_known).map(|(k, _)| place_m(k)).collect();
+    let mean = |axis: usize| places.iter().map(|place_m| place_m[axis]).sum::<f64>() / places.len() as f64;
+    (places.len(), [mean(0), mean(1)])
 }
 
 #[test]
@@ -82,24 +92,26 @@ fn a_localisation_that_jumps_moves_the_map_and_not_the_vehicle() {
     witness.until_driving("all is well");
 
     // Mapping follows: what was known is known, elsewhere.
-    let mut n_before = 0;
-    let mut jumped: Option<(SurfaceHeader, usize)> = None;
+    let mut before = (0, [0.0; 2]);
+    let mut jumped = None;
     let mut offset_m = [6.0, -9.0];
-    surfaces.poll(|_, cells| n_before = n_known(cells));
     driver.behave(Misbehaviour { offset_m, ..Misbehaviour::default() });
     eventually(60.0, || {
         surfaces.poll(|header, cells| match header.event {
-            JUMPED => jumped = Some((*header, n_known(cells))),
-            _ if jumped.is_none() => n_before = n_known(cells),
+            JUMPED => jumped = Some((*header, known(header, cells))),
+            _ if jumped.is_none() => before = known(header, cells),
             _ => {}
         });
         jumped
     });
-    let (header, n_after) = jumped.expect("mapping makes out the jump");
+    let (header, after) = jumped.expect("mapping makes out the jump");
     for axis in [0, 1] {
+        let moved_m = after.1[axis] - before.1[axis];
         assert!((header.jump_m[axis] - offset_m[axis]).abs() < 0.2, "{:?}", header.jump_m);
+        // To whole cells of half a metre.
+        assert!((moved_m - offset_m[axis]).abs() < 0.6, "{before:?} became {after:?}");
     }
-    assert!(10 * n_after > 7 * n_before, "of {n_before} cells {n_after} are left");
+    assert!(10 * after.0 > 9 * before.0, "of {} cells {} are left", before.0, after.0);
 
     // Control drives on meanwhile, on the map of before, laid where it belongs.
     let has_driven = (0..ATTEMPTS).any(|_| {
