@@ -125,7 +125,9 @@ pub(crate) fn places(tables: &[ConditionTable]) -> Vec<Place> {
 }
 
 fn condition_table(place: usize, real: &[StartRecord], null: &[StartRecord]) -> Option<ConditionTable> {
-    let edges = quantiles(windows(real).map(|window| window.values[place]).collect());
+    let values = windows(real).map(|window| window.values[place]).collect();
+    let edges =
+        if MEASURED[place] == Condition::TerrainClass { between_classes(values) } else { quantiles(values) };
     if edges.len() < 3 {
         return None;
     }
@@ -234,6 +236,12 @@ fn quantiles(mut values: Vec<f64>) -> Vec<f64> {
     let mut edges: Vec<f64> = (0..=N_BINS).map(|k| values[last * k / N_BINS]).collect();
     edges.dedup();
     edges
+}
+
+/// Edges half way between the numbers of the classes.
+fn between_classes(values: Vec<f64>) -> Vec<f64> {
+    let last = values.into_iter().fold(0.0, f64::max).round() as u8;
+    (0..=u16::from(last) + 1).map(|class| f64::from(class) - 0.5).collect()
 }
 
 /// The bin of a value; what lies outside belongs to the nearest.
