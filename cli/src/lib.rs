@@ -30,6 +30,7 @@ pub use failure::{UsageError, WorkFailed};
 
 /// Runs the command line of this process.
 pub fn run() -> ExitCode {
+    be_quiet_when_nobody_reads();
     let result = match Arguments::try_parse() {
         Ok(arguments) => dispatch(arguments.command),
         Err(error) => answer(&error),
@@ -41,6 +42,17 @@ pub fn run() -> ExitCode {
             failure::exit_code(&error)
         }
     }
+}
+
+/// A reader that goes away early, as `head` does, ends a command; that is nothing to report.
+fn be_quiet_when_nobody_reads() {
+    let report_panic = std::panic::take_hook();
+    std::panic::set_hook(Box::new(move |panic| {
+        let message = panic.payload().downcast_ref::<String>();
+        if !message.is_some_and(|message| message.starts_with("failed printing to stdout")) {
+            report_panic(panic);
+        }
+    }));
 }
 
 fn dispatch(command: Command) -> anyhow::Result<()> {
