@@ -9,12 +9,13 @@ use bytemuck::NoUninit;
 
 use crate::RuntimeError;
 use crate::channel::{
-    Bus, CHECKPOINT, COMMAND, DECISION, Header, Inlet, MISSION, ODOMETRY, RISK, RISK_PHYSICS, SCAN, STUCK, SURFACE,
+    Bus, CHECKPOINT, COMMAND, DECISION, Header, Inlet, MISSION, ODOMETRY, RISK, RISK_PHYSICS, SCAN, STUCK,
+    SURFACE,
 };
 use crate::clock::{self, SECOND_NS};
 use crate::message::{
-    CheckpointHeader, CommandRecord, DecisionRecord, MissionRecord, OdometryRecord, PointRecord, RiskHeader, ScanHeader, Stamp,
-    StuckRecord, SurfaceHeader,
+    CheckpointHeader, CommandRecord, DecisionRecord, MissionRecord, OdometryRecord, PointRecord, RiskHeader,
+    ScanHeader, Stamp, StuckRecord, SurfaceHeader,
 };
 use crate::setup::RecordedSetup;
 use crate::status::{Health, Meter, Role};

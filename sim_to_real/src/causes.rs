@@ -1,6 +1,6 @@
 //! Causes: effects of the catalogue added to the calibrated model, fitted to real drives.
 
-use crate::calibration::{coordinate, value_at, with_values};
+use crate::calibration::{coordinate, is_limit, with_values};
 use crate::comparison::Comparison;
 use crate::least_squares::fit;
 use bicycle::Effect;
@@ -151,13 +151,12 @@ fn bracket(description: &Description, value: f64) -> (f64, f64) {
     let middle = coordinate(parameter, value, None).start;
     let (first, last) = (marks[0], marks[marks.len() - 1]);
     let reach = last - first;
-    if !crate::calibration::is_limit(parameter) {
+    if !is_limit(parameter) {
         marks.push(parameter.neutral);
     }
     marks.extend([first - reach, last + reach]);
     let ends = coordinate(parameter, value, None);
     let below = marks.iter().copied().filter(|&mark| mark < middle - 1e-9).fold(f64::NEG_INFINITY, f64::max);
     let above = marks.iter().copied().filter(|&mark| mark > middle + 1e-9).fold(f64::INFINITY, f64::min);
-    let _ = value_at;
     (below.max(ends.low), above.min(ends.high))
 }

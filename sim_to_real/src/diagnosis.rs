@@ -92,20 +92,12 @@ impl Baseline {
 
 fn judged(baseline: &Baseline, trial: &Trial<'_>) -> Judgement {
     let none = Explanation { causes: Vec::new(), loss: trial.loss(&[]) };
-    let mut singles = single_explanations(trial);
-    singles.retain(|single| is_judged(trial, single));
+    let singles = single_explanations(trial);
     let mut weighed = Weighed { none, pairs: Vec::new(), singles };
     if weighed.may_hold_pairs(&baseline.null) {
         weighed.pairs = pairs(trial, &weighed.singles);
-        weighed.pairs.retain(|pair| is_judged(trial, pair));
     }
     weighed.judge(&baseline.null)
-}
-
-/// Whether the drives hold what tells these causes from their inputs: where the measured speed drives the model, an
-/// effect on the speed would stand for one in the sensors.
-fn is_judged(trial: &Trial<'_>, explanation: &Explanation) -> bool {
-    explanation.causes.iter().all(|cause| trial.comparison.judges(cause.description().id))
 }
 
 /// What is closed on each half of the real drives by the parameters that the other half gives.

@@ -1,16 +1,23 @@
 //! Which explanations there are, and how much each is to be believed.
 
 use crate::causes::{Explanation, Trial, candidates};
+use bicycle::effect::Description;
 
 /// Seconds are sought beside this many of the best singles.
 const N_FIRSTS: usize = 3;
 /// Pairs that are fitted together.
 const N_REFINED: usize = 5;
 
+/// Causes that the drives can judge: where the measured speed drives the model, an effect on the speed would stand for one
+/// in the sensors.
+fn judged(trial: &Trial<'_>) -> impl Iterator<Item = &'static Description> {
+    candidates().filter(|description| trial.comparison.judges(description.id))
+}
+
 /// Every effect alone, best first.
 pub(crate) fn single_explanations(trial: &Trial<'_>) -> Vec<Explanation> {
     let alone = |description| trial.with_one_more(&[], description);
-    let mut singles: Vec<Explanation> = candidates().filter_map(alone).collect();
+    let mut singles: Vec<Explanation> = judged(trial).filter_map(alone).collect();
     singles.sort_by(|a, b| a.loss.total_cmp(&b.loss));
     best_forms(singles)
 }
@@ -52,6 +59,6 @@ pub(crate) fn pairs(trial: &Trial<'_>, singles: &[Explanation]) -> Vec<Explanati
 /// An explanation with every other effect added.
 pub(crate) fn with_a_second(trial: &Trial<'_>, first: &Explanation) -> Vec<Explanation> {
     let known = first.ids();
-    let others = candidates().filter(|description| !known.contains(&description.cause));
+    let others = judged(trial).filter(|description| !known.contains(&description.cause));
     others.filter_map(|description| trial.with_one_more(&first.causes, description)).collect()
 }
