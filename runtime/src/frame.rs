@@ -9,9 +9,16 @@ use terrain::GridGeometry;
 const JUMPS_KEPT: usize = 64;
 
 /// The jumps of late, by which older maps are still to be moved.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub struct Frame {
     jumps: VecDeque<(u64, [f64; 2])>,
+}
+
+impl Default for Frame {
+    /// With room for all jumps that are ever kept: a jump in the control cycle takes no memory.
+    fn default() -> Self {
+        Self { jumps: VecDeque::with_capacity(JUMPS_KEPT) }
+    }
 }
 
 impl Frame {

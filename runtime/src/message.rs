@@ -5,6 +5,7 @@ mod convert;
 use iceoryx2::prelude::ZeroCopySend;
 
 use crate::layout::{RecordLayout, record};
+pub(crate) use convert::drive_row;
 pub use convert::{HOLD_REASONS, STOP_REASONS};
 
 /// Version of everything in this file; messages of another are refused.

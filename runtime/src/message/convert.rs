@@ -1,6 +1,6 @@
 //! Between the messages and what the pipeline is made of.
 
-use bicycle::{Command, Decision, HoldReason, Odometry, StopReason};
+use bicycle::{Column, Command, Decision, DriveRow, HoldReason, Odometry, StopReason};
 use terrain::{GridGeometry, RangePoint, Scan, TerrainClass};
 
 use super::{CommandRecord, Grid, OdometryRecord, PointRecord, ScanHeader, Source, Stamp};
@@ -57,6 +57,28 @@ impl Grid {
             n_cols: n_cols as usize,
         })
     }
+}
+
+/// A row of a drive log: odometry, and the command of its time [m/s], [rad].
+pub(crate) fn drive_row(time_s: f64, odometry: &Odometry, [speed_mps, steering_rad]: [f64; 2]) -> DriveRow {
+    let [x, y, z] = odometry.position_m;
+    let [roll, pitch, yaw] = odometry.attitude_rad;
+    let [vx, vy] = odometry.velocity_mps;
+    [
+        (Column::X, x),
+        (Column::Y, y),
+        (Column::Z, z),
+        (Column::Roll, roll),
+        (Column::Pitch, pitch),
+        (Column::Yaw, yaw),
+        (Column::Vx, vx),
+        (Column::Vy, vy),
+        (Column::Wz, odometry.yaw_rate_radps),
+        (Column::CmdSpeed, speed_mps),
+        (Column::CmdSteer, steering_rad),
+    ]
+    .into_iter()
+    .fold(DriveRow::new(time_s), |row, (column, value)| row.with(column, value))
 }
 
 impl From<&Odometry> for OdometryRecord {

@@ -2,8 +2,10 @@
 
 use std::collections::VecDeque;
 
-use bicycle::{Column, Decision, DriveRow, Odometry};
+use bicycle::{Decision, DriveRow, Odometry};
 use terrain::{GridMap, SurfaceCell};
+
+use crate::message::drive_row;
 
 /// Length of a stretch [s]: short enough for the ground behind the vehicle to be on the map still.
 const STRETCH_S: f64 = 6.0;
@@ -64,7 +66,7 @@ impl Notebook {
             return;
         }
         let began_ns = *self.began_ns.get_or_insert(at_ns);
-        let row = row(at_ns.saturating_sub(began_ns) as f64 * 1e-9, odometry, *command);
+        let row = drive_row(at_ns.saturating_sub(began_ns) as f64 * 1e-9, odometry, *command);
         if self.rows.len() == ROWS_MAX {
             self.rows.pop_front();
         }
@@ -96,30 +98,9 @@ impl Notebook {
     }
 }
 
-fn row(time_s: f64, odometry: &Odometry, [speed_mps, steering_rad]: [f64; 2]) -> DriveRow {
-    let [x, y, z] = odometry.position_m;
-    let [roll, pitch, yaw] = odometry.attitude_rad;
-    let [vx, vy] = odometry.velocity_mps;
-    [
-        (Column::X, x),
-        (Column::Y, y),
-        (Column::Z, z),
-        (Column::Roll, roll),
-        (Column::Pitch, pitch),
-        (Column::Yaw, yaw),
-        (Column::Vx, vx),
-        (Column::Vy, vy),
-        (Column::Wz, odometry.yaw_rate_radps),
-        (Column::CmdSpeed, speed_mps),
-        (Column::CmdSteer, steering_rad),
-    ]
-    .into_iter()
-    .fold(DriveRow::new(time_s), |row, (column, value)| row.with(column, value))
-}
-
 #[cfg(test)]
 mod tests {
-    use bicycle::{Command, StopReason};
+    use bicycle::{Column, Command, StopReason};
     use terrain::GridGeometry;
 
     use super::*;

@@ -6,7 +6,7 @@ use terrain::Pose;
 
 use crate::clock::SECOND_NS;
 use crate::message::{
-    CommandRecord, OdometryRecord, PointRecord, RiskHeader, ScanHeader, Stamp, SurfaceHeader,
+    CommandRecord, OdometryRecord, PointRecord, RiskHeader, ScanHeader, Stamp, SurfaceHeader, drive_row,
 };
 use crate::payload;
 
@@ -111,30 +111,13 @@ fn pose(odometry: &OdometryRecord) -> Pose {
     Pose { x_m, y_m, z_m, roll_rad, pitch_rad, yaw_rad }
 }
 
-fn row(time_s: f64, odometry: &OdometryRecord, decision: &Decision) -> DriveRow {
-    let [x, y, z] = odometry.position_m;
-    let [roll, pitch, yaw] = odometry.attitude_rad;
-    let [vx, vy] = odometry.velocity_mps;
-    let (speed, steer) = match decision {
-        Decision::Drive(command) => (f64::from(command.speed_mps), f64::from(command.steering_rad)),
+fn row(time_s: f64, record: &OdometryRecord, decision: &Decision) -> DriveRow {
+    let command = match decision {
+        Decision::Drive(command) => [f64::from(command.speed_mps), f64::from(command.steering_rad)],
         // The wheels stay as they are while it stops.
-        Decision::Hold(_) | Decision::Stop(_) => (0.0, odometry.steering_rad),
+        Decision::Hold(_) | Decision::Stop(_) => [0.0, record.steering_rad],
     };
-    [
-        (Column::X, x),
-        (Column::Y, y),
-        (Column::Z, z),
-        (Column::Roll, roll),
-        (Column::Pitch, pitch),
-        (Column::Yaw, yaw),
-        (Column::Vx, vx),
-        (Column::Vy, vy),
-        (Column::Wz, odometry.yaw_rate_radps),
-        (Column::CmdSpeed, speed),
-        (Column::CmdSteer, steer),
-        (Column::WheelSpeed, odometry.wheel_speed_mps),
-        (Column::SteerMeas, odometry.steering_rad),
-    ]
-    .into_iter()
-    .fold(DriveRow::new(time_s), |row, (column, value)| row.with(column, value))
+    drive_row(time_s, &record.odometry(0), command)
+        .with(Column::WheelSpeed, record.wheel_speed_mps)
+        .with(Column::SteerMeas, record.steering_rad)
 }
