@@ -105,6 +105,10 @@ macro_rules! catalogue {
                 match self { $(Self::$name(effect) => effect.n_slots(step_s),)* }
             }
 
+            fn held_follows_per_s(&self) -> Option<f64> {
+                match self { $(Self::$name(effect) => effect.held_follows_per_s(),)* }
+            }
+
             fn settled(&self, command: [f64; 2]) -> f64 {
                 match self { $(Self::$name(effect) => effect.settled(command),)* }
             }
@@ -146,6 +150,8 @@ catalogue! {
     speed_lag::SpeedLag,
     accel_limit::AccelLimit,
     speed_loop::SpeedLoop,
+    feed_forward::FeedForward,
+    speed_integral::SpeedIntegral,
     drive_limit::DriveLimit,
     drive_force_limit::DriveForceLimit,
     mass::Mass,

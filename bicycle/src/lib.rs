@@ -12,7 +12,7 @@ mod vehicle;
 pub use decision::{Decision, HoldReason, StopReason};
 pub use drive_log::{Column, DriveLog, DriveLogError, DriveRow, Run};
 pub use effect::{Effect, SensorModel};
-pub use model::{GroundSample, LaneState, Model, ModelError, Rates, Stepper};
+pub use model::{Asked, GroundSample, LaneState, Model, ModelError, Rates, Stepper};
 pub use motion::{Command, ImuSample, Odometry, State};
 pub use vehicle::{
     Axle, Body, Drivetrain, Geometry, Limits, Servo, Suspension, Tyre, Vehicle, VehicleError, Wheel,

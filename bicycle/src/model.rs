@@ -119,6 +119,25 @@ pub struct Rates<L: Lanes> {
     pub yaw_rate: Real<L>,
 }
 
+/// What the command asks of the actuators, once the effects on it have acted.
+#[derive(Clone, Copy)]
+pub struct Asked<L: Lanes> {
+    /// Speed of the drive [m/s].
+    pub speed: Real<L>,
+    /// Angle of the steering [rad], or yaw rate of a skid-steered vehicle [rad/s].
+    pub steering: Real<L>,
+    /// Acceleration that the drive shall give beside what its speed asks for [m/s2].
+    pub acceleration: Real<L>,
+}
+
+impl<L: Lanes> Asked<L> {
+    /// A speed and an angle.
+    #[inline(always)]
+    pub fn of([speed, steering]: [Real<L>; 2]) -> Self {
+        Self { speed, steering, acceleration: speed.0.real(0.0) }
+    }
+}
+
 /// A model made ready for one step length and one unit of length.
 #[derive(Clone, Debug)]
 pub struct Stepper {
@@ -182,6 +201,22 @@ impl Stepper {
         self.effects.recall(past, memory);
     }
 
+    /// Number of accelerations that effects hold against the forces that they met; see [`Stepper::correct_held`].
+    pub fn n_held(&self) -> usize {
+        self.effects.n_held()
+    }
+
+    /// Those accelerations, of all that the memory carries [m/s2].
+    pub fn held<'a, T>(&self, memory: &'a mut [T]) -> &'a mut [T] {
+        self.effects.held(memory)
+    }
+
+    /// Corrects what is held once a step was measured: what makes the vehicle faster than foretold is a force that the
+    /// integral has met and the model has not.
+    pub fn correct_held(&self, memory: &mut [f64], faster_mps: f64) {
+        self.effects.correct_held(memory, faster_mps);
+    }
+
     /// Fills the memory as a command leaves it that was in force for long.
     pub fn settle(&self, command: Command, memory: &mut [f64]) {
         let command = [f64::from(command.speed_mps), f64::from(command.steering_rad)];
@@ -223,7 +258,7 @@ impl Stepper {
         step: usize,
     ) -> Rates<L> {
         let asked = self.asked(command, state.speed, memory, step);
-        self.follow(state, asked, ground)
+        self.follow(state, asked, ground, memory)
     }
 
     /// The first half of a step: what the command asks of the actuators at a speed that was reached, once the effects
@@ -235,11 +270,10 @@ impl Stepper {
         reached_speed: Real<L>,
         memory: &mut [L::Value],
         step: usize,
-    ) -> [Real<L>; 2] {
-        let [speed, steering] = command;
-        let mut asked = CommandStep { speed, steering, reached_speed, step };
-        self.effects.on_command(memory, &mut asked);
-        [asked.speed, asked.steering]
+    ) -> Asked<L> {
+        let mut state = CommandStep { asked: Asked::of(command), reached_speed, step };
+        self.effects.on_command(memory, &mut state);
+        state.asked
     }
 
     /// The second half of a step: the actuators follow what is asked of them, and the body moves.
@@ -247,16 +281,17 @@ impl Stepper {
     pub fn follow<L: Lanes>(
         &self,
         state: &mut LaneState<L>,
-        asked: [Real<L>; 2],
+        asked: Asked<L>,
         ground: &GroundSample<Real<L>>,
+        memory: &mut [L::Value],
     ) -> Rates<L> {
         let lanes = state.x.0;
         let reached_speed = state.speed;
-        self.actuate(state, asked);
+        self.actuate(state, [asked.speed, asked.steering]);
         let tangent = state.steering.tan();
         let per_wheelbase = Real::constant(lanes, self.per_wheelbase);
         let turning = |speed: Real<L>| speed * per_wheelbase * tangent;
-        self.move_body(state, [reached_speed, asked[0], tangent], turning, ground)
+        self.move_body(state, (asked, reached_speed, tangent), turning, (ground, memory))
     }
 
     /// [`Stepper::follow`] for a skid-steered vehicle: the second of what is asked is a yaw rate [rad/s], which is
@@ -265,41 +300,45 @@ impl Stepper {
     pub fn follow_yaw_rate<L: Lanes>(
         &self,
         state: &mut LaneState<L>,
-        asked: [Real<L>; 2],
+        asked: Asked<L>,
         ground: &GroundSample<Real<L>>,
+        memory: &mut [L::Value],
     ) -> Rates<L> {
         let straight = state.x.0.real(0.0);
         let reached_speed = state.speed;
-        self.actuate(state, [asked[0], straight]);
-        self.move_body(state, [reached_speed, asked[0], straight], |_| asked[1], ground)
+        self.actuate(state, [asked.speed, straight]);
+        self.move_body(state, (asked, reached_speed, straight), |_| asked.steering, (ground, memory))
     }
 
-    /// Moves a body whose actuators have acted: `speeds_and_tangent` are the speed before, the speed asked for and the
-    /// tangent of the steering angle; `turning` gives the yaw rate at a speed.
+    /// Moves a body whose actuators have acted, from the speed before and with the tangent of the steering angle;
+    /// `turning` gives the yaw rate at a speed.
     #[inline(always)]
     fn move_body<L: Lanes>(
         &self,
         state: &mut LaneState<L>,
-        speeds_and_tangent: [Real<L>; 3],
+        (asked, reached_speed, steering_tangent): (Asked<L>, Real<L>, Real<L>),
         turning: impl Fn(Real<L>) -> Real<L>,
-        ground: &GroundSample<Real<L>>,
+        (ground, memory): (&GroundSample<Real<L>>, &mut [L::Value]),
     ) -> Rates<L> {
         let lanes = state.x.0;
-        let [reached_speed, asked_speed, steering_tangent] = speeds_and_tangent;
         let (sine, cosine) = state.turns.sin_cos_turns();
         let mut side_acceleration = lanes.real(0.0);
         if self.effects.drive() {
             let mut driving = Driving {
                 acceleration: (state.speed - reached_speed) * Real::constant(lanes, self.per_step),
                 side_acceleration,
-                asked_speed,
+                acceleration_limit: Real::constant(lanes, self.speed_change)
+                    * Real::constant(lanes, self.per_step),
+                asked_speed: asked.speed,
+                asked_acceleration: asked.acceleration,
                 speed: reached_speed,
                 steering_tangent,
                 yaw_rate: turning(reached_speed),
                 heading: [sine, cosine],
                 ground: *ground,
+                held: lanes.real(0.0),
             };
-            self.effects.on_drive(&mut driving);
+            self.effects.on_drive(memory, &mut driving);
             let step = Real::constant(lanes, self.step);
             state.speed = driving.acceleration.mul_add(step, reached_speed);
             side_acceleration = driving.side_acceleration;

@@ -215,6 +215,7 @@ fn compare<L: Lanes>(lanes: L, unpack: impl Fn(L::Value) -> Vec<f32>, pack: impl
         .chain([("backlash", 0.02), ("speed_loop", 0.3), ("mass", 1.3), ("rolling_drag", 0.2)])
         .chain([("quad_drag", 0.01), ("veg_drag", 0.4), ("cornering_drag", 0.5), ("slope_gravity", 0.9)])
         .chain([("cross_slope", 1.1), ("wind", 0.3), ("rear_slip", 0.01), ("friction", 0.6)])
+        .chain([("feed_forward", 0.4), ("speed_integral", 1.5)])
         .map(|(id, value)| effect(id, value));
     let stepper = Stepper::new(&model(effects.collect()), STEP_S, 1.0);
     let zero = lanes.real(0.0);

@@ -1,6 +1,8 @@
 //! The controller: one decision per cycle.
 
 mod steps;
+#[cfg(test)]
+mod tests;
 
 use crate::chunk::Chunk;
 use crate::config::{Actuation, Config, ConfigError};
@@ -54,6 +56,10 @@ pub struct Controller {
     /// The model with lengths in cells, for the rollouts.
     cell_stepper: Stepper,
     history: History,
+    /// Accelerations that the effects hold against the forces that the vehicle met [m/s2].
+    held_mps2: Vec<f64>,
+    /// Where the step began that is being driven.
+    before: Option<State>,
     watch: Watch,
     /// Largest lateral acceleration that a plan may ask for [m/s2].
     lateral_max_mps2: f64,
@@ -96,8 +102,10 @@ impl Controller {
             n_used: n_chunks,
             plan: Plan::new(&config),
             cell_stepper: stepper.clone(),
+            held_mps2: vec![0.0; stepper.n_held()],
             stepper,
             history: History::new(),
+            before: None,
             watch: Watch::new(config.recovery),
             lag_s,
             lateral_max_mps2: lateral_max_mps2(&model),
@@ -118,6 +126,7 @@ impl Controller {
     pub fn reset(&mut self) {
         self.is_fresh = true;
         self.history = History::new();
+        self.let_go();
         self.watch.reset();
         self.temperature_s = 1.0;
     }
@@ -184,6 +193,7 @@ impl Controller {
     fn plan_cycle(&mut self, input: &Input<'_>, observe: &mut impl FnMut(Phase)) -> Decision {
         self.plan.shift(input.elapsed_s / self.config.step_s);
         let mode = self.watch.observe(&input.state, input.elapsed_s);
+        self.follow_held(input);
         self.recall_slots(input.state, self.config.delay_s);
         self.start = self.predict_start(input);
         self.recall_slots(self.start, 0.0);
@@ -269,13 +279,18 @@ impl Controller {
     /// Keeps what the next cycle needs to know of this decision.
     fn remember(&mut self, input: &Input<'_>, decision: Decision) {
         match decision {
-            Decision::Drive(command) => self.history.send(command),
+            Decision::Drive(command) => {
+                self.before = Some(input.state);
+                self.history.send(command);
+            }
             Decision::Hold(_) => {
                 self.watch.reset();
                 self.is_fresh = true;
+                self.let_go();
                 self.history.send(standing(&input.state));
             }
             Decision::Stop(_) => {
+                self.let_go();
                 self.history.send(standing(&input.state));
             }
         }

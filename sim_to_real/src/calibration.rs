@@ -7,7 +7,7 @@ use bicycle::Effect;
 use bicycle::effect::Parameter;
 
 /// What every machine has a little of, in order of action, with the values that the fit starts from.
-const ORDINARY: [(&str, [f64; 4]); 17] = [
+const ORDINARY: [(&str, [f64; 4]); 21] = [
     ("steer_delay", [0.02, 0.0, 0.0, 0.0]),
     ("speed_delay", [0.02, 0.0, 0.0, 0.0]),
     ("speed_scale", [1.0, 0.0, 0.0, 0.0]),
@@ -15,7 +15,11 @@ const ORDINARY: [(&str, [f64; 4]); 17] = [
     ("steer_bias", [0.0; 4]),
     ("steer_rate", [3.0, 0.0, 0.0, 0.0]),
     ("steer_lag", [0.06, 0.0, 0.0, 0.0]),
-    ("speed_loop", [0.4, 0.0, 0.0, 0.0]),
+    ("accel_limit", [3.0, 0.0, 0.0, 0.0]),
+    ("speed_lag", [0.15, 0.0, 0.0, 0.0]),
+    ("speed_loop", [0.3, 0.0, 0.0, 0.0]),
+    ("feed_forward", [0.6, 0.0, 0.0, 0.0]),
+    ("speed_integral", [3.0, 0.0, 0.0, 0.0]),
     ("drive_limit", [8.0, 8.0, 0.0, 0.0]),
     ("rolling_drag", [0.0; 4]),
     ("veg_drag", [0.0; 4]),
@@ -26,23 +30,49 @@ const ORDINARY: [(&str, [f64; 4]); 17] = [
     ("understeer", [0.0; 4]),
     ("rear_slip", [0.0; 4]),
 ];
+/// Kinds of speed controllers, simple ones first, by what they have beside a proportional loop: none leads to the next by
+/// a slope that a fit could follow.
+const CONTROLLERS: [&[&str]; 3] = [
+    &[],
+    &["accel_limit", "speed_lag", "feed_forward"],
+    &["accel_limit", "speed_lag", "feed_forward", "speed_integral"],
+];
+/// A controller is taken for a less simple one when that foretells the drives better by this, in the logarithm of the loss.
+const WORTH_A_CONTROLLER: f64 = 0.2;
 /// Pull towards no effect, so that what the drives leave open stays small.
 const PULL: f64 = 1.5;
 
 /// Fits the ordinary effects to drives, and the yardstick to what is left.
 pub(crate) fn calibrated(wheelbase_m: f64, drives: &[&Drive]) -> (Vec<Effect>, Yardstick) {
-    let mut effects = ordinary();
+    let mut effects = Vec::new();
     let mut yardstick = Yardstick::rough();
-    for _ in 0..3 {
+    for round in 0..3 {
         let comparison = Comparison::new(wheelbase_m, drives.to_vec(), &yardstick);
-        effects = refined(&comparison, &with_limits_tried(&comparison, effects));
+        let fitted = |start| refined(&comparison, &with_limits_tried(&comparison, start));
+        effects = if round == 0 {
+            with_controller(&comparison, CONTROLLERS.map(|own| fitted(ordinary(own))))
+        } else {
+            fitted(effects)
+        };
         yardstick = Yardstick::of(&comparison.residuals(&effects), &yardstick);
     }
     (effects, yardstick)
 }
 
-fn ordinary() -> Vec<Effect> {
-    ORDINARY.iter().filter_map(|&(id, values)| Effect::from_values(id, values)).collect()
+/// The ordinary effects with a speed controller of some kind.
+fn ordinary(controller: &[&str]) -> Vec<Effect> {
+    let has = |id: &str| controller.contains(&id) || !CONTROLLERS.concat().contains(&id);
+    let own = ORDINARY.iter().filter(|(id, _)| has(id));
+    own.filter_map(|&(id, values)| Effect::from_values(id, values)).collect()
+}
+
+/// The simplest of the fits that no less simple one beats by what it is worth.
+fn with_controller<const N: usize>(comparison: &Comparison<'_>, fits: [Vec<Effect>; N]) -> Vec<Effect> {
+    let energy = |(place, effects): &(usize, Vec<Effect>)| {
+        comparison.loss(effects).ln() + WORTH_A_CONTROLLER * *place as f64
+    };
+    let best = fits.into_iter().enumerate().min_by(|a, b| energy(a).total_cmp(&energy(b)));
+    best.map_or_else(Vec::new, |(_, effects)| effects)
 }
 
 /// Limits that nothing reached leave no slope to follow: each is tried at every value of the catalogue.

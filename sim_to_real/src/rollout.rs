@@ -1,10 +1,10 @@
 //! Rollouts of a model from the measured states of a drive, sixteen or eight at a time, against what was measured.
 
 use crate::drive::{Drive, HORIZONS, N_STEPS, STEP_S, VX, YAW};
-use crate::evidence::{SpeedInput, SpeedSource};
+use crate::evidence::{Evidence, SpeedInput, SpeedSource};
 use bicycle::effect::Effect;
 use bicycle::lanes::{Lanes, Portable, Real, Scalar};
-use bicycle::{GroundSample, LaneState, Limits, Model, SensorModel, Stepper};
+use bicycle::{Asked, GroundSample, LaneState, Limits, Model, Rates, SensorModel, Stepper};
 use pulp::{NullaryFnOnce, f32x8, f32x16};
 use std::f64::consts::TAU;
 
@@ -32,8 +32,8 @@ impl Simulator {
 
     /// Predicted measurements of every start of a drive, [`PER_START`] numbers each, horizon by horizon.
     pub(crate) fn predict(&self, drive: &Drive) -> Vec<f32> {
-        let asked = self.asked(drive);
-        let roll_out = RollOut { simulator: self, drive, asked: &asked };
+        let rows = self.rows(drive);
+        let roll_out = RollOut { simulator: self, drive, given: &rows };
         #[cfg(target_arch = "x86_64")]
         {
             if let Some(lanes) = pulp::x86::V4::try_new() {
@@ -46,23 +46,96 @@ impl Simulator {
         On(Portable, roll_out).call()
     }
 
-    /// What the commands ask of the actuators, over the whole drive: speed and steering angle, or what stands for them.
-    fn asked(&self, drive: &Drive) -> Vec<[f32; 2]> {
+    /// What every row of a drive gives to a rollout that starts there.
+    fn rows(&self, drive: &Drive) -> Rows {
         let mut memory = vec![0.0; self.stepper.n_slots()];
         self.stepper.settle(drive.commands[0], &mut memory);
+        let mut rows = Rows { asked: Vec::new(), held: vec![Vec::new(); self.stepper.n_held()] };
+        for (row, command) in drive.commands.iter().enumerate() {
+            let asked = self.asked(drive, (row, command), &mut memory);
+            rows.asked.push([asked.speed, asked.steering, asked.acceleration].map(|value| value.1 as f32));
+            for (all, held) in rows.held.iter_mut().zip(self.stepper.held(&mut memory)) {
+                all.push(*held as f32);
+            }
+            if self.stepper.n_held() > 0 && row + 1 < drive.commands.len() {
+                self.observe(drive, row, asked, &mut memory);
+            }
+        }
+        rows
+    }
+
+    fn asked(
+        &self,
+        drive: &Drive,
+        (row, command): (usize, &bicycle::Command),
+        memory: &mut [f64],
+    ) -> Asked<Scalar> {
         // A speed that was measured is what the sensor made of it.
         let per_reading = match drive.evidence.speed_input {
             SpeedInput::Measured => 1.0 / self.sensors.velocity_ratio,
             SpeedInput::Commanded | SpeedInput::CommandedAcceleration => 1.0,
         };
-        let ask = |(step, command): (usize, &bicycle::Command)| {
-            let speed_mps = f64::from(command.speed_mps) * per_reading;
-            let command = [speed_mps, f64::from(command.steering_rad)].map(|value| Real(Scalar, value));
-            let reached_speed = Real(Scalar, drive.smooth[VX][step]);
-            self.stepper.asked(command, reached_speed, &mut memory, step).map(|value| value.1 as f32)
-        };
-        drive.commands.iter().enumerate().map(ask).collect()
+        let speed_mps = f64::from(command.speed_mps) * per_reading;
+        let command = [speed_mps, f64::from(command.steering_rad)].map(|value| Real(Scalar, value));
+        self.stepper.asked(command, Real(Scalar, drive.smooth[VX][row]), memory, row)
     }
+
+    /// Goes the step that was driven, so that what is held follows it.
+    fn observe(&self, drive: &Drive, row: usize, asked: Asked<Scalar>, memory: &mut [f64]) {
+        let real = |value: f64| Real(Scalar, value);
+        let zero = real(0.0);
+        let speed_mps = |row: usize| drive.smooth[VX][row] / self.sensors.velocity_ratio;
+        let turns = real((drive.smooth[YAW][row] - self.sensors.yaw_offset_rad) / TAU).wrap_turns();
+        let mut state = LaneState { x: zero, y: zero, turns, speed: real(speed_mps(row)), steering: zero };
+        let read = |values: &[f32]| real(f64::from(values[row]));
+        let ground = self.ground(Scalar, drive, read);
+        self.follow(drive.evidence, &mut state, asked, &ground, memory);
+        self.stepper.correct_held(memory, speed_mps(row + 1) - state.speed.1);
+    }
+
+    #[inline(always)]
+    fn follow<L: Lanes>(
+        &self,
+        evidence: Evidence,
+        state: &mut LaneState<L>,
+        mut asked: Asked<L>,
+        ground: &GroundSample<Real<L>>,
+        memory: &mut [L::Value],
+    ) -> Rates<L> {
+        if evidence.speed_input == SpeedInput::CommandedAcceleration {
+            asked.speed = asked.speed.mul_add(state.x.0.real(STEP_S), state.speed);
+        }
+        if evidence.is_skid_steered() {
+            self.stepper.follow_yaw_rate(state, asked, ground, memory)
+        } else {
+            self.stepper.follow(state, asked, ground, memory)
+        }
+    }
+
+    #[inline(always)]
+    fn ground<L: Lanes>(
+        &self,
+        lanes: L,
+        drive: &Drive,
+        read: impl Fn(&[f32]) -> Real<L>,
+    ) -> GroundSample<Real<L>> {
+        let (firm, zero) = (lanes.real(1.0), lanes.real(0.0));
+        let level =
+            GroundSample { linear_traction: firm, angular_traction: firm, gradient: [zero; 2], class: zero };
+        if !self.stepper.uses_ground() {
+            return level;
+        }
+        let [east, north] = &drive.gradient;
+        GroundSample { gradient: [read(east), read(north)], class: read(&drive.class), ..level }
+    }
+}
+
+/// What the commands ask of the actuators at every row of a drive, and what the effects then hold.
+struct Rows {
+    /// Speed and steering angle, or what stands for them, and acceleration.
+    asked: Vec<[f32; 3]>,
+    /// Row by row for each that is held [m/s2].
+    held: Vec<Vec<f32>>,
 }
 
 const UNLIMITED: Limits = Limits {
@@ -131,7 +204,7 @@ struct On<L, W>(L, W);
 struct RollOut<'a> {
     simulator: &'a Simulator,
     drive: &'a Drive,
-    asked: &'a [[f32; 2]],
+    given: &'a Rows,
 }
 
 impl<L: Pack> NullaryFnOnce for On<L, RollOut<'_>> {
@@ -166,22 +239,21 @@ impl RollOut<'_> {
             speed: real(origin.map(|origin| origin.speed_mps)),
             steering: zero,
         };
-        let evidence = self.drive.evidence;
+        let simulator = self.simulator;
+        let mut memory = vec![zero.1; simulator.stepper.n_slots()];
+        for (held, given) in simulator.stepper.held(&mut memory).iter_mut().zip(&self.given.held) {
+            *held = L::pack(&rows.map(|row| given[row]));
+        }
         let mut turned = zero;
         let mut way: Way = [[[0.0; WIDEST]; 3]; N_STEPS + 1];
         let mut next_horizon = 0;
         for step in 0..N_STEPS {
-            let mut asked = [0, 1].map(|channel| real(rows.map(|row| self.asked[row + step][channel])));
-            if evidence.speed_input == SpeedInput::CommandedAcceleration {
-                asked[0] = asked[0].mul_add(lanes.real(STEP_S), state.speed);
-            }
-            let ground = self.ground(lanes, rows.map(|row| row + step));
-            let stepper = &self.simulator.stepper;
-            let rates = if evidence.is_skid_steered() {
-                stepper.follow_yaw_rate(&mut state, asked, &ground)
-            } else {
-                stepper.follow(&mut state, asked, &ground)
-            };
+            let now = rows.map(|row| row + step);
+            let [speed, steering, acceleration] =
+                [0, 1, 2].map(|channel| real(now.map(|row| self.given.asked[row][channel])));
+            let asked = Asked { speed, steering, acceleration };
+            let ground = simulator.ground(lanes, self.drive, |values| real(now.map(|row| values[row])));
+            let rates = simulator.follow(self.drive.evidence, &mut state, asked, &ground, &mut memory);
             turned = rates.yaw_rate.mul_add(lanes.real(STEP_S), turned);
             way[step + 1] = [state.x, state.y, turned].map(|value| L::unpack(value.1));
             if step + 1 == HORIZONS[next_horizon] {
@@ -190,20 +262,6 @@ impl RollOut<'_> {
                 next_horizon += 1;
             }
         }
-    }
-
-    #[inline(always)]
-    fn ground<L: Pack>(&self, lanes: L, rows: [usize; WIDEST]) -> GroundSample<Real<L>> {
-        let firm = lanes.real(1.0);
-        let zero = lanes.real(0.0);
-        let level =
-            GroundSample { linear_traction: firm, angular_traction: firm, gradient: [zero; 2], class: zero };
-        if !self.simulator.stepper.uses_ground() {
-            return level;
-        }
-        let read = |values: &[f32]| Real(lanes, L::pack(&rows.map(|row| values[row])));
-        let [east, north] = &self.drive.gradient;
-        GroundSample { gradient: [read(east), read(north)], class: read(&self.drive.class), ..level }
     }
 
     fn origin(&self, row: usize) -> Origin {
@@ -217,7 +275,7 @@ impl RollOut<'_> {
         let (sine, cosine) = (seen_yaw_rad + 0.5 * turn_rad).sin_cos();
         let turns = (seen_yaw_rad + turn_rad) / TAU;
         let speed_mps = match self.drive.evidence.speed_source {
-            SpeedSource::Command => self.asked[row][0],
+            SpeedSource::Command => self.given.asked[row][0],
             _ => (self.drive.smooth[VX][row] / sensors.velocity_ratio) as f32,
         };
         Origin {

@@ -54,6 +54,8 @@ pub struct Commanding<'a, L: Lanes> {
     pub speed: Real<L>,
     /// Angle that the steering is asked for; effects change it [rad].
     pub steering: Real<L>,
+    /// Acceleration that the drive is asked for beside the speed; effects change it [m/s2].
+    pub acceleration: Real<L>,
     /// Speed reached before this step [m/s].
     pub reached_speed: Real<L>,
     /// What the effect carries from step to step.
@@ -68,8 +70,12 @@ pub struct Driving<L: Lanes> {
     pub acceleration: Real<L>,
     /// Acceleration that a force from outside gives the body along its y axis; effects change it [m/s2].
     pub side_acceleration: Real<L>,
+    /// Most that the actuators' own limit allows [m/s2].
+    pub acceleration_limit: Real<L>,
     /// Speed that the drive is asked for [m/s].
     pub asked_speed: Real<L>,
+    /// Acceleration that it is asked for beside it [m/s2].
+    pub asked_acceleration: Real<L>,
     /// Speed reached before this step [m/s].
     pub speed: Real<L>,
     /// Tangent of the steering angle reached.
@@ -80,6 +86,8 @@ pub struct Driving<L: Lanes> {
     pub heading: [Real<L>; 2],
     /// Ground under the vehicle.
     pub ground: GroundSample<Real<L>>,
+    /// What an effect that holds an acceleration holds; it changes it [m/s2].
+    pub held: Real<L>,
 }
 
 impl<L: Lanes> Driving<L> {
@@ -88,6 +96,13 @@ impl<L: Lanes> Driving<L> {
     pub fn slope(&self) -> [Real<L>; 2] {
         let ([east, north], [sine, cosine]) = (self.ground.gradient, self.heading);
         [east.mul_add(cosine, north * sine), north.mul_add(cosine, -(east * sine))]
+    }
+
+    /// Lets the drive accelerate by so much more [m/s2], as far as the actuators can.
+    #[inline(always)]
+    pub fn drive_by(&mut self, more: Real<L>) {
+        let limit = self.acceleration_limit;
+        self.acceleration = (self.acceleration + more).clamp(-limit, limit);
     }
 
     /// 1 on ground of this class, 0 on other ground, in between on the border.
@@ -167,6 +182,11 @@ pub(crate) trait Definition: Values {
     /// Numbers to be carried from step to step.
     fn n_slots(&self, _step_s: f64) -> usize {
         0
+    }
+    /// For an effect that holds an acceleration from step to step, which is what a controller has built up against the
+    /// forces it met: by how much that follows a speed that was measured and not foretold [1/s].
+    fn held_follows_per_s(&self) -> Option<f64> {
+        None
     }
     /// What the slots hold after `[speed, steering]` were commanded for long.
     fn settled(&self, _command: [f64; 2]) -> f64 {

@@ -2,8 +2,8 @@
 
 use super::definition::{Commanding, Constants, Driving, Moving, Stage};
 use super::{Effect, Kind};
-use crate::Command;
 use crate::lanes::{Constant, Lanes, Real, Scalar};
+use crate::{Asked, Command};
 
 /// How far back the commands are gone through for what the effects remember at the start [s].
 const PAST_S: f64 = 3.0;
@@ -15,6 +15,8 @@ struct Prepared {
     constants: Constants,
     first_slot: usize,
     n_slots: usize,
+    /// Slot of the acceleration that the effect holds.
+    held: Option<usize>,
 }
 
 /// The effects of a model, made ready for one step length, by stage.
@@ -24,19 +26,25 @@ pub(crate) struct PreparedEffects {
     on_drive: Vec<Prepared>,
     on_motion: Vec<Prepared>,
     step_s: f64,
+    /// Numbers that are carried: what the commands leave, then what is held.
     n_slots: usize,
+    /// The first slot of what is held.
+    first_held: usize,
     /// Steps gone through before the first.
     n_past: usize,
 }
 
 impl PreparedEffects {
     pub(crate) fn new(effects: &[Effect], step_s: f64) -> Self {
-        let mut n_slots = 0;
+        let first_held = effects.iter().map(|effect| effect.n_slots(step_s)).sum();
+        let (mut first_slot, mut next_held) = (0, first_held);
         let prepare = |&effect: &Effect| {
-            let first_slot = n_slots;
-            n_slots += effect.n_slots(step_s);
+            let n_slots = effect.n_slots(step_s);
             let constants = effect.constants(step_s).map(Constant::new);
-            Prepared { effect, kind: effect.kind(), constants, first_slot, n_slots: n_slots - first_slot }
+            let held = effect.held_follows_per_s().map(|_| next_held);
+            let prepared = Prepared { effect, kind: effect.kind(), constants, first_slot, n_slots, held };
+            (first_slot, next_held) = (first_slot + n_slots, next_held + usize::from(held.is_some()));
+            prepared
         };
         let prepared: Vec<Prepared> = effects.iter().map(prepare).collect();
         let at = |stage: Stage| {
@@ -48,7 +56,8 @@ impl PreparedEffects {
             on_drive: at(Stage::Drive),
             on_motion: at(Stage::Motion),
             step_s,
-            n_slots,
+            n_slots: next_held,
+            first_held,
             n_past: (PAST_S / step_s).ceil() as usize,
         }
     }
@@ -69,6 +78,24 @@ impl PreparedEffects {
         self.n_slots
     }
 
+    pub(crate) fn n_held(&self) -> usize {
+        self.n_slots - self.first_held
+    }
+
+    /// What is held, of all that is carried.
+    pub(crate) fn held<'a, T>(&self, memory: &'a mut [T]) -> &'a mut [T] {
+        &mut memory[self.first_held..self.n_slots]
+    }
+
+    /// Lets what is held follow a speed that was measured and not foretold.
+    pub(crate) fn correct_held(&self, memory: &mut [f64], faster_mps: f64) {
+        for prepared in &self.on_drive {
+            if let (Some(slot), Some(per_s)) = (prepared.held, prepared.effect.held_follows_per_s()) {
+                memory[slot] += per_s * faster_mps;
+            }
+        }
+    }
+
     /// Fills the memory as the commands of the past leave it.
     pub(crate) fn recall(&self, past: &dyn Fn(f64) -> Command, memory: &mut [f64]) {
         let at = |k: usize| {
@@ -77,9 +104,8 @@ impl PreparedEffects {
         };
         self.settle(at(0), memory);
         for k in 0..self.n_past {
-            let [speed, steering] = at(k).map(|value| Real(Scalar, value));
-            let reached_speed = speed;
-            self.pass_command(memory, &mut CommandStep { speed, steering, reached_speed, step: k });
+            let asked = Asked::of(at(k).map(|value| Real(Scalar, value)));
+            self.pass_command(memory, &mut CommandStep { reached_speed: asked.speed, asked, step: k });
         }
     }
 
@@ -102,21 +128,30 @@ impl PreparedEffects {
     fn pass_command<L: Lanes>(&self, memory: &mut [L::Value], state: &mut CommandStep<L>) {
         for prepared in &self.on_command {
             let mut commanding = Commanding {
-                speed: state.speed,
-                steering: state.steering,
+                speed: state.asked.speed,
+                steering: state.asked.steering,
+                acceleration: state.asked.acceleration,
                 reached_speed: state.reached_speed,
                 memory: &mut memory[prepared.first_slot..prepared.first_slot + prepared.n_slots],
                 step: state.step,
             };
             prepared.kind.on_command(&prepared.constants, &mut commanding);
-            (state.speed, state.steering) = (commanding.speed, commanding.steering);
+            let Commanding { speed, steering, acceleration, .. } = commanding;
+            state.asked = Asked { speed, steering, acceleration };
         }
     }
 
     #[inline(always)]
-    pub(crate) fn on_drive<L: Lanes>(&self, driving: &mut Driving<L>) {
+    pub(crate) fn on_drive<L: Lanes>(&self, memory: &mut [L::Value], driving: &mut Driving<L>) {
         for prepared in &self.on_drive {
-            prepared.kind.on_drive(&prepared.constants, driving);
+            match prepared.held {
+                None => prepared.kind.on_drive(&prepared.constants, driving),
+                Some(slot) => {
+                    driving.held.1 = memory[slot];
+                    prepared.kind.on_drive(&prepared.constants, driving);
+                    memory[slot] = driving.held.1;
+                }
+            }
         }
     }
 
@@ -130,8 +165,7 @@ impl PreparedEffects {
 
 /// What the effects on the command see and change.
 pub(crate) struct CommandStep<L: Lanes> {
-    pub(crate) speed: Real<L>,
-    pub(crate) steering: Real<L>,
+    pub(crate) asked: Asked<L>,
     pub(crate) reached_speed: Real<L>,
     pub(crate) step: usize,
 }

@@ -13,6 +13,9 @@ use bicycle::{Command, State};
 use std::f64::consts::TAU;
 use traversability::RiskMapView;
 
+/// A cycle that took more of the model's steps than this tells nothing of a single one.
+const LONGEST_STEPS: f64 = 3.0;
+
 /// What to sample for, in metres.
 #[derive(Clone, Copy)]
 pub(super) enum TaskOrder<'a> {
@@ -42,11 +45,38 @@ impl Controller {
         state
     }
 
+    /// Lets what the effects hold follow the step that was driven since the last cycle.
+    pub(super) fn follow_held(&mut self, input: &Input<'_>) {
+        let Some(before) = self.before else { return };
+        let is_step = input.elapsed_s > 0.0 && input.elapsed_s < LONGEST_STEPS * self.config.step_s;
+        if self.held_mps2.is_empty() || !is_step {
+            return;
+        }
+        let age_s = self.config.delay_s + input.elapsed_s;
+        self.recall_slots(before, age_s);
+        let mut memory = self.slots.map(f64::from);
+        let judge = Judge { stepper: &self.stepper, limits: &self.model.limits, map: input.map };
+        let command = self.history.at(age_s - 0.5 * input.elapsed_s).unwrap_or(as_command(&before));
+        let expected = judge.step(&before, command, &mut memory, 0);
+        let share = input.elapsed_s / self.config.step_s;
+        let gained_mps = input.state.speed_mps - before.speed_mps;
+        let faster_mps = gained_mps / share - (expected.speed_mps - before.speed_mps);
+        self.stepper.correct_held(&mut memory, faster_mps * share);
+        self.held_mps2.copy_from_slice(self.stepper.held(&mut memory));
+    }
+
+    /// Forgets what was held: the vehicle stands, or the step was not driven.
+    pub(super) fn let_go(&mut self) {
+        self.before = None;
+        self.held_mps2.fill(0.0);
+    }
+
     /// What the effects remember at `state`, whose actuators follow the commands `delay_s` late.
     pub(super) fn recall_slots(&mut self, state: State, delay_s: f64) {
         let (history, slots) = (&self.history, &mut self.slots);
         let past = |age_s: f64| history.at(age_s + delay_s).unwrap_or(as_command(&state));
         let mut memory = [0.0; MAX_SLOTS];
+        self.stepper.held(&mut memory).copy_from_slice(&self.held_mps2);
         self.stepper.recall(&past, &mut memory[..self.stepper.n_slots()]);
         *slots = memory.map(|value| value as f32);
     }

@@ -226,7 +226,7 @@ fn the_cost_to_go_field_is_interpolated_between_cells() {
 /// Effects at every stage, in the order of a machine: delays and lags of both commands, gains, play, rate limits, a
 /// speed loop under drags and slope, understeer, slip and grip, and the sensors, which change no rollout.
 fn whole_model() -> Model {
-    let given: [(&str, [f64; 4]); 18] = [
+    let given: [(&str, [f64; 4]); 20] = [
         ("steer_delay", [0.13, 0.0, 0.0, 0.0]),
         ("speed_delay", [0.21, 0.0, 0.0, 0.0]),
         ("speed_scale", [0.95, 0.0, 0.0, 0.0]),
@@ -237,6 +237,8 @@ fn whole_model() -> Model {
         ("steer_lag", [0.15, 0.0, 0.0, 0.0]),
         ("steer_lag", [0.05, 0.0, 0.0, 0.0]),
         ("speed_loop", [0.4, 0.0, 0.0, 0.0]),
+        ("feed_forward", [0.5, 0.0, 0.0, 0.0]),
+        ("speed_integral", [1.5, 0.0, 0.0, 0.0]),
         ("rolling_drag", [0.2, 0.0, 0.0, 0.0]),
         ("quad_drag", [0.02, 0.0, 0.0, 0.0]),
         ("veg_drag", [0.5, 0.0, 0.0, 0.0]),

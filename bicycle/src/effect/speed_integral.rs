@@ -1,0 +1,37 @@
+//! A speed controller that pushes back until the command is reached.
+
+use super::definition::{Constants, Definition, Driving, Role, Stage, parameters};
+use crate::lanes::{Lanes, Real};
+
+parameters! {
+    /// A speed controller that pushes back until the command is reached.
+    SpeedIntegral {
+        /// Acceleration J that each metre of distance to the command builds up [1/s2].
+        gain_per_s2 in "1/s2": 0.0 to 50.0, neutral 0.0, tried [1.0, 3.0, 8.0];
+    }
+}
+
+/// Time in which what the integral holds follows a force that the model does not know [s].
+const OBSERVER_S: f64 = 0.5;
+
+impl Definition for SpeedIntegral {
+    const ID: &'static str = "speed_integral";
+    const MEANING: &'static str = "integral of the speed: dv/dt = ... + I with dI/dt = J (command - v), so that no offset is left";
+    const ROLE: Role = Role::Calibration;
+    const STAGES: &'static [Stage] = &[Stage::Drive];
+
+    fn constants(&self, step_s: f64) -> [f64; 4] {
+        [self.gain_per_s2 * step_s, 0.0, 0.0, 0.0]
+    }
+
+    fn held_follows_per_s(&self) -> Option<f64> {
+        Some(1.0 / OBSERVER_S)
+    }
+
+    #[inline(always)]
+    fn on_drive<L: Lanes>(constants: &Constants, state: &mut Driving<L>) {
+        state.drive_by(state.held);
+        let gain = Real::constant(state.speed.0, constants[0]);
+        state.held = (state.asked_speed - state.speed).mul_add(gain, state.held);
+    }
+}

@@ -1,0 +1,92 @@
+//! Speed controllers against closed forms.
+#![allow(clippy::unwrap_used, reason = "a test that cannot be set up has failed")]
+
+use bicycle::{Command, Effect, GroundSample, Limits, Model, State, Stepper};
+
+const STEP_S: f64 = 0.02;
+const SPEED_MPS: f64 = 2.0;
+
+fn effect(id: &str, value: f64) -> Effect {
+    Effect::from_values(id, [value, 0.0, 0.0, 0.0]).unwrap()
+}
+
+fn stepper(effects: &[(&str, f64)]) -> Stepper {
+    let limits = Limits {
+        speed_max_mps: 5.0,
+        reverse_speed_max_mps: 1.0,
+        steering_max_rad: 0.5,
+        steering_rate_max_radps: 1.0,
+        acceleration_max_mps2: 2.0,
+        lateral_acceleration_max_mps2: 3.0,
+        roll_max_rad: 0.5,
+        pitch_max_rad: 0.5,
+    };
+    let effects = effects.iter().map(|&(id, value)| effect(id, value)).collect();
+    Stepper::new(&Model { wheelbase_m: 2.0, limits, effects }, STEP_S, 1.0).with_instant_actuators()
+}
+
+/// Speeds after every step of a drive with one command, from `speed_mps`; what is held at its end.
+fn speeds(stepper: &Stepper, speed_mps: f64, n: usize) -> (Vec<f64>, Vec<f64>) {
+    let command = Command { speed_mps: SPEED_MPS as f32, steering_rad: 0.0 };
+    let mut memory = vec![0.0; stepper.n_slots()];
+    stepper.settle(Command { speed_mps: speed_mps as f32, ..command }, &mut memory);
+    let mut state = State { speed_mps, ..State::default() };
+    let mut step = |t| {
+        state = stepper.step_state(&state, command, &GroundSample::FIRM, &mut memory, t);
+        state.speed_mps
+    };
+    let speeds = (0..n).map(&mut step).collect();
+    (speeds, stepper.held(&mut memory).to_vec())
+}
+
+/// A drag D leaves a loop that closes the share 1 - exp(-dt / T) of its distance every step D dt over that share behind its
+/// command, about D T.
+#[test]
+fn a_proportional_loop_droops_under_drag() {
+    let (speeds, held) = speeds(&stepper(&[("speed_loop", 0.4), ("rolling_drag", 0.5)]), SPEED_MPS, 500);
+    let behind_mps = 0.5 * STEP_S / (1.0 - (-STEP_S / 0.4).exp());
+    assert!((SPEED_MPS - speeds[499] - behind_mps).abs() < 1e-9, "{}", speeds[499]);
+    assert!(held.is_empty());
+}
+
+/// With an integral the error obeys e'' + e' / T + J e = 0; at T = 0.4 s and J = 1.5 / s2 its roots are -1 and -1.5 / s, so
+/// that a drag D that sets in leaves e = -D (exp(-t) - exp(-1.5 t)) / 0.5, and in the end the integral holds D.
+#[test]
+fn an_integral_takes_a_drag_back() {
+    let controlled = stepper(&[("speed_loop", 0.4), ("speed_integral", 1.5), ("rolling_drag", 0.5)]);
+    let (speeds, held) = speeds(&controlled, SPEED_MPS, 1000);
+    for (step, speed_mps) in speeds.iter().enumerate() {
+        let t = (step + 1) as f64 * STEP_S;
+        let error_mps = -0.5 * ((-t).exp() - (-1.5 * t).exp()) / 0.5;
+        assert!((speed_mps - SPEED_MPS - error_mps).abs() < 0.006, "{t} s: {speed_mps} {error_mps}");
+    }
+    assert!((held[0] - 0.5).abs() < 1e-3, "{held:?}");
+}
+
+/// Behind a ramp of A a loop of time constant T lags by A T; the whole of the command's acceleration fed forward leaves
+/// nothing of that, half of it the half.
+#[test]
+fn feed_forward_takes_the_lag_behind_a_ramp() {
+    for (share, lag_mps) in [(0.0, 0.2), (0.5, 0.1), (1.0, 0.0)] {
+        let controlled = stepper(&[("accel_limit", 0.5), ("speed_loop", 0.4), ("feed_forward", share)]);
+        let (speeds, _) = speeds(&controlled, 0.0, 150);
+        let ramped_mps = 0.5 * 150.0 * STEP_S;
+        assert!((ramped_mps - speeds[149] - lag_mps).abs() < 0.006, "{share}: {}", speeds[149]);
+    }
+}
+
+/// A speed that stays where it is although 1 m/s2 is held: what is held falls by the share dt / (0.5 s) every step.
+#[test]
+fn what_is_held_follows_what_was_measured() {
+    let controlled = stepper(&[("speed_loop", 0.4), ("speed_integral", 1.5)]);
+    let command = Command { speed_mps: SPEED_MPS as f32, steering_rad: 0.0 };
+    let state = State { speed_mps: SPEED_MPS, ..State::default() };
+    let mut memory = vec![0.0; controlled.n_slots()];
+    controlled.held(&mut memory)[0] = 1.0;
+    for step in 1..=50 {
+        let foretold = controlled.step_state(&state, command, &GroundSample::FIRM, &mut memory, step);
+        controlled.correct_held(&mut memory, SPEED_MPS - foretold.speed_mps);
+        let expected_mps2 = (1.0 - STEP_S / 0.5).powi(step as i32);
+        assert!((controlled.held(&mut memory)[0] - expected_mps2).abs() < 1e-9);
+    }
+}
