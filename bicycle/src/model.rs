@@ -346,7 +346,14 @@ impl Stepper {
         let yaw_rate = turning(state.speed);
         let acceleration = (state.speed - reached_speed) * Real::constant(lanes, self.per_step);
         let lateral = lanes.real(0.0);
-        let mut moving = Moving { forward: state.speed, lateral, yaw_rate, side_acceleration, acceleration };
+        let mut moving = Moving {
+            forward: state.speed,
+            lateral,
+            yaw_rate,
+            side_acceleration,
+            acceleration,
+            steering_tangent,
+        };
         self.effects.on_motion(&mut moving);
         let Moving { forward, lateral, yaw_rate, .. } = moving;
         let share = ground.linear_traction * Real::constant(lanes, self.advance);

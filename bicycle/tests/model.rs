@@ -107,6 +107,21 @@ fn a_lag_closes_exponentially() {
     assert!((states[4].steering_rad - 0.5 * (1.0 - mean)).abs() < 1e-9);
 }
 
+/// A linkage behind a servo of 0.5 rad/s: the wheels turn G times as fast and as far, to v tan(G angle) / L.
+#[test]
+fn a_linkage_multiplies_what_the_servo_does() {
+    for ratio in [0.7, 1.25] {
+        let effects = vec![effect("steer_rate", 0.5), effect("steer_linkage", ratio)];
+        let states = run(effects, State::default(), command(1.0, 0.4), 20);
+        let yaw_rate = |t: usize| (states[t + 1].yaw_rad - states[t].yaw_rad) / STEP_S;
+        // Half way on the ramp the servo stands at 0.5 rad/s (3.5 steps), at its end at 0.4 rad.
+        for (t, angle_rad) in [(3, 0.5 * 3.5 * STEP_S), (19, 0.4)] {
+            let expected_radps = (ratio * angle_rad).tan() / WHEELBASE_M;
+            assert!((yaw_rate(t) / expected_radps - 1.0).abs() < 3e-3, "{ratio} {t}: {}", yaw_rate(t));
+        }
+    }
+}
+
 /// Standing still before, a delay D shortens the way at constant speed by v D, whole number of steps or not.
 #[test]
 fn a_delay_shortens_the_way_by_its_length() {
@@ -214,7 +229,13 @@ fn compare<L: Lanes>(lanes: L, unpack: impl Fn(L::Value) -> Vec<f32>, pack: impl
         .chain([("speed_scale", 0.95), ("understeer", 0.02), ("steer_rate", 0.8), ("accel_limit", 1.5)])
         .chain([("backlash", 0.02), ("speed_loop", 0.3), ("mass", 1.3), ("rolling_drag", 0.2)])
         .chain([("quad_drag", 0.01), ("veg_drag", 0.4), ("cornering_drag", 0.5), ("slope_gravity", 0.9)])
-        .chain([("cross_slope", 1.1), ("wind", 0.3), ("rear_slip", 0.01), ("friction", 0.6)])
+        .chain([
+            ("cross_slope", 1.1),
+            ("wind", 0.3),
+            ("steer_linkage", 1.1),
+            ("rear_slip", 0.01),
+            ("friction", 0.6),
+        ])
         .chain([("feed_forward", 0.4), ("speed_integral", 1.5)])
         .map(|(id, value)| effect(id, value));
     let stepper = Stepper::new(&model(effects.collect()), STEP_S, 1.0);

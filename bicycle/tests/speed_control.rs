@@ -90,3 +90,17 @@ fn what_is_held_follows_what_was_measured() {
         assert!((controlled.held(&mut memory)[0] - expected_mps2).abs() < 1e-9);
     }
 }
+
+/// A motor with the time constant T behind a loop with the time constant P: the error obeys T e'' + e' + e / P = 0. At
+/// T = 0.1 s and P = 0.625 s its roots are -2 and -8 / s, so that a step of the command leaves
+/// e = (8 exp(-2 t) - 2 exp(-8 t)) / 6 of itself.
+#[test]
+fn a_slow_motor_makes_the_loop_one_of_second_order() {
+    let controlled = stepper(&[("speed_loop", 0.625), ("drive_lag", 0.1)]);
+    let (speeds, _) = speeds(&controlled, 0.0, 150);
+    for (step, speed_mps) in speeds.iter().enumerate() {
+        let t = (step + 1) as f64 * STEP_S;
+        let left = (8.0 * (-2.0 * t).exp() - 2.0 * (-8.0 * t).exp()) / 6.0;
+        assert!((speed_mps - SPEED_MPS * (1.0 - left)).abs() < 0.02, "{t} s: {speed_mps}");
+    }
+}

@@ -12,9 +12,21 @@ pub(crate) struct Explanation {
     pub(crate) causes: Vec<Effect>,
     /// Mean robust loss.
     pub(crate) loss: f64,
+    /// The same on drives that it was not fitted to, where that was tried.
+    pub(crate) foretold_loss: f64,
 }
 
 impl Explanation {
+    pub(crate) fn new(causes: Vec<Effect>, loss: f64) -> Self {
+        Self { causes, loss, foretold_loss: loss }
+    }
+
+    /// Logarithm of the loss: half of it as fitted, half as foretold, so that what fits one drive and not the other
+    /// is believed less.
+    pub(crate) fn energy(&self) -> f64 {
+        0.5 * (self.loss.ln() + self.foretold_loss.ln())
+    }
+
     /// Names of the causes; two forms of one cause share a name.
     pub(crate) fn ids(&self) -> Vec<&'static str> {
         self.causes.iter().map(|cause| cause.description().cause).collect()
@@ -59,7 +71,7 @@ impl Trial<'_> {
     pub(crate) fn with_one_more(&self, known: &[Effect], description: &Description) -> Option<Explanation> {
         let with = |cause: Effect| {
             let causes: Vec<Effect> = known.iter().copied().chain([cause]).collect();
-            Explanation { loss: self.loss(&causes), causes }
+            Explanation::new(causes.clone(), self.loss(&causes))
         };
         let tried = tried(description).into_iter().map(with);
         let best = tried.min_by(|a, b| a.loss.total_cmp(&b.loss))?;
@@ -81,9 +93,9 @@ impl Trial<'_> {
             .collect();
         let found = fit(&coordinates, |values| self.residuals(&with_values(&causes, values)));
         if found.loss < explanation.loss {
-            Explanation { causes: with_values(&causes, &found.values), loss: found.loss }
+            Explanation::new(with_values(&causes, &found.values), found.loss)
         } else {
-            Explanation { causes, loss: explanation.loss }
+            Explanation::new(causes, explanation.loss)
         }
     }
 
@@ -98,11 +110,10 @@ impl Trial<'_> {
         let with = |place: f64| {
             let cause = with_values(&[cause], &[place])[0];
             let causes: Vec<Effect> = known.iter().copied().chain([cause]).collect();
-            Explanation { loss: self.loss(&causes), causes }
+            Explanation::new(causes.clone(), self.loss(&causes))
         };
         let (mut low, mut high) = bracket(&description, cause.values()[0]);
-        let mut best =
-            Explanation { causes: known.iter().copied().chain([cause]).collect(), loss: explanation.loss };
+        let mut best = Explanation::new(known.iter().copied().chain([cause]).collect(), explanation.loss);
         let inner = |low: f64, high: f64| [high - GOLDEN * (high - low), low + GOLDEN * (high - low)];
         let [mut left, mut right] = inner(low, high).map(|place| (place, with(place)));
         for _ in 0..12 {

@@ -5,6 +5,7 @@ use crate::baseline::{Baseline, GapError, drives_of};
 use crate::causes::{Explanation, Trial};
 use crate::comparison::{Comparison, root_mean_square};
 use crate::conditions::{StartRecord, condition_tables, ground_residuals, places};
+use crate::cross_validation::{CrossValidation, Split, foretold};
 use crate::drive::Drive;
 use crate::explanation::{pairs, single_explanations};
 use crate::findings::Findings;
@@ -52,7 +53,9 @@ pub fn diagnose(baseline: &Baseline, machine: &Machine, real: &[DriveLog]) -> Re
     let all: Vec<&Drive> = drives.iter().collect();
     let trial = baseline.trial(&all);
     let before = trial.residuals(&[]);
-    let judgement = judged(baseline, &trial);
+    let cross_validation = CrossValidation::of(&drives);
+    let splits = cross_validation.splits(baseline);
+    let judgement = judged(baseline, &trial, &splits);
     let causes = judgement.announced.clone();
     let after = trial.residuals(&causes);
     let (own, repaired) = (StartRecord::of(&all, &before), StartRecord::of(&all, &after));
@@ -66,7 +69,7 @@ pub fn diagnose(baseline: &Baseline, machine: &Machine, real: &[DriveLog]) -> Re
         named: named_effects(&trial, &causes),
         findings,
         errors: [root_mean_square(&before), root_mean_square(&after)],
-        predicted_closed: predicted_closed(baseline, &drives, &causes),
+        predicted_closed: predicted_closed(baseline, &splits, &causes),
         effects: causes,
         steering: drives[0].evidence.steering(),
         verdict: judgement.verdict,
@@ -90,31 +93,25 @@ impl Baseline {
     }
 }
 
-fn judged(baseline: &Baseline, trial: &Trial<'_>) -> Judgement {
-    let none = Explanation { causes: Vec::new(), loss: trial.loss(&[]) };
-    let singles = single_explanations(trial);
+fn judged(baseline: &Baseline, trial: &Trial<'_>, splits: &[Split<'_>]) -> Judgement {
+    let none = Explanation::new(Vec::new(), trial.loss(&[]));
+    let singles = foretold(splits, single_explanations(trial));
     let mut weighed = Weighed { none, pairs: Vec::new(), singles };
     if weighed.may_hold_pairs(&baseline.null) {
-        weighed.pairs = pairs(trial, &weighed.singles);
+        weighed.pairs = foretold(splits, pairs(trial, &weighed.singles));
     }
     weighed.judge(&baseline.null)
 }
 
-/// What is closed on each half of the real drives by the parameters that the other half gives.
-fn predicted_closed(baseline: &Baseline, drives: &[Drive], causes: &[Effect]) -> Option<f64> {
-    let halves: Vec<Drive> = if drives.len() == 1 { drives[0].halves() } else { drives.to_vec() };
-    let mut squares = [0.0; 2];
-    for out in 0..halves.len() {
-        let rest: Vec<&Drive> = (0..halves.len()).filter(|&i| i != out).map(|i| &halves[i]).collect();
-        let own = baseline.trial(&[&halves[out]]);
-        let learned = baseline.trial(&rest);
-        let start = Explanation { loss: learned.loss(causes), causes: causes.to_vec() };
-        let elsewhere = if causes.is_empty() { start } else { learned.refined(start) };
-        for (sum, causes) in squares.iter_mut().zip([&[][..], &elsewhere.causes]) {
-            *sum += root_mean_square(&own.residuals(causes)).powi(2);
+/// What is closed on each real drive by the parameters that the others give.
+fn predicted_closed(baseline: &Baseline, splits: &[Split<'_>], causes: &[Effect]) -> Option<f64> {
+    let mut squares = [0.0_f64; 2];
+    for split in splits {
+        for (sum, causes) in squares.iter_mut().zip([Vec::new(), split.refitted(causes)]) {
+            *sum += root_mean_square(&split.own.residuals(&causes)).powi(2);
         }
     }
-    let [before, after] = squares.map(|sum| (sum / halves.len() as f64).sqrt());
+    let [before, after] = squares.map(|sum| (sum / splits.len() as f64).sqrt());
     baseline.closed(before, after)
 }
 

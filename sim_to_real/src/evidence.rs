@@ -113,7 +113,8 @@ impl Evidence {
         let by_angle = !self.is_skid_steered();
         let is_commanded = matches!(self.turn_input, TurnInput::CommandedAngle | TurnInput::CommandedYawRate);
         match id {
-            "motor_deadband" | "accel_limit" | "drive_force_limit" | "speed_loop" => {
+            "motor_deadband" | "accel_limit" | "drive_force_limit" | "speed_loop" | "feed_forward"
+            | "speed_integral" | "drive_lag" => {
                 self.judges_speed() && self.speed_input == SpeedInput::Commanded
             }
             "speed_delay" | "speed_scale" | "speed_lag" | "drive_limit" | "mass" | "rolling_drag"

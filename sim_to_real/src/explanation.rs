@@ -5,7 +5,7 @@ use bicycle::effect::Description;
 
 /// Seconds are sought beside this many of the best singles.
 const N_FIRSTS: usize = 3;
-/// Pairs that are fitted together.
+/// So many of the best singles, and of the best pairs, are fitted as a whole.
 const N_REFINED: usize = 5;
 
 /// Causes that the drives can judge: where the measured speed drives the model, an effect on the speed would stand for one
@@ -17,9 +17,14 @@ fn judged(trial: &Trial<'_>) -> impl Iterator<Item = &'static Description> {
 /// Every effect alone, best first.
 pub(crate) fn single_explanations(trial: &Trial<'_>) -> Vec<Explanation> {
     let alone = |description| trial.with_one_more(&[], description);
-    let mut singles: Vec<Explanation> = judged(trial).filter_map(alone).collect();
-    singles.sort_by(|a, b| a.loss.total_cmp(&b.loss));
-    best_forms(singles)
+    let mut singles = best_forms(sorted(judged(trial).filter_map(alone).collect()));
+    let others = singles.split_off(N_REFINED.min(singles.len()));
+    sorted(singles.into_iter().map(|single| trial.refined(single)).chain(others).collect())
+}
+
+fn sorted(mut explanations: Vec<Explanation>) -> Vec<Explanation> {
+    explanations.sort_by(|a, b| a.loss.total_cmp(&b.loss));
+    explanations
 }
 
 /// Of several forms of one cause, the best.
@@ -44,16 +49,14 @@ pub(crate) fn pairs(trial: &Trial<'_>, singles: &[Explanation]) -> Vec<Explanati
     for first in singles.iter().take(N_FIRSTS) {
         pairs.extend(with_a_second(trial, first));
     }
-    pairs.sort_by(|a, b| a.loss.total_cmp(&b.loss));
+    pairs = sorted(pairs);
     pairs.dedup_by_key(|pair| {
         let mut ids = pair.ids();
         ids.sort_unstable();
         ids
     });
     pairs.truncate(N_REFINED);
-    let mut refined: Vec<Explanation> = pairs.into_iter().map(|pair| trial.refined(pair)).collect();
-    refined.sort_by(|a, b| a.loss.total_cmp(&b.loss));
-    refined
+    sorted(pairs.into_iter().map(|pair| trial.refined(pair)).collect())
 }
 
 /// An explanation with every other effect added.

@@ -68,7 +68,7 @@ impl Weighed {
     pub(crate) fn judge(&self, null: &Null) -> Judgement {
         let explanations = std::iter::once(&self.none).chain(&self.singles).chain(&self.pairs);
         let mut all: Vec<(f64, &Explanation)> = explanations
-            .map(|explanation| (explanation.loss.ln() + price(explanation, null), explanation))
+            .map(|explanation| (explanation.energy() + price(explanation, null), explanation))
             .collect();
         all.sort_by(|a, b| a.0.total_cmp(&b.0));
         let is_beyond_doubt = all[0].0 + BEYOND_DOUBT < self.none.loss.ln();
@@ -96,7 +96,7 @@ impl Weighed {
     fn credible_set(&self, best: &Explanation) -> Vec<String> {
         let reach = -TEMPERATURE * TOLD_APART.ln();
         let Some(first) = self.singles.first() else { return Vec::new() };
-        let near = self.singles.iter().take_while(|single| (single.loss / first.loss).ln() < reach);
+        let near = self.singles.iter().take_while(|single| single.energy() - first.energy() < reach);
         let mut ids: Vec<String> = match best.causes.len() {
             2.. => best.ids().iter().map(|id| (*id).to_owned()).collect(),
             _ => near.flat_map(Explanation::ids).map(str::to_owned).collect(),

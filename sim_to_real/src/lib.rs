@@ -6,6 +6,7 @@ mod calibration;
 mod causes;
 mod comparison;
 mod conditions;
+mod cross_validation;
 mod diagnosis;
 mod drive;
 mod evidence;

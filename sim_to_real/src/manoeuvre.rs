@@ -245,7 +245,7 @@ impl<'a> Design<'a> {
     fn best_losses(&self, causes: &[Effect], designed: &Drive, fit: Fit) -> Losses {
         let together: Vec<&Drive> = self.all.iter().copied().chain([designed]).collect();
         let trial = self.baseline.trial(&together);
-        let start = Explanation { loss: trial.loss(causes), causes: causes.to_vec() };
+        let start = Explanation::new(causes.to_vec(), trial.loss(causes));
         let best = match (fit, parameters_of(causes)) {
             (Fit::Kept, _) | (_, 0) => start,
             (Fit::Renewed, 1) => trial.searched(start),

@@ -133,6 +133,8 @@ pub struct Moving<L: Lanes> {
     pub side_acceleration: Real<L>,
     /// Acceleration along the body's x axis in this step [m/s2].
     pub acceleration: Real<L>,
+    /// Tangent of the angle that the steering reached; 0 for a skid-steered vehicle.
+    pub steering_tangent: Real<L>,
 }
 
 impl<L: Lanes> Moving<L> {

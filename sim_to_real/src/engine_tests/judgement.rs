@@ -30,7 +30,7 @@ fn null(gained: (&str, f64)) -> Null {
 }
 
 fn single((id, value): (&str, f64), loss: f64) -> Explanation {
-    Explanation { causes: vec![effect(id, value)], loss }
+    Explanation::new(vec![effect(id, value)], loss)
 }
 
 /// Singles of the list with these losses, sorted as they come.
@@ -39,8 +39,8 @@ fn weighed(none: f64, losses: &[f64], pair: Option<f64>) -> Weighed {
         SINGLES.iter().zip(losses).map(|(&own, &loss)| single(own, loss)).collect();
     singles.sort_by(|a, b| a.loss.total_cmp(&b.loss));
     let both = [SINGLES[0], SINGLES[3]].map(|(id, value)| effect(id, value));
-    let pairs = pair.map(|loss| Explanation { causes: both.to_vec(), loss }).into_iter().collect();
-    Weighed { none: Explanation { causes: Vec::new(), loss: none }, singles, pairs }
+    let pairs = pair.map(|loss| Explanation::new(both.to_vec(), loss)).into_iter().collect();
+    Weighed { none: Explanation::new(Vec::new(), none), singles, pairs }
 }
 
 fn judged(none: f64, losses: &[f64], pair: Option<f64>) -> Judgement {

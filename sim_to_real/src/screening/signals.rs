@@ -107,6 +107,12 @@ impl<'a> Signals<'a> {
         self.position_m.map(|[x, y]| (x[to] - x[from]).hypot(y[to] - y[from]))
     }
 
+    /// The same along the yaw half way [m].
+    pub(super) fn moved_ahead_m(&self, from: usize, to: usize) -> Option<f64> {
+        let (sine, cosine) = self.yaw?.values[usize::midpoint(from, to)].sin_cos();
+        self.position_m.map(|[x, y]| ((x[to] - x[from]) * cosine + (y[to] - y[from]) * sine).abs())
+    }
+
     /// Yaw rate, measured or from the yaw over windows of a fifth of a second.
     pub(super) fn turning_radps(&self) -> Option<Vec<f64>> {
         if let Some(yaw_rate) = self.yaw_rate {

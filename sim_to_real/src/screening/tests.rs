@@ -230,6 +230,23 @@ fn other_units_of_speed_and_length_are_named() {
     assert!(told.starts_with("x and y: expected SI units, found millimetres?"), "{told}");
 }
 
+/// At a slip angle of 55 degrees the way is 1 / cos(55 degrees) = 1.74 times as long as the speed ahead says, which is
+/// sliding and no wrong unit.
+#[test]
+fn sliding_sideways_is_not_a_unit() {
+    let slip_rad = 55.0_f64.to_radians();
+    let sliding = |row: &DriveRow| {
+        row.with(Column::Vx, row.value(Column::Vx) * slip_rad.cos())
+            .with(Column::Yaw, row.value(Column::Yaw) - slip_rad)
+    };
+    let log = log(&rows(1000).iter().map(sliding).collect::<Vec<_>>());
+    let told = screen(&machine(), &log);
+    assert!(
+        !told.iter().any(|suspicion| matches!(suspicion, Suspicion::PathAgainstSpeed { .. })),
+        "{told:?}"
+    );
+}
+
 #[test]
 fn a_vehicle_slower_than_commanded_is_not_a_unit() {
     for factor in [0.5, 0.8, 1.2] {

@@ -140,26 +140,34 @@ fn unit(ratio: f64) -> Option<&'static str> {
 
 fn path_against_speed(runs: &[Signals<'_>]) -> Option<Suspicion> {
     let column = runs.iter().find_map(|run| run.speed)?.name();
-    let ratio = path_ratio(runs)?;
-    if (PATH_RATIO[0]..PATH_RATIO[1]).contains(&ratio) {
+    let ratio = path_ratio(runs, |run, from, to| run.moved_m(from, to))?;
+    let is_usual = |ratio: f64| (PATH_RATIO[0]..PATH_RATIO[1]).contains(&ratio);
+    if is_usual(ratio) {
         return None;
     }
     let evidence = format!("the path is {ratio:.4} times as long as {column} says");
     Some(match (unit(ratio), unit(1.0 / ratio)) {
         (Some(unit), _) => Suspicion::Unit { column, unit, evidence },
         (_, Some(unit)) => Suspicion::Unit { column: "x and y", unit, evidence },
+        // Who slides sideways goes farther than the speed ahead says.
+        _ if path_ratio(runs, |run, from, to| run.moved_ahead_m(from, to)).is_some_and(is_usual) => {
+            return None;
+        }
         _ => Suspicion::PathAgainstSpeed { ratio },
     })
 }
 
 /// Path over integrated speed: the median over windows with much speed, which leaps do not reach.
-fn path_ratio(runs: &[Signals<'_>]) -> Option<f64> {
+fn path_ratio(
+    runs: &[Signals<'_>],
+    moved_m: impl Fn(&Signals<'_>, usize, usize) -> Option<f64>,
+) -> Option<f64> {
     let ways: Vec<[f64; 2]> = runs
         .iter()
         .flat_map(|run| {
             let travelled = run.speed.map(|speed| run.summed(speed.values)).unwrap_or_default();
             let way = |(from, to): (usize, usize)| {
-                Some([(travelled.get(to)? - travelled.get(from)?).abs(), run.moved_m(from, to)?])
+                Some([(travelled.get(to)? - travelled.get(from)?).abs(), moved_m(run, from, to)?])
             };
             run.windows().filter_map(way).collect::<Vec<_>>()
         })

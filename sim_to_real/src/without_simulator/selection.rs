@@ -19,9 +19,19 @@ const PRICE_ELSEWHERE: f64 = 0.02;
 const TOLD_APART: f64 = 0.03;
 /// Effects this near to the best of their turn are tried in its place later.
 const NEAR: f64 = 0.3;
-/// What pushes or brakes the body.
-const FORCES: [&str; 7] =
-    ["rolling_drag", "quad_drag", "veg_drag", "loose_drag", "cornering_drag", "slope_gravity", "wind"];
+/// What pushes or brakes the body, and what a speed loop does beside closing its distance.
+const FORCES: [&str; 10] = [
+    "rolling_drag",
+    "quad_drag",
+    "veg_drag",
+    "loose_drag",
+    "cornering_drag",
+    "slope_gravity",
+    "wind",
+    "feed_forward",
+    "speed_integral",
+    "drive_lag",
+];
 /// Additions that are fitted together with all that is known, best first, and how often the next few get their turn.
 const N_REFINED: usize = 3;
 const N_BATCHES: usize = 2;
@@ -55,7 +65,7 @@ impl LeftOut<'_> {
         for (out, own) in self.folds.groups.iter().enumerate() {
             let others = self.folds.groups.iter().enumerate().filter(|(group, _)| *group != out);
             let rest = trial(others.flat_map(|(_, drives)| drives.iter().copied()).collect());
-            let start = Explanation { loss: rest.loss(causes), causes: causes.to_vec() };
+            let start = Explanation::new(causes.to_vec(), rest.loss(causes));
             let found = if causes.is_empty() { start } else { rest.refined(start) };
             let n_starts: usize = own.iter().map(|drive| drive.starts.len()).sum();
             sum += trial(own.clone()).loss(&found.causes) * n_starts as f64;
@@ -76,7 +86,7 @@ pub(crate) struct Grown {
 
 /// Adds effects as long as they are worth their price, at most `n_most`.
 pub(crate) fn grown(trial: &Trial<'_>, left_out: Option<&LeftOut<'_>>, n_most: usize) -> Grown {
-    let mut best = Explanation { causes: Vec::new(), loss: trial.loss(&[]) };
+    let mut best = Explanation::new(Vec::new(), trial.loss(&[]));
     let mut elsewhere = left_out.map(|left_out| left_out.judge(&[]).0);
     let mut rivals = Vec::new();
     let last_turn = loop {
@@ -150,7 +160,7 @@ fn additions(trial: &Trial<'_>, known: &Explanation) -> Vec<(&'static Descriptio
     let may_act = |id: &str| may_push || !FORCES.contains(&id);
     let candidates = CATALOGUE.iter().filter(|description| {
         let id = description.id;
-        !ids.contains(&id) && may_act(id) && trial.comparison.judges(id)
+        !ids.contains(&description.cause) && may_act(id) && trial.comparison.judges(id)
     });
     let mut turn: Vec<_> = candidates
         .filter_map(|description| Some((description, trial.with_one_more(&known.causes, description)?)))
@@ -201,7 +211,8 @@ fn gains(
 ) -> Vec<(&'static str, f64)> {
     let of_selected = best.ids().into_iter().map(|id| {
         let causes = without(best, id);
-        let start = Explanation { loss: trial.loss(&causes), causes };
+        let loss = trial.loss(&causes);
+        let start = Explanation::new(causes, loss);
         let rest = if start.causes.is_empty() { start } else { trial.refined(start) };
         (id, (rest.loss / best.loss).ln())
     });
@@ -220,8 +231,9 @@ impl Selection {
             if n_before == 0 {
                 return;
             }
-            let start = self.explanation.clone();
-            self.explanation = trial.refined(Explanation { loss: trial.loss(&start.causes), ..start });
+            let causes = self.explanation.causes.clone();
+            let loss = trial.loss(&causes);
+            self.explanation = trial.refined(Explanation::new(causes, loss));
             self.explanation.causes.retain(is_clear_of_bounds);
             let may_push = may_push(trial, &self.explanation.ids());
             self.explanation.causes.retain(|cause| may_push || !FORCES.contains(&cause.description().id));
