@@ -29,6 +29,7 @@ SETS = {
     "tune_b": SetPlan(["lorry", "coupe", "truck"], ["parts"], 26, 6, 6, 6),
     "tune_none": SetPlan(["saloon", "estate", "rover", "lorry", "coupe", "truck"], ["command"], 0, 4, 0, 0),
     "check_c": SetPlan(["roadster", "van", "buggy"], ["command", "parts"], 14, 7, 3, 3),
+    "check_d": SetPlan(["hatchback", "pickup", "crawler"], ["command", "parts"], 14, 7, 3, 3),
 }
 
 

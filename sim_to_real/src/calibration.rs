@@ -7,7 +7,7 @@ use bicycle::Effect;
 use bicycle::effect::Parameter;
 
 /// What every machine has a little of, in order of action, with the values that the fit starts from.
-const ORDINARY: [(&str, [f64; 4]); 21] = [
+const ORDINARY: [(&str, [f64; 4]); 22] = [
     ("steer_delay", [0.02, 0.0, 0.0, 0.0]),
     ("speed_delay", [0.02, 0.0, 0.0, 0.0]),
     ("speed_scale", [1.0, 0.0, 0.0, 0.0]),
@@ -21,6 +21,7 @@ const ORDINARY: [(&str, [f64; 4]); 21] = [
     ("feed_forward", [0.6, 0.0, 0.0, 0.0]),
     ("speed_integral", [3.0, 0.0, 0.0, 0.0]),
     ("drive_limit", [8.0, 8.0, 0.0, 0.0]),
+    ("drive_lag", [0.05, 0.0, 0.0, 0.0]),
     ("rolling_drag", [0.0; 4]),
     ("veg_drag", [0.0; 4]),
     ("loose_drag", [0.0; 4]),
@@ -34,13 +35,15 @@ const ORDINARY: [(&str, [f64; 4]); 21] = [
 /// a slope that a fit could follow.
 const CONTROLLERS: [&[&str]; 3] = [
     &[],
-    &["accel_limit", "speed_lag", "feed_forward"],
-    &["accel_limit", "speed_lag", "feed_forward", "speed_integral"],
+    &["accel_limit", "speed_lag", "feed_forward", "drive_lag"],
+    &["accel_limit", "speed_lag", "feed_forward", "speed_integral", "drive_lag"],
 ];
 /// A controller is taken for a less simple one when that foretells the drives better by this, in the logarithm of the loss.
-const WORTH_A_CONTROLLER: f64 = 0.2;
+const WORTH_A_CONTROLLER: f64 = 0.16;
 /// Pull towards no effect, so that what the drives leave open stays small.
 const PULL: f64 = 1.5;
+/// Shares of gravity, along and across.
+const GRAVITY: [&str; 2] = ["slope_gravity", "cross_slope"];
 
 /// Fits the ordinary effects to drives, and the yardstick to what is left.
 pub(crate) fn calibrated(wheelbase_m: f64, drives: &[&Drive]) -> (Vec<Effect>, Yardstick) {
@@ -48,11 +51,11 @@ pub(crate) fn calibrated(wheelbase_m: f64, drives: &[&Drive]) -> (Vec<Effect>, Y
     let mut yardstick = Yardstick::rough();
     for round in 0..3 {
         let comparison = Comparison::new(wheelbase_m, drives.to_vec(), &yardstick);
-        let fitted = |start| refined(&comparison, &with_limits_tried(&comparison, start));
+        let fitted = |start, held| refined(&comparison, &with_limits_tried(&comparison, start), held);
         effects = if round == 0 {
-            with_controller(&comparison, CONTROLLERS.map(|own| fitted(ordinary(own))))
+            with_controller(&comparison, CONTROLLERS.map(|own| fitted(ordinary(own), &[])))
         } else {
-            fitted(effects)
+            fitted(with_whole_gravity(effects), &GRAVITY)
         };
         yardstick = Yardstick::of(&comparison.residuals(&effects), &yardstick);
     }
@@ -96,20 +99,33 @@ fn with_limits_tried(comparison: &Comparison<'_>, mut effects: Vec<Effect>) -> V
     effects
 }
 
-/// All parameters of all effects fitted together.
-fn refined(comparison: &Comparison<'_>, effects: &[Effect]) -> Vec<Effect> {
-    let coordinates: Vec<Coordinate> = effects.iter().flat_map(coordinates_of).collect();
+/// Gravity acts whole or, in a simulator of a plane, not at all. Told apart, the shares are not fitted any more: else the
+/// gain of the speed loop, by which every force is measured, would be anybody's.
+fn with_whole_gravity(mut effects: Vec<Effect>) -> Vec<Effect> {
+    let share = |effect: &Effect| effect.values()[0];
+    let along = effects.iter().find(|effect| effect.description().id == GRAVITY[0]).map_or(0.0, share);
+    let whole = if along > 0.5 { 1.0 } else { 0.0 };
+    for effect in effects.iter_mut().filter(|effect| GRAVITY.contains(&effect.description().id)) {
+        let id = effect.description().id;
+        *effect = Effect::from_values(id, [whole, 0.0, 0.0, 0.0]).unwrap_or(*effect);
+    }
+    effects
+}
+
+/// All parameters of all effects fitted together, but for those of effects that are held.
+fn refined(comparison: &Comparison<'_>, effects: &[Effect], held: &[&str]) -> Vec<Effect> {
+    let of = |effect: &Effect| coordinates_of(effect, held.contains(&effect.description().id));
+    let coordinates: Vec<Coordinate> = effects.iter().flat_map(of).collect();
     let found = fit(&coordinates, |values| comparison.residuals(&with_values(effects, values)));
     with_values(effects, &found.values)
 }
 
-fn coordinates_of(effect: &Effect) -> Vec<Coordinate> {
-    let parameters = effect.description().parameters;
-    parameters
-        .iter()
-        .zip(effect.values())
-        .map(|(parameter, value)| coordinate(parameter, value, Some(PULL)))
-        .collect()
+fn coordinates_of(effect: &Effect, is_held: bool) -> Vec<Coordinate> {
+    let own = |(parameter, value): (&Parameter, f64)| {
+        let own = coordinate(parameter, value, Some(PULL));
+        if is_held { Coordinate { low: own.start, high: own.start, pull: None, ..own } } else { own }
+    };
+    effect.description().parameters.iter().zip(effect.values()).map(own).collect()
 }
 
 /// A parameter as the fit sees it: limits by their logarithm, all else as it is.

@@ -13,7 +13,7 @@ const STUDENT_90: f64 = 1.833;
 /// What the calibrated model's own error adds, in changes of the parameter that matter,
 const MODEL_ERROR: f64 = 0.06;
 /// and what the difference between the machine's effect and the catalogue's formula adds, in distances from no effect.
-const FORM_ERROR: f64 = 0.08;
+const FORM_ERROR: f64 = 0.12;
 
 /// The effects with their parameters and 90 % intervals.
 pub(crate) fn named_effects(trial: &Trial<'_>, causes: &[Effect]) -> Vec<NamedEffect> {

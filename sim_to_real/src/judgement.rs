@@ -24,6 +24,8 @@ const MOST_NAMES: usize = 6;
 const UNKNOWN_IN_FLOORS: f64 = 1.55;
 /// this share of the gap.
 const UNKNOWN_SHARE: f64 = 0.35;
+/// The same beside friction, where a rest is no sign of anything else: how a vehicle slides is only outlined.
+const UNKNOWN_SHARE_WHILE_SLIDING: f64 = 0.75;
 /// An unknown rest beside less than this part of the squared gap makes a name worthless.
 const WORTH_A_NAME: f64 = 0.25;
 /// The loss that a drive may have at best, in losses of the null.
@@ -82,7 +84,9 @@ impl Weighed {
         let over = |loss: f64| (loss - null.loss).max(0.0);
         let left = over(best.loss) / over(self.none.loss).max(1e-9);
         let floors = (best.loss / null.loss).sqrt();
-        let unknown = floors > UNKNOWN_IN_FLOORS && left.sqrt() > UNKNOWN_SHARE;
+        let slides = best.causes.iter().any(|cause| matches!(cause, Effect::Friction(_)));
+        let share = if slides { UNKNOWN_SHARE_WHILE_SLIDING } else { UNKNOWN_SHARE };
+        let unknown = floors > UNKNOWN_IN_FLOORS && left.sqrt() > share;
         match (best.causes.is_empty(), unknown) {
             (true, false) => (Verdict::None, Vec::new()),
             (true, true) => (Verdict::Unknown, Vec::new()),

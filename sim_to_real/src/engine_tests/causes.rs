@@ -58,7 +58,7 @@ fn two_effects_that_were_put_in_are_the_best_pair() {
         ids.sort_unstable();
         assert_eq!(ids, ["speed_scale", "steer_gain"], "{:?}", pair.causes);
         for cause in &pair.causes {
-            let expected = if cause.description().id == "steer_gain" { 0.85 } else { 0.9 };
+            let expected = if cause.description().cause == "steer_gain" { 0.85 } else { 0.9 };
             assert!((cause.values()[0] - expected).abs() < 0.01, "{cause:?}");
         }
         assert!(pair.loss < 0.5 * singles[0].loss);

@@ -5,6 +5,7 @@ use crate::answer::Verdict;
 use crate::baseline::Null;
 use crate::causes::Explanation;
 use crate::judgement::{Judgement, Weighed};
+use bicycle::Effect;
 use proptest::prelude::*;
 use std::collections::BTreeMap;
 
@@ -105,6 +106,30 @@ fn what_exceeds_the_floor_and_a_share_of_the_gap_is_unknown() {
     assert_eq!(judged(9.0, &[9.0; 5], None).verdict, Verdict::Unknown);
     // In reach of the floor a rest is no unknown, whatever its share.
     assert_eq!(judged(1.2, &[1.2; 5], None).verdict, Verdict::None);
+}
+
+/// 5 of 20 floors left in loss, half of the gap in error, is more than the model of any effect but friction may leave.
+#[test]
+fn a_rest_beside_sliding_is_no_sign_of_anything_else() {
+    let with = |own: Effect| {
+        let singles = vec![Explanation::new(vec![own], 5.75)];
+        let none = Explanation::new(Vec::new(), 20.0);
+        Weighed { none, singles, pairs: Vec::new() }.judge(&null(("wind", 0.0))).verdict
+    };
+    assert_eq!(with(effect("steer_lag", 0.2)), Verdict::EffectsAndUnknown);
+    let friction = Effect::from_values("friction", [0.4, 1.0, 3.0, 0.0]).unwrap();
+    assert_eq!(with(friction), Verdict::Effects);
+}
+
+/// Two that fit alike; one of them foretells other drives a tenth worse, which is half a tenth in energy.
+#[test]
+fn what_foretells_worse_is_believed_less() {
+    let losses = [1.0, 1.02, 3.0, 3.0, 3.0];
+    let mut weighed = weighed(4.0, &losses, None);
+    assert_eq!(announced(&weighed.judge(&null(("wind", 0.0)))), ["steer_lag"]);
+    weighed.singles[0].foretold_loss = 1.1;
+    assert!((weighed.singles[0].energy() - 0.5 * 1.1_f64.ln()).abs() < 1e-12);
+    assert_eq!(announced(&weighed.judge(&null(("wind", 0.0)))), ["steer_delay"]);
 }
 
 proptest! {

@@ -1,6 +1,7 @@
 //! The parts of the engine on inputs whose answer is known by arithmetic.
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
+mod calibration;
 mod causes;
 mod conditions;
 mod intervals;
