@@ -24,7 +24,7 @@ pub use bench_gap::BenchGapArguments;
 pub use collect::{CollectArguments, CollectMap, CollectSplit, CollectWorld};
 pub use deviation::AskedDeviation;
 pub use drive::{DriveArguments, InstructionSet, MapSource, Method, Pace};
-pub use gap::{GapApplyArguments, GapCommand, GapDiagnoseArguments};
+pub use gap::{GapApplyArguments, GapCommand, GapDiagnoseArguments, GapEffectsArguments};
 pub use gap_check::{GapScoreArguments, GapSealArguments};
 pub use inspect::InspectArguments;
 pub use learned_map::{BenchLearnedMapArguments, NetworkSizes};

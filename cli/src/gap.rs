@@ -4,6 +4,7 @@ mod apply;
 mod baseline;
 mod diagnose;
 mod drives;
+mod effects;
 mod follow_up;
 mod html;
 mod machine;
@@ -22,6 +23,7 @@ pub(crate) fn run(command: &GapCommand) -> anyhow::Result<()> {
     match command {
         GapCommand::Diagnose(diagnose) => diagnose::run(diagnose),
         GapCommand::Apply(apply) => apply::run(apply),
+        GapCommand::Effects(effects) => effects::run(effects),
         GapCommand::Seal(seal) => seal::run(seal),
         GapCommand::Score(score) => score::run(score),
     }

@@ -14,6 +14,7 @@ mod loss_curves;
 mod map;
 mod navigation_table;
 mod relief;
+mod signatures;
 mod strips;
 mod traction_map;
 mod view;
@@ -35,6 +36,7 @@ pub use gap_score::draw_gap_score;
 pub use learning::{draw_learning, learning_svg};
 pub use loss_curves::draw_loss_curves;
 pub use navigation_table::draw_navigation_table;
+pub use signatures::draw_signatures;
 pub use traction_map::draw_traction_map;
 
 /// One drive, as far as a picture needs it. All positions are in the map frame.

@@ -301,3 +301,19 @@ fn an_interrupted_run_leaves_nothing_half_written() {
     assert!(output.status.success());
     assert!(is_whole(&folder.path().join("r/report.html")) && is_whole(&folder.path().join("p.csv")));
 }
+
+/// The page in the docs is the one that the program writes, and names every effect with its equation.
+#[test]
+fn the_catalogue_in_the_docs_is_the_programs() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("new");
+    succeed(folder.path(), &["effects", "--out", "new"]);
+    let written = fs::read_to_string(out.join("effects.md")).unwrap();
+    let docs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/effects.md");
+    assert!(written == fs::read_to_string(docs).unwrap(), "run `surefoot gap effects --out docs`");
+    assert!(fs::metadata(out.join("effects.png")).unwrap().len() > 50_000);
+    let told = succeed(folder.path(), &["effects"]);
+    for description in bicycle::effect::CATALOGUE {
+        assert!(told.contains(description.id) && told.contains(description.meaning), "{}", description.id);
+    }
+}

@@ -40,6 +40,9 @@ const CONTROLLERS: [&[&str]; 3] = [
 ];
 /// A controller is taken for a less simple one when that foretells the drives better by this, in the logarithm of the loss.
 const WORTH_A_CONTROLLER: f64 = 0.16;
+/// The same where no gravity acts: nothing then tells how the controller answers a force, and a less simple one that is
+/// not there would answer it wrongly.
+const WORTH_A_CONTROLLER_ON_A_PLANE: f64 = 0.5;
 /// Pull towards no effect, so that what the drives leave open stays small.
 const PULL: f64 = 1.5;
 /// Shares of gravity, along and across.
@@ -72,7 +75,8 @@ fn ordinary(controller: &[&str]) -> Vec<Effect> {
 /// The simplest of the fits that no less simple one beats by what it is worth.
 fn with_controller<const N: usize>(comparison: &Comparison<'_>, fits: [Vec<Effect>; N]) -> Vec<Effect> {
     let energy = |(place, effects): &(usize, Vec<Effect>)| {
-        comparison.loss(effects).ln() + WORTH_A_CONTROLLER * *place as f64
+        let worth = if is_heavy(effects) { WORTH_A_CONTROLLER } else { WORTH_A_CONTROLLER_ON_A_PLANE };
+        comparison.loss(effects).ln() + worth * *place as f64
     };
     let best = fits.into_iter().enumerate().min_by(|a, b| energy(a).total_cmp(&energy(b)));
     best.map_or_else(Vec::new, |(_, effects)| effects)
@@ -102,14 +106,17 @@ fn with_limits_tried(comparison: &Comparison<'_>, mut effects: Vec<Effect>) -> V
 /// Gravity acts whole or, in a simulator of a plane, not at all. Told apart, the shares are not fitted any more: else the
 /// gain of the speed loop, by which every force is measured, would be anybody's.
 fn with_whole_gravity(mut effects: Vec<Effect>) -> Vec<Effect> {
-    let share = |effect: &Effect| effect.values()[0];
-    let along = effects.iter().find(|effect| effect.description().id == GRAVITY[0]).map_or(0.0, share);
-    let whole = if along > 0.5 { 1.0 } else { 0.0 };
+    let whole = if is_heavy(&effects) { 1.0 } else { 0.0 };
     for effect in effects.iter_mut().filter(|effect| GRAVITY.contains(&effect.description().id)) {
         let id = effect.description().id;
         *effect = Effect::from_values(id, [whole, 0.0, 0.0, 0.0]).unwrap_or(*effect);
     }
     effects
+}
+
+/// Whether more than half of gravity was found to act along slopes.
+fn is_heavy(effects: &[Effect]) -> bool {
+    effects.iter().any(|effect| effect.description().id == GRAVITY[0] && effect.values()[0] > 0.5)
 }
 
 /// All parameters of all effects fitted together, but for those of effects that are held.

@@ -2,8 +2,8 @@
 //! discrimination.
 
 mod discrimination;
-mod family;
-mod simulation;
+pub(crate) mod family;
+pub(crate) mod simulation;
 
 use crate::answer::Verdict;
 use crate::baseline::{Baseline, GapError, drives_of};
@@ -166,7 +166,8 @@ impl<'a> Design<'a> {
     /// What a rival would measure of commands; `None` where its model leaves the numbers or the drive is too short.
     fn measured(&self, rival: &Rival, start: (f64, &[Command])) -> Option<Drive> {
         let effects = rival.effects(&self.baseline.effects);
-        let log = measured_drive(self.machine.wheelbase_m, &effects, start).ok()?;
+        let log = measured_drive(self.machine.wheelbase_m, &effects, start, &|_| bicycle::GroundSample::FIRM)
+            .ok()?;
         let level = Machine { ground: None, ..self.machine.clone() };
         drives_of("designed", &level, &[log]).ok()?.pop()
     }

@@ -1,6 +1,6 @@
 //! A speed controller that asks the drive for the command's own acceleration.
 
-use super::definition::{Commanding, Constants, Definition, Driving, Role, Stage, parameters};
+use super::definition::{Commanding, Constants, Definition, Role, Stage, parameters};
 use crate::lanes::{Lanes, Real};
 
 parameters! {
@@ -13,9 +13,9 @@ parameters! {
 
 impl Definition for FeedForward {
     const ID: &'static str = "feed_forward";
-    const MEANING: &'static str = "feed-forward: dv/dt = ... + F d command/dt";
+    const MEANING: &'static str = "feed-forward to the speed loop: dv/dt = (command - v) / T + F d command/dt";
     const ROLE: Role = Role::Calibration;
-    const STAGES: &'static [Stage] = &[Stage::Command, Stage::Drive];
+    const STAGES: &'static [Stage] = &[Stage::Command];
 
     fn constants(&self, step_s: f64) -> [f64; 4] {
         [self.share / step_s, 0.0, 0.0, 0.0]
@@ -35,10 +35,5 @@ impl Definition for FeedForward {
         let change = state.speed - Real(lanes, state.memory[0]);
         state.memory[0] = state.speed.1;
         state.acceleration = change.mul_add(Real::constant(lanes, constants[0]), state.acceleration);
-    }
-
-    #[inline(always)]
-    fn on_drive<L: Lanes>(_constants: &Constants, state: &mut Driving<L>) {
-        state.drive_by(state.asked_acceleration);
     }
 }

@@ -27,5 +27,6 @@ impl Definition for SpeedLoop {
         let rate = Real::constant(state.speed.0, constants[0]);
         let limit = state.acceleration.abs();
         state.acceleration = ((state.asked_speed - state.speed) * rate).clamp(-limit, limit);
+        state.drive_by(state.asked_acceleration);
     }
 }

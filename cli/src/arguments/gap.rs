@@ -13,6 +13,8 @@ pub enum GapCommand {
     /// Put the effects of a diagnosis into the controller's model
     #[command(long_about = APPLY_ABOUT)]
     Apply(GapApplyArguments),
+    /// List the effects that a diagnosis knows: equations, parameters and what each does to a drive
+    Effects(GapEffectsArguments),
     /// Make cases with withheld causes, to try a diagnosis on
     #[command(long_about = super::gap_check::SEAL_ABOUT)]
     Seal(super::GapSealArguments),
@@ -20,6 +22,21 @@ pub enum GapCommand {
     #[command(long_about = super::gap_check::SCORE_ABOUT)]
     Score(super::GapScoreArguments),
 }
+
+/// Where the catalogue goes.
+#[derive(Args, Clone, Debug)]
+#[command(after_long_help = EFFECTS_AFTER_HELP)]
+pub struct GapEffectsArguments {
+    /// Write the catalogue as effects.md with a picture of every effect's signature into this folder, which is made if
+    /// missing; without it, the catalogue is printed
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+}
+
+const EFFECTS_AFTER_HELP: &str = "\
+Examples:
+  surefoot gap effects
+  surefoot gap effects --out docs";
 
 /// Which drives to diagnose, and where the answer goes.
 #[derive(Args, Clone, Debug)]

@@ -121,7 +121,7 @@ fn sine(speed: f64, angle: f64, frequency_hz: f64) -> Piece {
 }
 
 /// Durations [s], speeds [m/s] and angles [rad], one after the other.
-pub(super) fn held(parts: &[(f64, f64, f64)]) -> Vec<Command> {
+pub(crate) fn held(parts: &[(f64, f64, f64)]) -> Vec<Command> {
     let rows = parts.iter().flat_map(|&(duration_s, speed, angle)| {
         std::iter::repeat_n(command(speed, angle), (duration_s / STEP_S).round() as usize)
     });

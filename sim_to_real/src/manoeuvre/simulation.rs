@@ -1,4 +1,4 @@
-//! A whole drive on level ground as a model with its sensors would make it.
+//! A whole drive as a model with its sensors would make it.
 
 use crate::drive::STEP_S;
 use bicycle::lanes::{Real, STEERING_DOMAIN_RAD, Scalar};
@@ -22,16 +22,21 @@ const UNLIMITED: Limits = Limits {
 /// What is true at one row: east, north [m], yaw without jumps [rad], forward speed [m/s], yaw rate [rad/s].
 type Truth = [f64; 5];
 
+/// The ground of every row of a drive.
+pub(crate) type GroundOfRow<'a> = &'a dyn Fn(usize) -> GroundSample;
+
 /// The measurements, free of noise, of a vehicle that begins at a speed and follows commands.
 ///
 /// # Errors
 /// The model left the numbers.
-pub(super) fn measured_drive(
+pub(crate) fn measured_drive(
     wheelbase_m: f64,
     effects: &[Effect],
-    (speed_mps, commands): (f64, &[Command]),
+    start: (f64, &[Command]),
+    ground: GroundOfRow<'_>,
 ) -> Result<DriveLog, DriveLogError> {
-    let truths = driven(wheelbase_m, effects, (speed_mps, commands));
+    let commands = start.1;
+    let truths = driven(wheelbase_m, effects, start, ground);
     let sensors = SensorModel::of(effects);
     let mut log = DriveLog::default();
     for (row, command) in commands.iter().enumerate() {
@@ -52,7 +57,12 @@ pub(super) fn measured_drive(
     Ok(log)
 }
 
-fn driven(wheelbase_m: f64, effects: &[Effect], (speed_mps, commands): (f64, &[Command])) -> Vec<Truth> {
+fn driven(
+    wheelbase_m: f64,
+    effects: &[Effect],
+    (speed_mps, commands): (f64, &[Command]),
+    ground: GroundOfRow<'_>,
+) -> Vec<Truth> {
     let model = Model { wheelbase_m, limits: UNLIMITED, effects: effects.to_vec() };
     let stepper = Stepper::new(&model, STEP_S, 1.0).with_instant_actuators();
     let mut memory = vec![0.0; stepper.n_slots()];
@@ -62,15 +72,19 @@ fn driven(wheelbase_m: f64, effects: &[Effect], (speed_mps, commands): (f64, &[C
     let real = |value: f64| Real(Scalar, value);
     let zero = real(0.0);
     let mut state = LaneState { x: zero, y: zero, turns: zero, speed: real(speed_mps), steering: zero };
-    let firm = real(1.0);
-    let level =
-        GroundSample { linear_traction: firm, angular_traction: firm, gradient: [zero; 2], class: zero };
     let (mut yaw, mut rates) = (0.0, [speed_mps, 0.0]);
     let mut truths = Vec::with_capacity(commands.len());
     for (step, command) in commands.iter().enumerate() {
         truths.push([state.x.1, state.y.1, yaw, rates[0], rates[1]]);
         let command = [command.speed_mps, command.steering_rad].map(|value| real(f64::from(value)));
-        let reached = stepper.step(&mut state, command, &level, &mut memory, step);
+        let GroundSample { linear_traction, angular_traction, gradient, class } = ground(step);
+        let ground = GroundSample {
+            linear_traction: real(linear_traction),
+            angular_traction: real(angular_traction),
+            gradient: gradient.map(real),
+            class: real(class),
+        };
+        let reached = stepper.step(&mut state, command, &ground, &mut memory, step);
         rates = [reached.speed.1, reached.yaw_rate.1];
         // The state's own yaw wraps.
         let turned = state.turns.1 - yaw / TAU;
@@ -101,7 +115,8 @@ mod tests {
     /// Two turns of a circle: yaw v tan(angle) t / L beyond a whole turn, speed and yaw rate as commanded.
     #[test]
     fn the_bare_bicycle_turns_as_its_formula_says() {
-        let log = measured_drive(2.0, &[], (1.0, &held(&[(30.0, 1.0, 0.4)]))).unwrap();
+        let log =
+            measured_drive(2.0, &[], (1.0, &held(&[(30.0, 1.0, 0.4)])), &|_| GroundSample::FIRM).unwrap();
         let (yaw, wz) = (column(&log, Column::Yaw), column(&log, Column::Wz));
         let rate = 0.4_f32.tan() / 2.0;
         let last = yaw.len() - 1;
@@ -115,7 +130,7 @@ mod tests {
         let values = |id: &str, value: f64| Effect::from_values(id, [value, 0.0, 0.0, 0.0]).unwrap();
         let effects = [values("pose_latency", 0.1), values("yaw_misalign", 0.05), values("odom_scale", 1.1)];
         let straight = held(&[(2.0, 1.0, 0.0)]);
-        let log = measured_drive(2.0, &effects, (1.0, &straight)).unwrap();
+        let log = measured_drive(2.0, &effects, (1.0, &straight), &|_| GroundSample::FIRM).unwrap();
         let (x, yaw, vx) = (column(&log, Column::X), column(&log, Column::Yaw), column(&log, Column::Vx));
         assert!((x[50] - 0.9).abs() < 1e-6 && (yaw[50] - 0.05).abs() < 1e-9 && (vx[50] - 1.1).abs() < 1e-6);
     }
