@@ -1,0 +1,324 @@
+//! The kinematic bicycle on ground that takes a share of every motion (PIETRA, equation 2), step by step.
+
+use crate::effect::{CommandStep, Driving, Moving, PreparedEffects};
+use crate::lanes::{Constant, Lanes, Real, STEERING_DOMAIN_RAD, Scalar};
+use crate::{Command, GroundSample, Model, State};
+use std::f64::consts::TAU;
+
+/// States of a pack of vehicles. Lengths are in the unit that the stepper was made for.
+#[derive(Clone, Copy)]
+pub struct LaneState<L: Lanes> {
+    /// East [unit].
+    pub x: Real<L>,
+    /// North [unit].
+    pub y: Real<L>,
+    /// Yaw in whole turns, within [-1/2, 1/2].
+    pub turns: Real<L>,
+    /// Speed that the drive has reached [m/s].
+    pub speed: Real<L>,
+    /// Angle that the steering has reached [rad].
+    pub steering: Real<L>,
+}
+
+/// Body rates of a step, after the ground took its share.
+#[derive(Clone, Copy)]
+pub struct Rates<L: Lanes> {
+    /// Speed asked of the ground, before it took its share [m/s].
+    pub speed: Real<L>,
+    /// Yaw rate [rad/s].
+    pub yaw_rate: Real<L>,
+}
+
+/// What the command asks of the actuators, once the effects on it have acted.
+#[derive(Clone, Copy)]
+pub struct Asked<L: Lanes> {
+    /// Speed of the drive [m/s].
+    pub speed: Real<L>,
+    /// Angle of the steering [rad], or yaw rate of a skid-steered vehicle [rad/s].
+    pub steering: Real<L>,
+    /// Acceleration that the drive shall give beside what its speed asks for [m/s2].
+    pub acceleration: Real<L>,
+}
+
+impl<L: Lanes> Asked<L> {
+    /// A speed and an angle.
+    #[inline(always)]
+    pub fn of([speed, steering]: [Real<L>; 2]) -> Self {
+        Self { speed, steering, acceleration: speed.0.real(0.0) }
+    }
+}
+
+/// A model made ready for one step length and one unit of length.
+#[derive(Clone, Debug)]
+pub struct Stepper {
+    per_wheelbase: Constant,
+    advance: Constant,
+    turn: Constant,
+    speed_change: Constant,
+    steering_change: Constant,
+    steering_domain: Constant,
+    step: Constant,
+    per_step: Constant,
+    effects: PreparedEffects,
+}
+
+impl Stepper {
+    /// Steps of `step_s`, positions in units of `unit_m`.
+    pub fn new(model: &Model, step_s: f64, unit_m: f64) -> Self {
+        Self {
+            per_wheelbase: Constant::new(1.0 / model.wheelbase_m),
+            advance: Constant::new(step_s / unit_m),
+            turn: Constant::new(step_s / TAU),
+            speed_change: Constant::new(model.limits.acceleration_max_mps2 * step_s),
+            steering_change: Constant::new(model.limits.steering_rate_max_radps * step_s),
+            steering_domain: Constant::new(STEERING_DOMAIN_RAD),
+            step: Constant::new(step_s),
+            per_step: Constant::new(1.0 / step_s),
+            effects: PreparedEffects::new(&model.effects, step_s),
+        }
+    }
+
+    /// Changes the unit of length.
+    pub fn rescale(&mut self, unit_m: f64) {
+        self.advance = Constant::new(self.step.value() / unit_m);
+    }
+
+    /// Without the limits on acceleration and steering rate.
+    pub fn with_instant_actuators(mut self) -> Self {
+        let endless = Constant::new(1e30);
+        (self.speed_change, self.steering_change) = (endless, endless);
+        self
+    }
+
+    /// Whether the model has effects; if not, [`Stepper::step_bare`] does for commands within the limits.
+    pub fn has_effects(&self) -> bool {
+        !self.effects.is_empty()
+    }
+
+    /// Whether an effect reads the gradient or the class of the ground.
+    pub fn uses_ground(&self) -> bool {
+        self.effects.use_ground()
+    }
+
+    /// Numbers per vehicle that the effects carry from step to step.
+    pub fn n_slots(&self) -> usize {
+        self.effects.n_slots()
+    }
+
+    /// Fills the memory, [`Stepper::n_slots`] values, as the past leaves it: `past` gives the command that was in
+    /// force an age [s] before the start, up to three seconds.
+    pub fn recall(&self, past: &dyn Fn(f64) -> Command, memory: &mut [f64]) {
+        self.effects.recall(past, memory);
+    }
+
+    /// Number of accelerations that effects hold against the forces that they met; see [`Stepper::correct_held`].
+    pub fn n_held(&self) -> usize {
+        self.effects.n_held()
+    }
+
+    /// Those accelerations, of all that the memory carries [m/s2].
+    pub fn held<'a, T>(&self, memory: &'a mut [T]) -> &'a mut [T] {
+        self.effects.held(memory)
+    }
+
+    /// Corrects what is held once a step was measured: what makes the vehicle faster than foretold is a force that the
+    /// integral has met and the model has not.
+    pub fn correct_held(&self, memory: &mut [f64], faster_mps: f64) {
+        self.effects.correct_held(memory, faster_mps);
+    }
+
+    /// Fills the memory as a command leaves it that was in force for long.
+    pub fn settle(&self, command: Command, memory: &mut [f64]) {
+        let command = [f64::from(command.speed_mps), f64::from(command.steering_rad)];
+        self.effects.settle(command, memory);
+    }
+
+    /// One step with actuators that follow at once; exact when the model has no effects and the commands keep
+    /// the limits on acceleration and steering rate.
+    #[inline(always)]
+    pub fn step_bare<L: Lanes>(
+        &self,
+        state: &mut LaneState<L>,
+        command: [Real<L>; 2],
+        ground: &GroundSample<Real<L>>,
+    ) -> Rates<L> {
+        let lanes = state.x.0;
+        let [speed, steering] = command;
+        (state.speed, state.steering) = (speed, steering);
+        let (sine, cosine) = state.turns.sin_cos_turns();
+        let advance = speed * ground.linear_traction * Real::constant(lanes, self.advance);
+        let curving = steering.tan() * ground.angular_traction;
+        let yaw_rate = speed * Real::constant(lanes, self.per_wheelbase) * curving;
+        state.x = advance.mul_add(cosine, state.x);
+        state.y = advance.mul_add(sine, state.y);
+        state.turns = yaw_rate.mul_add(Real::constant(lanes, self.turn), state.turns).wrap_turns();
+        Rates { speed, yaw_rate }
+    }
+
+    /// One step of the whole model: effects on the command, limits of acceleration and steering rate, effects on
+    /// the acceleration and on the motion, traction. `memory` holds [`Stepper::n_slots`] values, `step` counts
+    /// from the start.
+    #[inline(always)]
+    pub fn step<L: Lanes>(
+        &self,
+        state: &mut LaneState<L>,
+        command: [Real<L>; 2],
+        ground: &GroundSample<Real<L>>,
+        memory: &mut [L::Value],
+        step: usize,
+    ) -> Rates<L> {
+        let asked = self.asked(command, state.speed, memory, step);
+        self.follow(state, asked, ground, memory)
+    }
+
+    /// The first half of a step: what the command asks of the actuators at a speed that was reached, once the effects
+    /// on it have acted.
+    #[inline(always)]
+    pub fn asked<L: Lanes>(
+        &self,
+        command: [Real<L>; 2],
+        reached_speed: Real<L>,
+        memory: &mut [L::Value],
+        step: usize,
+    ) -> Asked<L> {
+        let mut state = CommandStep { asked: Asked::of(command), reached_speed, step };
+        self.effects.on_command(memory, &mut state);
+        state.asked
+    }
+
+    /// The second half of a step: the actuators follow what is asked of them, and the body moves.
+    #[inline(always)]
+    pub fn follow<L: Lanes>(
+        &self,
+        state: &mut LaneState<L>,
+        asked: Asked<L>,
+        ground: &GroundSample<Real<L>>,
+        memory: &mut [L::Value],
+    ) -> Rates<L> {
+        let lanes = state.x.0;
+        let reached_speed = state.speed;
+        self.actuate(state, [asked.speed, asked.steering]);
+        let tangent = state.steering.tan();
+        let per_wheelbase = Real::constant(lanes, self.per_wheelbase);
+        let turning = |speed: Real<L>| speed * per_wheelbase * tangent;
+        self.move_body(state, (asked, reached_speed, tangent), turning, (ground, memory))
+    }
+
+    /// [`Stepper::follow`] for a skid-steered vehicle: the second of what is asked is a yaw rate [rad/s], which is
+    /// reached at once and at any speed.
+    #[inline(always)]
+    pub fn follow_yaw_rate<L: Lanes>(
+        &self,
+        state: &mut LaneState<L>,
+        asked: Asked<L>,
+        ground: &GroundSample<Real<L>>,
+        memory: &mut [L::Value],
+    ) -> Rates<L> {
+        let straight = state.x.0.real(0.0);
+        let reached_speed = state.speed;
+        self.actuate(state, [asked.speed, straight]);
+        self.move_body(state, (asked, reached_speed, straight), |_| asked.steering, (ground, memory))
+    }
+
+    /// Moves a body whose actuators have acted, from the speed before and with the tangent of the steering angle;
+    /// `turning` gives the yaw rate at a speed.
+    #[inline(always)]
+    fn move_body<L: Lanes>(
+        &self,
+        state: &mut LaneState<L>,
+        (asked, reached_speed, steering_tangent): (Asked<L>, Real<L>, Real<L>),
+        turning: impl Fn(Real<L>) -> Real<L>,
+        (ground, memory): (&GroundSample<Real<L>>, &mut [L::Value]),
+    ) -> Rates<L> {
+        let lanes = state.x.0;
+        let (sine, cosine) = state.turns.sin_cos_turns();
+        let mut side_acceleration = lanes.real(0.0);
+        if self.effects.drive() {
+            let mut driving = Driving {
+                acceleration: (state.speed - reached_speed) * Real::constant(lanes, self.per_step),
+                side_acceleration,
+                acceleration_limit: Real::constant(lanes, self.speed_change)
+                    * Real::constant(lanes, self.per_step),
+                asked_speed: asked.speed,
+                asked_acceleration: asked.acceleration,
+                speed: reached_speed,
+                steering_tangent,
+                yaw_rate: turning(reached_speed),
+                heading: [sine, cosine],
+                ground: *ground,
+                held: lanes.real(0.0),
+            };
+            self.effects.on_drive(memory, &mut driving);
+            let step = Real::constant(lanes, self.step);
+            state.speed = driving.acceleration.mul_add(step, reached_speed);
+            side_acceleration = driving.side_acceleration;
+        }
+        let yaw_rate = turning(state.speed);
+        let acceleration = (state.speed - reached_speed) * Real::constant(lanes, self.per_step);
+        let lateral = lanes.real(0.0);
+        let mut moving = Moving {
+            forward: state.speed,
+            lateral,
+            yaw_rate,
+            side_acceleration,
+            acceleration,
+            steering_tangent,
+        };
+        self.effects.on_motion(&mut moving);
+        let Moving { forward, lateral, yaw_rate, .. } = moving;
+        let share = ground.linear_traction * Real::constant(lanes, self.advance);
+        let (forward_step, lateral_step) = (forward * share, lateral * share);
+        state.x = forward_step.mul_add(cosine, state.x) - lateral_step * sine;
+        state.y = forward_step.mul_add(sine, lateral_step.mul_add(cosine, state.y));
+        let yaw_rate = yaw_rate * ground.angular_traction;
+        state.turns = yaw_rate.mul_add(Real::constant(lanes, self.turn), state.turns).wrap_turns();
+        Rates { speed: forward, yaw_rate }
+    }
+
+    #[inline(always)]
+    fn actuate<L: Lanes>(&self, state: &mut LaneState<L>, asked: [Real<L>; 2]) {
+        let lanes = state.x.0;
+        let towards = |asked: Real<L>, reached: Real<L>, change: Constant| {
+            let change = Real::constant(lanes, change);
+            asked.clamp(reached - change, reached + change)
+        };
+        state.speed = towards(asked[0], state.speed, self.speed_change);
+        let domain = Real::constant(lanes, self.steering_domain);
+        let steering = towards(asked[1], state.steering, self.steering_change);
+        state.steering = steering.clamp(-domain, domain);
+    }
+
+    /// One step of one vehicle in metres and radians: the reference. The stepper's unit must be 1 m.
+    pub fn step_state(
+        &self,
+        state: &State,
+        command: Command,
+        ground: &GroundSample,
+        memory: &mut [f64],
+        step: usize,
+    ) -> State {
+        let real = |value: f64| Real(Scalar, value);
+        let mut lanes = LaneState {
+            x: real(state.x_m),
+            y: real(state.y_m),
+            turns: real(state.yaw_rad / TAU),
+            speed: real(state.speed_mps),
+            steering: real(state.steering_rad),
+        };
+        let ground = GroundSample {
+            linear_traction: real(ground.linear_traction),
+            angular_traction: real(ground.angular_traction),
+            gradient: ground.gradient.map(real),
+            class: real(ground.class),
+        };
+        let command = [f64::from(command.speed_mps), f64::from(command.steering_rad)].map(real);
+        self.step(&mut lanes, command, &ground, memory, step);
+        State {
+            x_m: lanes.x.1,
+            y_m: lanes.y.1,
+            yaw_rad: lanes.turns.1 * TAU,
+            speed_mps: lanes.speed.1,
+            steering_rad: lanes.steering.1,
+        }
+    }
+}
