@@ -1,7 +1,7 @@
 //! What is known before the real drives are opened: the calibrated nominal model, its noise, and how much of a gap one
 //! nominal drive shows against the others.
 
-use crate::calibration::calibrated;
+use crate::calibration::{calibrated, proportional};
 use crate::causes::{Explanation, Trial};
 use crate::comparison::{Comparison, Yardstick, root_mean_square};
 use crate::conditions::StartRecord;
@@ -47,6 +47,8 @@ pub enum GapError {
 pub struct Baseline {
     pub(crate) wheelbase_m: f64,
     pub(crate) effects: Vec<Effect>,
+    /// The same with a proportional speed loop.
+    pub(crate) proportional: Vec<Effect>,
     pub(crate) yardstick: Yardstick,
     pub(crate) null: Null,
 }
@@ -94,12 +96,15 @@ impl Baseline {
             left_out.push(LeftOut::new(wheelbase_m, &drives[out], &effects, [&own, &yardstick]));
             share(out + 2);
         }
-        Ok(Self { wheelbase_m, effects, yardstick, null: Null::of(&left_out) })
+        let proportional = proportional(wheelbase_m, &all, &yardstick);
+        Ok(Self { wheelbase_m, effects, proportional, yardstick, null: Null::of(&left_out) })
     }
 
-    /// The ordinary physics of this machine, calibrated; a controller's model needs them beside what is announced.
-    pub fn effects(&self) -> &[Effect] {
-        &self.effects
+    /// The ordinary physics of this machine, calibrated for a controller's model, which needs it beside what is announced.
+    /// Its speed loop is proportional: sampled plans foretell drives worse, and drive worse, with a ramp and a
+    /// feed-forward of their own commands in the model, although these foretell recorded commands better.
+    pub fn effects_for_control(&self) -> &[Effect] {
+        &self.proportional
     }
 }
 

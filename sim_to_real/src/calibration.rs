@@ -65,6 +65,13 @@ pub(crate) fn calibrated(wheelbase_m: f64, drives: &[&Drive]) -> (Vec<Effect>, Y
     (effects, yardstick)
 }
 
+/// The ordinary effects with a proportional speed loop, fitted to drives in units of their yardstick.
+pub(crate) fn proportional(wheelbase_m: f64, drives: &[&Drive], yardstick: &Yardstick) -> Vec<Effect> {
+    let comparison = Comparison::new(wheelbase_m, drives.to_vec(), yardstick);
+    let effects = refined(&comparison, &with_limits_tried(&comparison, ordinary(&[])), &[]);
+    refined(&comparison, &with_whole_gravity(effects), &GRAVITY)
+}
+
 /// The ordinary effects with a speed controller of some kind.
 fn ordinary(controller: &[&str]) -> Vec<Effect> {
     let has = |id: &str| controller.contains(&id) || !CONTROLLERS.concat().contains(&id);

@@ -86,7 +86,13 @@ fn bare_baseline(machine: &Machine, drives: &[&Drive], yardstick: Yardstick) -> 
         cells: residual_cells(&noise, &noise, None),
         starts: StartRecord::of(drives, &noise),
     };
-    Baseline { wheelbase_m: machine.wheelbase_m, effects: Vec::new(), yardstick, null }
+    Baseline {
+        wheelbase_m: machine.wheelbase_m,
+        effects: Vec::new(),
+        proportional: Vec::new(),
+        yardstick,
+        null,
+    }
 }
 
 fn diagnosis(baseline: &Baseline, all: &[&Drive], folds: &Folds<'_>, selection: &Selection) -> Diagnosis {

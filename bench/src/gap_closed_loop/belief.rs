@@ -63,7 +63,7 @@ impl Simulator {
 
     /// The effects of the calibrated model.
     pub fn calibrated(&self) -> &[Effect] {
-        self.baseline.effects()
+        self.baseline.effects_for_control()
     }
 
     /// Drives the plant with a gap, and diagnoses what was recorded.
@@ -94,7 +94,7 @@ impl Simulator {
             Belief::Repaired => found,
             Belief::True => &truth[..],
         };
-        model.effects = composed(self.baseline.effects(), causes);
+        model.effects = composed(self.baseline.effects_for_control(), causes);
         model
     }
 }
