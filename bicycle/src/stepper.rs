@@ -106,7 +106,7 @@ impl Stepper {
     }
 
     /// Fills the memory, [`Stepper::n_slots`] values, as the past leaves it: `past` gives the command that was in
-    /// force an age [s] before the start, up to three seconds.
+    /// force an age [s] before the start, up to three seconds. What is held stays as it was.
     pub fn recall(&self, past: &dyn Fn(f64) -> Command, memory: &mut [f64]) {
         self.effects.recall(past, memory);
     }

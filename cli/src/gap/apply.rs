@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use bicycle::effect::{CATALOGUE, EffectError};
+use bicycle::effect::{CATALOGUE, DriveLag, EffectError, SpeedLag};
 use bicycle::{Effect, Model};
 use formats::ConfigText;
 use sim_to_real::{Answer, NamedEffect, Steering, Verdict};
@@ -15,6 +15,7 @@ pub(super) fn run(arguments: &GapApplyArguments) -> anyhow::Result<()> {
     let told = |message: String| UsageError(format!("{}: {message}", arguments.diagnosis.display()));
     let effects = effects(&answer).map_err(told)?;
     let mut model = read_model(&arguments.model)?;
+    let effects: Vec<Effect> = effects.into_iter().map(|effect| fitting(effect, &model)).collect();
     model.effects.extend(&effects);
     let text = text(&model, &answer, &arguments.model)?;
     formats::write_bytes_atomic(&arguments.out, text.as_bytes())
@@ -67,6 +68,18 @@ fn effect(named: &NamedEffect) -> Result<Effect, String> {
     let effect = Effect::from_values(id, values).ok_or_else(|| format!("effects: '{id}' cannot be made"))?;
     effect.validate().map_err(|error: EffectError| error.to_string())?;
     Ok(effect)
+}
+
+/// A motor's lag acts inside a speed loop. A model without one closes any distance within a step, which a late motor would
+/// overshoot: there it is a lag of the command.
+fn fitting(effect: Effect, model: &Model) -> Effect {
+    let has_loop = model.effects.iter().any(|own| matches!(own, Effect::SpeedLoop(_)));
+    match effect {
+        Effect::DriveLag(DriveLag { time_constant_s }) if !has_loop => {
+            Effect::SpeedLag(SpeedLag { time_constant_s })
+        }
+        _ => effect,
+    }
 }
 
 /// A model's file, or the model that a vehicle's file or a shipped vehicle stands for.

@@ -10,6 +10,7 @@ use crate::evidence::SpeedInput;
 use crate::machine::Machine;
 use bicycle::Effect;
 use bicycle::effect::{CATALOGUE, Description, Parameter};
+use std::collections::BTreeSet;
 
 /// Logarithmic gain in loss that an effect must bring on the drives themselves,
 const PRICE: f64 = 0.05;
@@ -189,17 +190,19 @@ fn alternatives(
 ) -> Vec<&'static str> {
     let rest = without(best, id);
     let ids = best.ids();
-    let unused = others.iter().filter(|description| !ids.contains(&description.id));
+    let unused = others.iter().filter(|description| !ids.contains(&description.cause));
     let does_as_well = |description: &&&'static Description| {
         let swapped = trial.with_one_more(&rest, description).map(|swapped| trial.refined(swapped));
         swapped
             .is_some_and(|swapped| is_within_bounds(&swapped) && (swapped.loss / best.loss).ln() < TOLD_APART)
     };
-    unused.filter(does_as_well).map(|description| description.id).collect()
+    let mut names: Vec<&str> = unused.filter(does_as_well).map(|description| description.cause).collect();
+    names.dedup();
+    names
 }
 
 fn without(explanation: &Explanation, id: &str) -> Vec<Effect> {
-    let others = explanation.causes.iter().filter(|cause| cause.description().id != id);
+    let others = explanation.causes.iter().filter(|cause| cause.description().cause != id);
     others.copied().collect()
 }
 
@@ -217,9 +220,12 @@ fn gains(
         (id, (rest.loss / best.loss).ln())
     });
     let unselected =
-        last_turn.iter().map(|(description, with)| (description.id, (best.loss / with.loss).ln()));
+        last_turn.iter().map(|(description, with)| (description.cause, (best.loss / with.loss).ln()));
     let mut gains: Vec<_> = of_selected.chain(unselected).collect();
     gains.sort_by(|a, b| b.1.total_cmp(&a.1));
+    // Of several forms of one cause, the best.
+    let mut named = BTreeSet::new();
+    gains.retain(|(id, _)| named.insert(*id));
     gains
 }
 
@@ -244,7 +250,7 @@ impl Selection {
         let ids = self.explanation.ids();
         self.alternatives.retain(|(id, _)| ids.contains(id));
         for causes in &mut self.elsewhere {
-            causes.retain(|cause| ids.contains(&cause.description().id));
+            causes.retain(|cause| ids.contains(&cause.description().cause));
         }
     }
 

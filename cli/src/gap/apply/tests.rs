@@ -106,3 +106,12 @@ fn a_skid_steered_machine_is_not_for_a_controller_that_steers_by_an_angle() {
     let text = serde_json::to_string(&answer(Verdict::None, Vec::new())).unwrap();
     assert!(!text.contains("steering") && serde_json::from_str::<Answer>(&text).is_ok(), "{text}");
 }
+
+#[test]
+fn a_motors_lag_needs_a_speed_loop_to_act_in() {
+    let lag = Effect::from_values("drive_lag", [0.3, 0.0, 0.0, 0.0]).unwrap();
+    let mut model = Model::of(&formats::read_vehicle("rc_car").unwrap());
+    assert_eq!(fitting(lag, &model), Effect::from_values("speed_lag", [0.3, 0.0, 0.0, 0.0]).unwrap());
+    model.effects.push(Effect::from_values("speed_loop", [0.4, 0.0, 0.0, 0.0]).unwrap());
+    assert_eq!(fitting(lag, &model), lag);
+}
