@@ -36,6 +36,13 @@ const LEARNED: [Row; 6] = [
 ];
 /// Largest relative spread of the learned methods in distribution.
 const SPREAD_MAX: f64 = 0.05;
+/// How far a ratio to the uniform prior may lie from the published one, and which of PIETRA's is better than published.
+const RATIO_TOLERANCE: f64 = 0.05;
+const RATIO_TO_BEAT: f64 = 0.637;
+/// How much worse than in distribution PIETRA is out of it, relative to the former.
+const LOSS_MAX: f64 = 0.05;
+/// How close the physics-informed loss alone leaves EVORA out of distribution.
+const LOSS_ALONE: f64 = 0.02;
 /// How far PIETRA lies below the physics prior and EVORA out of distribution, relative to these.
 const GAPS_MIN: [(Row, f64); 2] = [(Row::PhysicsPrior, 0.08), (Row::Evora, 0.14)];
 /// Parameters of four on which PIETRA's excess is the lowest.
@@ -49,7 +56,10 @@ const WEIGHTS: [f64; 2] = [0.9, 0.1];
 pub(super) fn verdicts(report: &Report) -> Vec<Verdict> {
     let mut verdicts: Vec<Verdict> = ORDER.iter().map(|pair| order(report, *pair)).collect();
     verdicts.extend(in_distribution(report));
+    verdicts.push(physics_loss_alone(report));
     verdicts.extend(GAPS_MIN.iter().map(|&(row, least)| gap(report, row, least)));
+    verdicts.push(loss_out_of_distribution(report));
+    verdicts.extend(ratios(report));
     verdicts.push(lowest_excess(report));
     verdicts.extend(most_uneven(report));
     verdicts.extend(evidence(report));
@@ -70,11 +80,12 @@ fn order(report: &Report, [below, above]: [Row; 2]) -> Verdict {
     }
 }
 
-fn in_distribution(report: &Report) -> [Verdict; 2] {
+fn in_distribution(report: &Report) -> [Verdict; 3] {
     let totals = LEARNED.map(|row| report.row(row).in_distribution.total.mean);
     let least = totals.into_iter().fold(f64::INFINITY, f64::min);
     let most = totals.into_iter().fold(f64::NEG_INFINITY, f64::max);
-    let prior = report.row(Row::PhysicsPrior).in_distribution.total.mean;
+    let [prior, uniform] =
+        [Row::PhysicsPrior, Row::UniformPrior].map(|row| report.row(row).in_distribution.total.mean);
     [
         Verdict {
             rule: "ID: learned methods within 5 % of one another".to_owned(),
@@ -85,6 +96,55 @@ fn in_distribution(report: &Report) -> [Verdict; 2] {
             rule: "ID: learned methods below the physics prior".to_owned(),
             found: format!("at most {most:.3}, prior {prior:.3}"),
             is_passed: most < prior,
+        },
+        Verdict {
+            rule: "ID: physics prior below uniform prior".to_owned(),
+            found: format!("{prior:.3}, {uniform:.3}"),
+            is_passed: prior < uniform,
+        },
+    ]
+}
+
+/// Without the prior the loss changes nothing: what EVORA falls back to is still uniform.
+fn physics_loss_alone(report: &Report) -> Verdict {
+    let [alone, evora] = [Row::EvoraPhysicsLoss, Row::Evora].map(|row| ood(report, row).total.mean);
+    let apart = (alone / evora - 1.0).abs();
+    Verdict {
+        rule: "OOD: physics-informed loss alone within 2 % of EVORA".to_owned(),
+        found: format!("{alone:.3}, {evora:.3}; {:.1} % apart", 100.0 * apart),
+        is_passed: apart <= LOSS_ALONE,
+    }
+}
+
+fn loss_out_of_distribution(report: &Report) -> Verdict {
+    let even = report.row(Row::Pietra).in_distribution.total.mean;
+    let uneven = ood(report, Row::Pietra).total.mean;
+    let loss = uneven / even - 1.0;
+    Verdict {
+        rule: "PIETRA at most 5 % worse OOD than ID".to_owned(),
+        found: format!("{even:.3}, {uneven:.3}; {:.1} % worse", 100.0 * loss),
+        is_passed: loss <= LOSS_MAX,
+    }
+}
+
+/// Errors come in another unit than the paper's; their ratios to the uniform prior, over the whole test, do not.
+fn ratios(report: &Report) -> [Verdict; 2] {
+    let of = |row: Row| report.row(row).overall.ratio_to_uniform;
+    let rows = || Row::ALL.into_iter().filter(|row| *row != Row::UniformPrior);
+    let off = |row: Row| (of(row) - row.published_ratios()[0]).abs();
+    let n_close = rows().filter(|row| off(*row) <= RATIO_TOLERANCE).count();
+    let furthest = rows().map(off).fold(0.0, f64::max);
+    let pietra = of(Row::Pietra);
+    [
+        Verdict {
+            rule: "ratios to uniform within 0.05 of the paper's".to_owned(),
+            found: format!("{n_close} of {}; up to {furthest:.3} off", rows().count()),
+            is_passed: n_close == rows().count(),
+        },
+        Verdict {
+            rule: format!("PIETRA's ratio to uniform below {RATIO_TO_BEAT}"),
+            found: format!("{pietra:.3}"),
+            is_passed: pietra < RATIO_TO_BEAT,
         },
     ]
 }
@@ -252,7 +312,7 @@ mod tests {
     #[test]
     fn published_tables_hold_all_rules() {
         assert_eq!(failed(|_| ()), Vec::<String>::new());
-        assert_eq!(verdicts(&published()).len(), 7 + 2 + 2 + 1 + 4 + 8);
+        assert_eq!(verdicts(&published()).len(), 7 + 3 + 1 + 2 + 1 + 2 + 1 + 4 + 8);
     }
 
     #[test]
@@ -281,6 +341,46 @@ mod tests {
         assert!(of(2.80).is_empty());
         assert_eq!(of(2.81), ["ID: learned methods within 5 % of one another"]);
         assert_eq!(of(2.94).len(), 2, "not below the prior of 2.93 either");
+        let prior = failed(|report| row(report, Row::PhysicsPrior).in_distribution.total.mean = 4.35);
+        assert_eq!(prior, ["ID: physics prior below uniform prior"], "uniform has 4.34");
+    }
+
+    #[test]
+    fn the_physics_informed_loss_alone_stays_close_to_evora_on_either_side() {
+        // 2 % around 3.35 is 3.283 to 3.417.
+        let of = |mean: f64| {
+            failed(|report| row(report, Row::EvoraPhysicsLoss).out_of_distribution.total.mean = mean)
+        };
+        assert!(of(3.29).is_empty());
+        assert!(of(3.41).is_empty());
+        assert_eq!(of(3.28), ["OOD: physics-informed loss alone within 2 % of EVORA"]);
+        assert_eq!(of(3.42), ["OOD: physics-informed loss alone within 2 % of EVORA"]);
+    }
+
+    #[test]
+    fn pietra_may_lose_little_out_of_distribution() {
+        // 5 % over 2.68 is 2.814; PP alone is at 2.87.
+        let of = |mean: f64| {
+            failed(|report| {
+                row(report, Row::Pietra).out_of_distribution.total.mean = mean;
+                row(report, Row::PhysicsPrior).out_of_distribution.total.mean = 3.2;
+            })
+        };
+        assert!(of(2.81).is_empty());
+        assert_eq!(of(2.82), ["PIETRA at most 5 % worse OOD than ID"]);
+    }
+
+    #[test]
+    fn every_ratio_to_the_uniform_prior_must_be_the_papers_and_pietras_may_not_exceed_it() {
+        let of =
+            |which: Row, ratio: f64| failed(|report| row(report, which).overall.ratio_to_uniform = ratio);
+        // 3.05 / 4.35 is 0.701.
+        assert!(of(Row::Vanilla, 0.750).is_empty());
+        assert_eq!(of(Row::Vanilla, 0.752), ["ratios to uniform within 0.05 of the paper's"]);
+        assert_eq!(of(Row::Vanilla, 0.650), ["ratios to uniform within 0.05 of the paper's"]);
+        assert_eq!(of(Row::Vanilla, f64::NAN), ["ratios to uniform within 0.05 of the paper's"]);
+        assert_eq!(of(Row::Pietra, 0.640), ["PIETRA's ratio to uniform below 0.637"]);
+        assert_eq!(of(Row::Pietra, 0.380), ["ratios to uniform within 0.05 of the paper's"]);
     }
 
     #[test]
