@@ -28,7 +28,9 @@ fn traction_map_is_judged_told_and_drawn() {
     ]);
     assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
     let told = String::from_utf8_lossy(&output.stdout);
-    for part in ["wp_forest.npz: 3938 cells", "3.42 [", "fused with physics", "density AUROC"] {
+    for part in
+        ["wp_forest.npz: 3938 cells", "3.42 [", "fused with physics", "- less prior alone", "density AUROC"]
+    {
         assert!(told.contains(part), "{part} in {told}");
     }
     let bytes = std::fs::read(out.join("traction_map.json")).expect("the numbers");

@@ -4,7 +4,7 @@
 
 use std::path::{Path, PathBuf};
 
-use bench::traction_map::{Head, Source, TractionMapReport, judge};
+use bench::traction_map::{Head, Interval, Source, TractionMapReport, judge};
 use bicycle::Column;
 use formats::{read_drive_log_csv, read_traction_map};
 use physics_prior::{ANGULAR, LINEAR, Quantiles};
@@ -31,6 +31,14 @@ fn the_forest_is_as_published() {
     for (head, source, error) in published {
         let found = head.score(source).emd2.value;
         assert!((found - error).abs() < 0.01, "{source:?}: {found}");
+    }
+    // What docs/traction_map.md says that fusing changes against the prior alone.
+    for (head, told) in
+        [(&report.linear, [-0.059, -0.024, 0.012]), (&report.angular, [-0.067, -0.044, -0.019])]
+    {
+        let Interval { low, value, high } = head.score(Source::FusedWithPhysics).less_prior;
+        let found = [low, value, high];
+        assert!(found.iter().zip(told).all(|(found, told)| (found - told).abs() < 6e-4), "{found:?}");
     }
 }
 

@@ -30,6 +30,8 @@ pub struct MethodScore {
     pub emd2: Interval,
     /// Mean error less that of the prediction, paired.
     pub less_prediction: Interval,
+    /// Mean error less that of the physics prior alone, paired: what the prediction adds to the prior.
+    pub less_prior: Interval,
     /// Mean error over that of the uniform distribution, paired [-].
     pub over_uniform: Interval,
 }
@@ -120,10 +122,13 @@ pub(super) fn head(errors: &[Vec<f64>; 6], density: &[f64], blocks: &Blocks, see
     }
     let all = means(&mut (0..blocks.n()));
     let interval = |of: &dyn Fn(&[f64; 6]) -> f64| Interval::of(of(&all), redrawn.iter().map(of).collect());
+    let less =
+        |source: Source, other: Source| interval(&|means| means[source as usize] - means[other as usize]);
     let scores = Source::ALL.map(|source| MethodScore {
         source,
         emd2: interval(&|means| means[source as usize]),
-        less_prediction: interval(&|means| means[source as usize] - means[Source::Prediction as usize]),
+        less_prediction: less(source, Source::Prediction),
+        less_prior: less(source, Source::Prior),
         over_uniform: interval(&|means| means[source as usize] / means[Source::Uniform as usize]),
     });
     let density_auroc = Interval::of(auroc_of((0..density.len()).collect()), aurocs);
@@ -235,8 +240,26 @@ mod tests {
         let score = &head.scores[4];
         assert_eq!(score.emd2.value, 8.5);
         assert!(score.emd2.low < 7.0 && score.emd2.high > 10.0, "{:?}", score.emd2);
-        let difference = score.less_prediction;
-        assert!([difference.value, difference.low, difference.high].iter().all(|d| (d - 4.0).abs() < 1e-12));
+        // The fifth source is off by 4 more than the first and by 2 more than the third, in every redraw.
+        for (difference, expected) in [(score.less_prediction, 4.0), (score.less_prior, 2.0)] {
+            let ends = [difference.value, difference.low, difference.high];
+            assert!(ends.iter().all(|end| (end - expected).abs() < 1e-12), "{difference:?}");
+        }
         assert_eq!(head.density_auroc.value, 1.0);
+    }
+
+    #[test]
+    fn cells_of_a_block_are_drawn_together() {
+        // Two blocks of 50 cells: the sources differ by 1 in the one and not at all in the other. Redraws of blocks give
+        // 0, 1/2 or 1, the ends with a quarter each; 100 cells drawn one by one would stay within 0.4 and 0.6.
+        let geometry = GridGeometry { resolution_m: 1.0, origin: [0, 0], n_rows: 1, n_cols: 100 };
+        let cells: Vec<usize> = (0..100).collect();
+        let blocks = Blocks::of(&geometry, &cells, 50.0);
+        let error = |source: usize, cell: usize| {
+            f64::from(u8::from(source == Source::FusedWithPhysics as usize && cell < 50))
+        };
+        let errors = std::array::from_fn(|s| (0..100).map(|i| error(s, i)).collect());
+        let fused = head(&errors, &[0.0; 100], &blocks, 1).scores[Source::FusedWithPhysics as usize];
+        assert_eq!((fused.less_prior.low, fused.less_prior.value, fused.less_prior.high), (0.0, 0.5, 1.0));
     }
 }

@@ -257,8 +257,8 @@ deviation over the seeds; null where nothing was measured.
 
 With --traction-map writes traction_map.png, and traction_map.json with
   n_cells, n_out_of_distribution, n_obstructed, n_blocks, prediction_weight
-  linear, angular  of every source: emd2, less_prediction, over_uniform, each with value, low and high (95 %,
-                   bootstrap over blocks of 5 m); density_auroc
+  linear, angular  of every source: emd2, less_prediction, less_prior, over_uniform, each with value, low and high
+                   (95 %, bootstrap over blocks of 5 m); density_auroc
 
 Example, a quarter of an hour:
   surefoot bench learning --seeds 5

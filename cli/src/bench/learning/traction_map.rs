@@ -75,6 +75,7 @@ fn told(name: &str, report: &TractionMapReport) -> String {
     };
     told += "\n  fused with physics\n";
     told += &row("- less prediction", &|head| head.score(Source::FusedWithPhysics).less_prediction);
+    told += &row("- less prior alone", &|head| head.score(Source::FusedWithPhysics).less_prior);
     told += &row("- over uniform", &|head| head.score(Source::FusedWithPhysics).over_uniform);
     told += &row("density AUROC", &|head| head.density_auroc);
     told
