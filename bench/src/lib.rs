@@ -1,5 +1,10 @@
-//! What the two costly parts of a control cycle cost on this machine: one update of the controller, and the risk map
-//! of the physics prior. Both are measured through the interface that a drive uses.
+//! What things cost on this machine, and the tables that are published: one update of the controller ([`control`]), a
+//! risk map of the physics prior ([`prior_map`]) and of what was learned ([`learned_map`]), learning ([`learning`],
+//! [`traction_map`]), navigation ([`navigation`]) and diagnoses ([`gap_score`], [`gap_closed_loop`]). A part of
+//! [Surefoot](../cli/index.html).
+//!
+//! All of it goes through the interfaces that a drive uses. [`closed_loop`] puts plant and planner together;
+//! `examples/drive_own_world.rs` drives in a world and with a vehicle of one's own.
 
 pub mod closed_loop;
 pub mod collection;

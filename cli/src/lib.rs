@@ -1,7 +1,72 @@
-//! The one binary, `surefoot`: arguments, progress, pictures and reports around the crates that do the work.
+//! # Surefoot
 //!
-//! [`run`] reads the arguments, calls the command's handler and turns its result into an exit code: 0 success,
-//! 1 the work failed, 2 bad usage or input. Errors are printed here and nowhere else, one line each.
+//! A real-time local planner for ground vehicles that drive where there is no road, and a tool that says why simulator
+//! and robot disagree. This page is the guide to its crates; the README beside the code has commands and figures,
+//! `ARCHITECTURE.md` the rules that the code keeps.
+//!
+//! ## The flow
+//!
+//! Ten times a second, from left to right and never back:
+//!
+//! | what | is made of it | by |
+//! |---|---|---|
+//! | scan, odometry | a map of the ground: heights, variance, plants, obstacles, holes | [`terrain`] |
+//! | the ground | what it does to the vehicle as distributions of traction, roll and pitch | [`physics_prior`] |
+//! | drives | what was learned from them, weighed against physics by how much like the training the ground is | [`evidential`] |
+//! | distributions | the worst that is likely enough to matter, for every cell and heading: the [risk map](traversability::RiskMap) | [`traversability`] |
+//! | risk map, goal | 1024 futures of the [model](bicycle::Model), and out of them one [decision](bicycle::Decision) | [`mppi`], [`bicycle`] |
+//!
+//! [`navigator`] is this chain as one object with two calls, [`observe`](navigator::Navigator::observe) and
+//! [`decide`](navigator::Navigator::decide). The controller does not know who made its map: a constant one drives it as
+//! well.
+//!
+//! Around it:
+//!
+//! - [`scenarios`]: the truth that all of it is tested against: worlds, a plant of rigid bodies and tyres, sensors,
+//!   episodes.
+//! - [`runtime`]: the chain as processes over shared memory, with watchdog, recorder and replay.
+//! - [`sim_to_real`]: which effect separates recorded drives of a robot from those of its simulator.
+//! - [`formats`]: every file that is read or written.
+//! - [`bench`](::bench): timings, the published tables, and plant and planner in a closed loop.
+//!
+//! ## Where to begin
+//!
+//! Each library has an example of less than a hundred lines that ends in a check of what it shows:
+//!
+//! | to | run |
+//! |---|---|
+//! | bring a map of your own | `cargo run -p terrain --example own_map` |
+//! | bring a vehicle of your own | `cargo run -p bicycle --example own_vehicle`, from a file `cargo run -p formats --example own_files` |
+//! | bring a risk map of your own | `cargo run -p traversability --example own_risk_map` |
+//! | ask physics about ground | `cargo run -p physics_prior --example judge_a_ramp` |
+//! | ask the networks about ground | `cargo run -p evidential --example learned_weight` |
+//! | drive the controller over a constant risk map | `cargo run -p mppi --example drive_constant_map` |
+//! | drive the planner on your map, without sensors | `cargo run -p navigator --example own_surface` |
+//! | simulate your world | `cargo run -p scenarios --example own_world` |
+//! | drive everything in your world | `cargo run -p bench --example drive_own_world` |
+//! | read and send messages of a run | `cargo run -p runtime --example watch_commands` |
+//! | find out why simulator and robot disagree | `cargo run -p sim_to_real --example diagnose_a_delay` |
+//!
+//! Those who come to read code begin with [`navigator::Navigator`], then [`traversability::RiskMapView`], then
+//! [`mppi::Controller`].
+//!
+//! ## Conventions
+//!
+//! - SI units. A name that holds a stored number ends in its unit: `speed_mps`, `yaw_rad`.
+//! - Map frame: x east, y north, z up; yaw counter-clockwise from east, in radians.
+//! - Body frame: forward, left, up, at the centre of the rear axle. Roll lifts the left side, pitch lowers the nose,
+//!   steering is the angle of the front wheels, left positive.
+//! - Grids are row-major from the south-west corner: rows count north, columns east. They lie on a lattice fixed to the
+//!   map's origin.
+//! - Time is nanoseconds on the clock of the measurements, and an argument: below [`runtime`] nothing reads a clock.
+//! - Everything random has a seed, and no command depends on the number of threads.
+//! - The **plant** is the truth, the **model** is what a controller believes; neither is built from the other.
+//!
+//! ## This crate
+//!
+//! The one binary, `surefoot`: arguments, progress, pictures and reports around the crates that do the work. [`run`]
+//! reads the arguments, calls the command's handler and turns its result into an exit code: 0 success, 1 the work
+//! failed, 2 bad usage or input. Errors are printed here and nowhere else, one line each.
 
 pub mod arguments;
 mod bench;

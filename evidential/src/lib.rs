@@ -1,4 +1,4 @@
-//! What driving teaches about the ground, and how far that may be trusted.
+//! What driving teaches about the ground, and how far that may be trusted; a part of [Surefoot](../cli/index.html).
 //!
 //! # The flow
 //!
@@ -10,6 +10,9 @@
 //! 4. A predictor is the checkpoint made ready for the control computer: the same arithmetic without autograd.
 //! 5. A belief map lays it over a whole surface, fuses it with the physics prior by evidence (equation 11) and keeps
 //!    the CVaR of the posterior as a risk map.
+//!
+//! [`shipped`] gives the networks that come with the program, [`train`] makes others, a [`BeliefMap`] judges a surface
+//! by them. `examples/learned_weight.rs` shows what they count on ground that they know and on ground that they do not.
 
 mod architecture;
 mod belief_map;

@@ -1,7 +1,20 @@
-//! Every file format: drive logs, elevation, vehicle and model descriptions, recordings, results.
+//! Every file format: drive logs, elevation, vehicle and model descriptions, recordings, results. A part of
+//! [Surefoot](../cli/index.html).
 //!
 //! What is refused is named by file, line or field, with what was expected and what was found; what is written is
-//! written whole or not at all.
+//! written whole or not at all. `examples/own_files.rs` brings a vehicle and a drive log of one's own.
+//!
+//! ```
+//! use formats::{ConfigText, parse_vehicle, read_vehicle, shipped_vehicle_text};
+//!
+//! let car = read_vehicle("rc_car")?; // or the path of a file
+//! assert!(car.geometry.wheelbase_m > 0.0);
+//!
+//! let text = shipped_vehicle_text("rc_car").expect("it ships").replace("wheelbase_m = 0.18", "wheelbase_m = 0");
+//! let refusal = parse_vehicle(&ConfigText::new("mine.toml", text)).unwrap_err().to_string();
+//! assert!(refusal.contains("geometry.wheelbase_m: expected a finite number > 0, found 0"), "{refusal}");
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 mod config;
 mod drive_log_csv;

@@ -1,9 +1,13 @@
 //! The pipeline as one pure object: observation to map to risk map to decision. No clock, no file, no process.
+//! A part of [Surefoot](../cli/index.html).
 //!
 //! It has three parts, which a robot may run in processes of their own: [`Surveyor`] maps the ground, [`Assessor`]
 //! turns the map into risk and time to the goal, [`Pilot`] decides. [`Navigator`] is the three in one, for a closed
 //! loop: [`Navigator::observe`] takes in what was measured and keeps the maps, [`Navigator::decide`] asks the
 //! controller.
+//!
+//! [`Config::for_vehicle`] fits all settings to a machine, a [`Belief`] says how the ground is judged, a [`Guard`] what
+//! may enter. `examples/own_surface.rs` drives the three on a map of one's own.
 
 mod assessor;
 mod author;

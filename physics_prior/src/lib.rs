@@ -1,12 +1,17 @@
-//! The physics prior: what the shape and the cover of the ground say about traction and attitude before
-//! anything was learned (PIETRA, section IV-C), as distributions of one pose and as a risk map.
+//! The physics prior: what the shape and the cover of the ground say about traction and attitude before anything was
+//! learned (PIETRA, section IV-C), as distributions of one pose and as a risk map. A part of
+//! [Surefoot](../cli/index.html).
+//!
+//! A [`PriorMap`] turns a surface into a risk map and answers for any pose with a [`PriorBelief`]; [`PriorConfig`]
+//! holds its constants. A skid-steered machine on level ground has a prior of its own, [`SkidSteerPrior`].
+//! `examples/judge_a_ramp.rs` judges a map of one's own for a vehicle of one's own.
 //!
 //! Readings of the paper, and what goes beyond it:
 //! - The slope of equation 15 is the absolute gradient along the heading under each wheel of a level vehicle;
 //!   "corresponds to 30 degrees" means the tangent. Loose ground counts as dirt.
 //! - A slope works against a turn as often as for it, and a yaw rate is a speed times a curvature: angular traction is
-//!   the linear one times `1 - s / s_max` or `1 + s / s_max`, each with probability one half. The paper's `1 - s / s_max`
-//!   alone says that nobody can turn on ground on which vehicles do turn.
+//!   the linear one times `1 - s / s_max` or `1 + s / s_max`, each with probability one half. The paper's `1 - s /
+//!   s_max` alone says that nobody can turn on ground on which vehicles do turn.
 //! - Equation 17 takes the absolute angle; roll from the wheel pairs of each axle, pitch from those of each side.
 //! - A wheel stands on the first ground that a ball of its radius touches, not on the height under its centre;
 //!   contact heights and gradients are taken there.

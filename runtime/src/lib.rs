@@ -1,8 +1,12 @@
 //! The pipeline as processes of their own: channels without copies, a clock, health, and what happens when one of them
-//! fails.
+//! fails. A part of [Surefoot](../cli/index.html).
 //!
 //! Every process does one of `navigator`'s parts, the same object that a closed loop in one process drives with, and
 //! tells the others what it found over [`channel`]s. Whoever runs the vehicle is one more process.
+//!
+//! A [`Bus`](channel::Bus) joins a run by its name, [`Outlet`](channel::Outlet)s and [`Inlet`](channel::Inlet)s are the
+//! two ends of a channel, [`message`] holds every record as it lies in memory, and a [`Watchdog`](watchdog::Watchdog)
+//! has the last word before the actuators. `examples/watch_commands.rs` shows both ends in one process.
 
 pub mod budget;
 pub mod channel;

@@ -1,6 +1,12 @@
 //! The truth that the planner never sees: worlds, the physical plant, simulated sensors, tasks and the episode loop.
+//! A part of [Surefoot](../cli/index.html).
 //!
 //! Of `bicycle` this crate uses descriptions and the drive log, never the dynamics: the model never grades itself.
+//!
+//! A [`World`] is ground with heights and materials, made by [`rock_field`], [`arena`], [`world_from_layers`] or
+//! [`World::from_fn`]; a [`Plant`] is a machine on it, a [`Deviation`] what is wrong with that machine; an [`Episode`]
+//! puts both together with sensors and rules and asks for a decision every cycle. `examples/own_world.rs` drives in a
+//! world of one's own.
 
 mod arena;
 mod deviation;

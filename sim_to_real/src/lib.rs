@@ -1,4 +1,16 @@
-//! Why simulator and robot disagree: where the gap lies, which unmodelled effect causes it, how far it shrinks.
+//! Why simulator and robot disagree: where the gap lies, which unmodelled effect causes it, how far it shrinks. A part
+//! of [Surefoot](../cli/index.html).
+//!
+//! 1. [`screen`] says which stretches of drives cannot be right.
+//! 2. [`Baseline::calibrate`] fits the kinematic bicycle to drives of the simulator and learns what one of these looks
+//!    like to a model of the others.
+//! 3. [`diagnose`] weighs every effect of the catalogue, and pairs of them, against the robot's drives; where there is
+//!    no simulator, [`diagnose_without_simulator`].
+//! 4. [`verify`] opens the drives that were held out and says how far the gap shrinks; an [`Answer`] keeps it all.
+//! 5. [`design_manoeuvre`] asks for the drive that would tell apart what is left open.
+//!
+//! Drives are `bicycle::DriveLog`s. The crate never sees the plant that made them. `examples/diagnose_a_delay.rs` goes
+//! through steps 2 to 4.
 
 mod answer;
 mod baseline;

@@ -1,4 +1,4 @@
-//! The ground as the vehicle knows it.
+//! The ground as the vehicle knows it; a part of [Surefoot](../cli/index.html).
 //!
 //! # The flow
 //!
@@ -27,6 +27,8 @@
 //!
 //! [`ElevationMap::assume_ground`] seeds the ground below a vehicle that has seen nothing yet, and
 //! [`ElevationMap::reanchor`] moves the map with a correction of the localisation.
+//!
+//! A map that comes from elsewhere is a [`GridMap`] of [`SurfaceCell`]s; `examples/own_map.rs` makes one.
 //!
 //! # Frames and units
 //!
