@@ -1,27 +1,19 @@
 //! From arguments to a vehicle, a world and a task in it.
 
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
 use bicycle::{Model, Vehicle};
 use formats::{ConfigText, ElevationFile, overlay, read_elevation, read_model, read_vehicle};
 use navigator::Config;
 use scenarios::{
-    ArenaConfig, ArenaError, Bounds, LayerConfig, Pair, PairWish, ROCK_FIELD_DISTANCE_M, RockFieldConfig,
-    Task, WorldLayers, check_pair, feasible_pair, world_from_layers,
+    ArenaConfig, ArenaError, Pair, PairWish, ROCK_FIELD_DISTANCE_M, RockFieldConfig, Task, WorldLayers,
+    check_pair,
 };
 
 use super::knowledge::Knowledge;
 use super::open_loop::Script;
 use crate::UsageError;
 use crate::arguments::{DriveArguments, WorldSource};
-
-/// Maps up to so many cells a side are built whole.
-const WHOLE_MAP_CELLS: f64 = 3500.0;
-/// What of a larger map is built around its start and goal, beyond the distance between them [m].
-const WINDOW_MARGIN_M: f64 = 30.0;
-/// Places of a large map that are searched for a start and a goal.
-const WINDOWS_TRIED: u64 = 8;
 
 /// What is driven, with what.
 pub(super) struct Scene {
@@ -107,57 +99,12 @@ fn in_file(arguments: &DriveArguments, vehicle: &Vehicle, path: &Path) -> Result
         goal_m: arguments.goal.map(|goal| [goal.x_m, goal.y_m]),
         distance_m: ROCK_FIELD_DISTANCE_M.min(0.5 * shortest_m),
     };
-    let whole_m = WHOLE_MAP_CELLS * LayerConfig::for_vehicle(vehicle).resolution_m;
-    let mut windows = windows(&bounds, &wish, (arguments.seed, whole_m)).into_iter().peekable();
-    loop {
-        let window = windows.next().flatten();
-        let config = LayerConfig { window, ..LayerConfig::for_vehicle(vehicle) };
-        let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
-        let world =
-            world_from_layers(name, &layers, &config, arguments.seed).map_err(UsageError::from_input)?;
-        let world = Arc::new(world);
-        match feasible_pair(&world, vehicle, &wish, arguments.seed) {
-            Ok(Pair { start, goal_m }) => {
-                return Ok(Task::in_world(world, start, goal_m, Task::tolerance_m(vehicle)));
-            }
-            Err(error) if windows.peek().is_none() => return Err(UsageError::from_input(error)),
-            Err(_) => {}
-        }
-    }
+    let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
+    Task::in_layers(&name, &layers, vehicle, &wish, arguments.seed).map_err(UsageError::from_input)
 }
 
-/// The parts of a map to build and look for a pair in, one after the other: all of a small map; of a large one what
-/// lies around the ends that are given, or places by the seed.
-fn windows(map: &Bounds, wish: &PairWish, (seed, whole_m): (u64, f64)) -> Vec<Option<Bounds>> {
-    let side_m = [0, 1].map(|k| map.north_east_m[k] - map.south_west_m[k]);
-    if side_m[0].max(side_m[1]) <= whole_m {
-        return vec![None];
-    }
-    let ends = wish.start.map(|[x_m, y_m, _]| [x_m, y_m]).into_iter().chain(wish.goal_m);
-    let given: Vec<[f64; 2]> = ends.collect();
-    let around = |places: &[[f64; 2]], within_m: f64| {
-        let bound = |k: usize, pick: fn(f64, f64) -> f64| {
-            places.iter().map(|place| place[k]).fold(places[0][k], pick)
-        };
-        Bounds {
-            south_west_m: [0, 1].map(|k| bound(k, f64::min) - within_m),
-            north_east_m: [0, 1].map(|k| bound(k, f64::max) + within_m),
-        }
-    };
-    if !given.is_empty() {
-        let free_m = if given.len() == 2 { 0.0 } else { wish.distance_m };
-        return vec![Some(around(&given, WINDOW_MARGIN_M + free_m))];
-    }
-    // The fractional parts of multiples of the plastic number's powers spread evenly over a square.
-    let place = |try_: u64| {
-        let turn = (seed.wrapping_mul(WINDOWS_TRIED).wrapping_add(try_) % (1 << 32)) as f64;
-        [(0, 0.754_877_666_246_693), (1, 0.569_840_290_998_053)]
-            .map(|(k, step)| map.south_west_m[k] + side_m[k] * (turn * step).fract())
-    };
-    (0..WINDOWS_TRIED).map(|try_| Some(around(&[place(try_)], WINDOW_MARGIN_M + wish.distance_m))).collect()
-}
-
-fn layers(file: ElevationFile) -> WorldLayers {
+/// The file's layers as a world takes them.
+pub(crate) fn layers(file: ElevationFile) -> WorldLayers {
     WorldLayers {
         elevation_m: file.elevation,
         canopy_height_m: file.layers.canopy_height_m,
