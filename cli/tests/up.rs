@@ -2,6 +2,8 @@
 
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
+mod tools;
+
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 
@@ -66,10 +68,23 @@ fn files_that_are_none_are_refused_with_what_was_expected() {
     assert_refused(&["replay", &other], &["notes.txt", "expected a recording"]);
 }
 
-/// Drives over the arena with a heavier machine than the model believes in; returns the folder and what was said.
+/// Drives along the arena's bare floor, west of everything, with a heavier machine than the model believes in.
 fn drive_arena(out: &Path) -> Output {
-    let words =
-        ["up", "--world", "arena", "--method", "physics", "--threads", "1", "--deviation", "mass=1.1"];
+    let words = [
+        "up",
+        "--world",
+        "arena",
+        "--start",
+        "1.6,1.2,1.57",
+        "--goal",
+        "1.6,6.6",
+        "--method",
+        "physics",
+        "--threads",
+        "1",
+        "--deviation",
+        "mass=1.1",
+    ];
     let run = run_name("arena");
     surefoot(&words).args(["--run", &run, "--out"]).arg(out).output().unwrap()
 }
@@ -91,10 +106,10 @@ fn look(command: &str, file: &Path) -> (Option<i32>, Value, String) {
 fn a_drive_of_processes_is_recorded_and_made_again_and_what_is_cut_off_is_named() {
     let folder = tempfile::tempdir().unwrap();
     let output = drive_arena(folder.path());
-    // On a machine that has no time for it, the vehicle may come nowhere; it is recorded all the same.
-    let code = output.status.code();
-    assert!(matches!(code, Some(0 | 1)), "{code:?} {}", text(&output.stderr));
-    assert_eq!(text(&output.stdout).contains("goal reached after"), code == Some(0));
+    // The way is short and level: a machine that has no time for it drives it with stops.
+    let told = text(&output.stdout);
+    assert_eq!(output.status.code(), Some(0), "{told} {}", text(&output.stderr));
+    assert!(told.contains("goal reached after"), "{told}");
 
     let run = json(&folder.path().join("runtime.json"));
     assert!(run["control"]["n_decisions"].as_u64().unwrap() > 20, "{run}");
@@ -178,19 +193,21 @@ fn who_reads_only_the_first_line_has_read_enough() {
     assert_eq!(text(&output.stdout), "{\n");
 }
 
-/// In a container with little shared memory. Where the system lets nobody make one, there is nothing to see.
+/// In a container with little shared memory.
 #[test]
 fn too_little_shared_memory_is_said_in_one_line() {
-    let run = run_name("small");
-    let script = "mount -t tmpfs -o size=2m tmpfs /dev/shm || exit 77; exec \"$0\" \"$@\"";
-    let mut command = Command::new("unshare");
-    command.args(["--user", "--map-root-user", "--mount", "sh", "-c", script]);
-    command.args([env!("CARGO_BIN_EXE_surefoot"), "up", "--role", "mapping", "--method", "physics"]);
-    let Ok(output) = command.args(["--run", &run]).output() else { return };
-    let told = text(&output.stderr);
-    if output.status.code() == Some(77) || told.contains("unshare") {
+    let container = ["--user", "--map-root-user", "--mount", "sh", "-c"];
+    let little = "mount -t tmpfs -o size=2m tmpfs /dev/shm";
+    if !tools::is_there("unshare", &[&container[..], &[little]].concat()) {
         return;
     }
+    let run = run_name("small");
+    let script = format!("{little} && exec \"$0\" \"$@\"");
+    let mut command = Command::new("unshare");
+    command.args(container).arg(script).arg(env!("CARGO_BIN_EXE_surefoot"));
+    command.args(["up", "--role", "mapping", "--method", "physics", "--run", &run]);
+    let output = command.output().unwrap();
+    let told = text(&output.stderr);
     assert_eq!(output.status.code(), Some(2), "{told}");
     assert_eq!(told.lines().count(), 1, "{told}");
     assert!(told.contains("/dev/shm: expected") && told.contains("MB free"), "{told}");

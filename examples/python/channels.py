@@ -4,7 +4,9 @@ What a channel keeps, and how many may use it, must be what `runtime/src/channel
 channel decides.
 """
 
+import argparse
 import ctypes
+import re
 import time
 
 import iceoryx2 as iox2
@@ -36,6 +38,13 @@ CHANNELS = {
 def now_ns() -> int:
     """The clock of all processes."""
     return time.clock_gettime_ns(time.CLOCK_MONOTONIC)
+
+
+def run_name(word: str) -> str:
+    """A word that may name a run, as for `surefoot up --run`; argparse tells of any other."""
+    if re.fullmatch("[A-Za-z0-9_-]{1,32}", word) is None:
+        raise argparse.ArgumentTypeError(f"expected 1 to 32 letters, digits, - or _, found {word!r}")
+    return word
 
 
 class Bus:

@@ -4,19 +4,20 @@
     surefoot up --role mapping --run py --vehicle rc_car --method physics &
     surefoot up --role learning --run py --vehicle rc_car --method physics &
     surefoot up --role control --run py --vehicle rc_car --method physics &
-    python3 drive_robot.py py
+    python3 drive_robot.py --run py
 
 It tells where it is and what a ring of range rays sees, reads commands and risk maps, and stops when commands end.
 Prints one line of JSON and ends with 0 when it has come to its goal, else with 1.
 """
 
+import argparse
 import ctypes
 import json
 import math
 import sys
 
 import surefoot_layout as layout
-from channels import Bus, Inlet, Outlet, now_ns
+from channels import Bus, Inlet, Outlet, now_ns, run_name
 
 PERIOD_NS = 20_000_000
 CYCLES_PER_SCAN = 10
@@ -141,7 +142,13 @@ def drive(run: str) -> dict:
     }
 
 
-if __name__ == "__main__":
-    told = drive(sys.argv[1] if len(sys.argv) > 1 else "field")
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__.split("\n", 1)[0])
+    parser.add_argument("--run", type=run_name, default="field", help="name of the run to be the vehicle of")
+    told = drive(parser.parse_args().run)
     print(json.dumps(told))
-    sys.exit(0 if told["reached"] else 1)
+    return 0 if told["reached"] else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

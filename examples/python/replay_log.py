@@ -19,7 +19,7 @@ import sys
 import time
 
 import surefoot_layout as layout
-from channels import Bus, Outlet, now_ns
+from channels import Bus, Outlet, now_ns, run_name
 
 NEEDED = ("t", "x", "y", "yaw", "vx", "wz")
 DRIVE = 1
@@ -121,7 +121,7 @@ def replay(path: str, run: str, speed: float, seconds_max: float) -> dict:
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.split("\n", 1)[0])
     parser.add_argument("log", help="drive log, CSV")
-    parser.add_argument("--run", default="field", help="name of the run whose channels to use")
+    parser.add_argument("--run", type=run_name, default="field", help="name of the run whose channels to use")
     parser.add_argument("--speed", type=float, default=1.0, help="how many times as fast as it happened")
     parser.add_argument("--seconds", type=float, default=math.inf, help="end after so much of the log [s]")
     asked = parser.parse_args()
