@@ -165,6 +165,44 @@ fn crates_use_only_what_they_may() {
 }
 
 #[test]
+fn every_declared_dependency_is_used() {
+    let sources = all_sources();
+    let mut declared: BTreeSet<String> = BTreeSet::new();
+    let mut unused = Vec::new();
+    for package in METADATA.workspace_packages() {
+        for dependency in &package.dependencies {
+            let name = dependency.rename.as_ref().unwrap_or(&dependency.name);
+            // Where the code that it is declared for stands.
+            let places: &[&str] = match dependency.kind {
+                DependencyKind::Normal => &["src/"],
+                DependencyKind::Build => &["build.rs"],
+                _ => &[""],
+            };
+            let is_place = |path: &str| {
+                let inside = path.strip_prefix(package.name.as_str()).and_then(|path| path.strip_prefix('/'));
+                inside.is_some_and(|path| places.iter().any(|place| path.starts_with(place)))
+            };
+            let word = name.replace('-', "_");
+            let is_used = |source: &Source| is_place(&source.path) && has_word(&source.code, &word);
+            if !sources.iter().any(is_used) {
+                unused.push(format!("{}: {name} ({:?})", package.name, dependency.kind));
+            }
+            declared.insert(name.clone());
+        }
+    }
+    let manifest = read("Cargo.toml");
+    let offered = manifest.lines().skip_while(|line| *line != "[workspace.dependencies]").skip(1);
+    let offered = offered.take_while(|line| !line.starts_with('[')).filter_map(|line| line.split_once(" = "));
+    unused.extend(
+        offered
+            .map(|(name, _)| name)
+            .filter(|name| !declared.contains(*name))
+            .map(|name| format!("workspace: {name}")),
+    );
+    assert!(unused.is_empty(), "declared and not used:\n{}", unused.join("\n"));
+}
+
+#[test]
 fn folders_are_crates_and_share_the_lints() {
     for package in METADATA.workspace_packages() {
         let manifest = format!("{}/Cargo.toml", package.name);
