@@ -30,6 +30,8 @@ const SAID: &str = "said";
 const OVER: &str = "over";
 pub const ALPHA: f64 = 0.6;
 pub const SEED: u64 = 1;
+/// Age up to which the plant follows a command [s].
+pub const COMMAND_AGE_S: f64 = 0.3;
 
 /// A name that no other test and no other run of the tests has.
 fn unique_run() -> RunName {
@@ -275,5 +277,11 @@ pub fn episode_config(vehicle: &Vehicle) -> EpisodeConfig {
 }
 
 fn plant_setup(vehicle: &Vehicle) -> PlantSetup<'_> {
-    PlantSetup { task: task(), vehicle, episode: episode_config(vehicle), seed: SEED, command_age_max_s: 0.3 }
+    PlantSetup {
+        task: task(),
+        vehicle,
+        episode: episode_config(vehicle),
+        seed: SEED,
+        command_age_max_s: COMMAND_AGE_S,
+    }
 }
