@@ -44,7 +44,7 @@
 //! | drive the planner on your map, without sensors | `cargo run -p navigator --example own_surface` |
 //! | simulate your world | `cargo run -p scenarios --example own_world` |
 //! | drive everything in your world | `cargo run -p bench --example drive_own_world` |
-//! | read and send messages of a run | `cargo run -p runtime --example watch_commands` |
+//! | send and read messages of a run | `cargo run -p runtime --example publish_and_read` |
 //! | find out why simulator and robot disagree | `cargo run -p sim_to_real --example diagnose_a_delay` |
 //!
 //! Those who come to read code begin with [`navigator::Navigator`], then [`traversability::RiskMapView`], then

@@ -6,7 +6,7 @@
 //!
 //! A [`Bus`](channel::Bus) joins a run by its name, [`Outlet`](channel::Outlet)s and [`Inlet`](channel::Inlet)s are the
 //! two ends of a channel, [`message`] holds every record as it lies in memory, and a [`Watchdog`](watchdog::Watchdog)
-//! has the last word before the actuators. `examples/watch_commands.rs` shows both ends in one process.
+//! has the last word before the actuators. `examples/publish_and_read.rs` shows both ends in one process.
 
 pub mod budget;
 pub mod channel;
