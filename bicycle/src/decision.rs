@@ -13,6 +13,17 @@ pub enum Decision {
     Stop(StopReason),
 }
 
+impl Decision {
+    /// What the vehicle is told that was told `last` before: the command; to hold or to stop, no speed and the wheels as
+    /// they were told to stand.
+    pub fn command(&self, last: Command) -> Command {
+        match *self {
+            Self::Drive(command) => command,
+            Self::Hold(_) | Self::Stop(_) => Command { speed_mps: 0.0, ..last },
+        }
+    }
+}
+
 /// Why the vehicle waits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]

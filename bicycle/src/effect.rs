@@ -8,6 +8,7 @@
 
 mod definition;
 mod delay_line;
+mod gradient;
 mod lag;
 mod prepared;
 mod ramp;
@@ -97,6 +98,10 @@ macro_rules! catalogue {
                 match self { $(Self::$name(_) => Kind::$name,)* }
             }
 
+            fn least_at(&self, speed_mps: f64) -> f64 {
+                match self { $(Self::$name(_) => $name::least_at(speed_mps),)* }
+            }
+
             fn constants(&self, step_s: f64) -> [f64; 4] {
                 match self { $(Self::$name(effect) => effect.constants(step_s),)* }
             }
@@ -184,6 +189,27 @@ impl Effect {
     /// Whether it changes what the sensors say.
     pub fn acts_on_sensors(&self) -> bool {
         self.stages().contains(&Stage::Sensors)
+    }
+
+    /// The factor by which the speed that is reached exceeds the one that is commanded.
+    pub(crate) fn speed_ratio(&self) -> f64 {
+        match self {
+            Self::SpeedScale(scale) => scale.ratio,
+            _ => 1.0,
+        }
+    }
+
+    /// Refuses parameters within their bounds with which a step is not finite at every speed of up to `speed_mps`.
+    pub fn validate_at(&self, speed_mps: f64) -> Result<(), EffectError> {
+        self.validate()?;
+        let least = self.least_at(speed_mps);
+        let Description { id, parameters, .. } = self.description();
+        match (parameters.first(), self.values()[0]) {
+            (Some(&Parameter { name, unit, high, .. }), found) if found < least => {
+                Err(EffectError { id, parameter: name, low: least, high, unit, found })
+            }
+            _ => Ok(()),
+        }
     }
 
     /// Refuses parameters outside their bounds.

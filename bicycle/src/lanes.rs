@@ -65,7 +65,7 @@ pub trait Lanes: Copy + Send + Sync + 'static {
     fn max(self, a: Self::Value, b: Self::Value) -> Self::Value;
     /// Square root; of a tiny or negative number, a small number >= 0; of NaN, NaN. Relative error below 1e-6.
     fn sqrt(self, a: Self::Value) -> Self::Value;
-    /// An angle in turns brought to [-1/2, 1/2] by whole turns; |a| < 4 million.
+    /// An angle in turns brought to [-1/2, 1/2] by whole turns; |a| < 4 million. Of what is not finite, NaN.
     fn wrap_turns(self, a: Self::Value) -> Self::Value;
     /// Where a < b.
     fn less(self, a: Self::Value, b: Self::Value) -> Self::Mask;
@@ -123,10 +123,10 @@ impl<L: Lanes> Real<L> {
         Self(self.0, self.0.max(self.1, other.1))
     }
 
-    /// Brought into [low, high].
+    /// Brought into [low, high]; NaN stays NaN, and bounds that are NaN bound nothing.
     #[inline(always)]
     pub fn clamp(self, low: Self, high: Self) -> Self {
-        self.max(low).min(high)
+        high.min(low.max(self))
     }
 
     /// Square root, see [`Lanes::sqrt`].

@@ -53,7 +53,21 @@ pub enum ModelError {
     /// A parameter of an effect is out of range.
     #[error(transparent)]
     Effect(#[from] EffectError),
+    /// A parameter of an effect is out of the range that is left at the speeds that the limits allow.
+    #[error("{error}, for speeds of up to {speed_mps} m/s")]
+    EffectAtSpeed {
+        /// What is wrong.
+        error: EffectError,
+        /// Fastest speed that the vehicle reaches at the limits' fastest command [m/s].
+        speed_mps: f64,
+    },
 }
+
+/// Longest and shortest lengths, fastest speeds and quickest changes of anything on wheels: beyond them, the step's
+/// arithmetic in f32 overflows.
+const WHEELBASE_M: [f64; 2] = [0.01, 100.0];
+const SPEED_MOST_MPS: f64 = 200.0;
+const CHANGE_MOST: f64 = 1e6;
 
 impl Model {
     /// The vehicle's geometry and limits, no effects.
@@ -79,7 +93,37 @@ impl Model {
         check(&reverse, "a finite number >= 0", |value| value >= 0.0)?;
         let steering = [("limits.steering_max_rad", limits.steering_max_rad)];
         check(&steering, "an angle of at most 0.8 rad", |value| value <= STEERING_DOMAIN_RAD)?;
-        Ok(self.effects.iter().try_for_each(Effect::validate)?)
+        self.validate_sizes()?;
+        self.effects.iter().try_for_each(Effect::validate)?;
+        let speed_mps = self.speed_reached_mps();
+        let at_speed = |error| ModelError::EffectAtSpeed { error, speed_mps };
+        self.effects.iter().try_for_each(|effect| effect.validate_at(speed_mps).map_err(at_speed))
+    }
+
+    fn validate_sizes(&self) -> Result<(), ModelError> {
+        let limits = &self.limits;
+        let [shortest_m, longest_m] = WHEELBASE_M;
+        check(&[("wheelbase_m", self.wheelbase_m)], "a length from 0.01 to 100 m", |value| {
+            (shortest_m..=longest_m).contains(&value)
+        })?;
+        let speeds = [
+            ("limits.speed_max_mps", limits.speed_max_mps),
+            ("limits.reverse_speed_max_mps", limits.reverse_speed_max_mps),
+        ];
+        check(&speeds, "a speed of at most 200 m/s", |value| value <= SPEED_MOST_MPS)?;
+        let changes = [
+            ("limits.steering_rate_max_radps", limits.steering_rate_max_radps),
+            ("limits.acceleration_max_mps2", limits.acceleration_max_mps2),
+            ("limits.lateral_acceleration_max_mps2", limits.lateral_acceleration_max_mps2),
+        ];
+        check(&changes, "a number of at most 1e6", |value| value <= CHANGE_MOST)
+    }
+
+    /// The fastest speed that commands within the limits lead to where no force pushes [m/s].
+    fn speed_reached_mps(&self) -> f64 {
+        let commanded_mps = self.limits.speed_max_mps.max(self.limits.reverse_speed_max_mps);
+        let ratio: f64 = self.effects.iter().map(Effect::speed_ratio).product();
+        commanded_mps * ratio.max(1.0)
     }
 }
 

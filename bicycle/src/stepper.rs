@@ -48,6 +48,11 @@ impl<L: Lanes> Asked<L> {
     }
 }
 
+/// Speeds that forces may push a vehicle to [m/s]: far beyond any, near enough that no arithmetic overflows.
+const SPEED_DOMAIN_MPS: f64 = 1000.0;
+/// Change in a step that limits nothing.
+const ENDLESS: f64 = 1e30;
+
 /// A model made ready for one step length and one unit of length.
 #[derive(Clone, Debug)]
 pub struct Stepper {
@@ -57,6 +62,7 @@ pub struct Stepper {
     speed_change: Constant,
     steering_change: Constant,
     steering_domain: Constant,
+    speed_domain: Constant,
     step: Constant,
     per_step: Constant,
     effects: PreparedEffects,
@@ -72,6 +78,7 @@ impl Stepper {
             speed_change: Constant::new(model.limits.acceleration_max_mps2 * step_s),
             steering_change: Constant::new(model.limits.steering_rate_max_radps * step_s),
             steering_domain: Constant::new(STEERING_DOMAIN_RAD),
+            speed_domain: Constant::new(SPEED_DOMAIN_MPS),
             step: Constant::new(step_s),
             per_step: Constant::new(1.0 / step_s),
             effects: PreparedEffects::new(&model.effects, step_s),
@@ -85,14 +92,24 @@ impl Stepper {
 
     /// Without the limits on acceleration and steering rate.
     pub fn with_instant_actuators(mut self) -> Self {
-        let endless = Constant::new(1e30);
+        let endless = Constant::new(ENDLESS);
         (self.speed_change, self.steering_change) = (endless, endless);
         self
     }
 
-    /// Whether the model has effects; if not, [`Stepper::step_bare`] does for commands within the limits.
+    /// Whether the model has effects; if not, [`Stepper::step_plain`] is the whole step.
     pub fn has_effects(&self) -> bool {
         !self.effects.is_empty()
+    }
+
+    /// Whether the actuators follow at once; of a model without effects, [`Stepper::step_bare`] is then the whole step.
+    pub fn has_instant_actuators(&self) -> bool {
+        self.speed_change.value() >= ENDLESS
+    }
+
+    /// How far back [`Stepper::recall`] asks for commands [s].
+    pub fn past_s(&self) -> f64 {
+        self.effects.past_s()
     }
 
     /// Whether an effect reads the gradient or the class of the ground.
@@ -106,7 +123,7 @@ impl Stepper {
     }
 
     /// Fills the memory, [`Stepper::n_slots`] values, as the past leaves it: `past` gives the command that was in
-    /// force an age [s] before the start, up to three seconds. What is held stays as it was.
+    /// force an age [s] before the start, up to [`Stepper::past_s`]. What is held stays as it was.
     pub fn recall(&self, past: &dyn Fn(f64) -> Command, memory: &mut [f64]) {
         self.effects.recall(past, memory);
     }
@@ -133,8 +150,7 @@ impl Stepper {
         self.effects.settle(command, memory);
     }
 
-    /// One step with actuators that follow at once; exact when the model has no effects and the commands keep
-    /// the limits on acceleration and steering rate.
+    /// One step of a model without effects whose actuators follow at once.
     #[inline(always)]
     pub fn step_bare<L: Lanes>(
         &self,
@@ -142,9 +158,27 @@ impl Stepper {
         command: [Real<L>; 2],
         ground: &GroundSample<Real<L>>,
     ) -> Rates<L> {
+        [state.speed, state.steering] = command;
+        self.roll(state, ground)
+    }
+
+    /// One step of a model without effects, from a steering angle and to a command within [`STEERING_DOMAIN_RAD`].
+    #[inline(always)]
+    pub fn step_plain<L: Lanes>(
+        &self,
+        state: &mut LaneState<L>,
+        command: [Real<L>; 2],
+        ground: &GroundSample<Real<L>>,
+    ) -> Rates<L> {
+        self.follow_command(state, command);
+        self.roll(state, ground)
+    }
+
+    /// Moves the body of a model without effects whose actuators have acted.
+    #[inline(always)]
+    fn roll<L: Lanes>(&self, state: &mut LaneState<L>, ground: &GroundSample<Real<L>>) -> Rates<L> {
         let lanes = state.x.0;
-        let [speed, steering] = command;
-        (state.speed, state.steering) = (speed, steering);
+        let (speed, steering) = (state.speed, state.steering);
         let (sine, cosine) = state.turns.sin_cos_turns();
         let advance = speed * ground.linear_traction * Real::constant(lanes, self.advance);
         let curving = steering.tan() * ground.angular_traction;
@@ -250,7 +284,8 @@ impl Stepper {
             };
             self.effects.on_drive(memory, &mut driving);
             let step = Real::constant(lanes, self.step);
-            state.speed = driving.acceleration.mul_add(step, reached_speed);
+            let domain = Real::constant(lanes, self.speed_domain);
+            state.speed = driving.acceleration.mul_add(step, reached_speed).clamp(-domain, domain);
             side_acceleration = driving.side_acceleration;
         }
         let yaw_rate = turning(state.speed);
@@ -277,15 +312,21 @@ impl Stepper {
 
     #[inline(always)]
     fn actuate<L: Lanes>(&self, state: &mut LaneState<L>, asked: [Real<L>; 2]) {
-        let lanes = state.x.0;
+        self.follow_command(state, asked);
+        let domain = Real::constant(state.x.0, self.steering_domain);
+        state.steering = state.steering.clamp(-domain, domain);
+    }
+
+    /// The actuators go towards what is asked of them, as far as they come in a step.
+    #[inline(always)]
+    fn follow_command<L: Lanes>(&self, state: &mut LaneState<L>, asked: [Real<L>; 2]) {
         let towards = |asked: Real<L>, reached: Real<L>, change: Constant| {
-            let change = Real::constant(lanes, change);
-            asked.clamp(reached - change, reached + change)
+            let change = Real::constant(reached.0, change);
+            // In this order, what was reached stays NaN once it is.
+            asked.max(reached - change).min(reached + change)
         };
         state.speed = towards(asked[0], state.speed, self.speed_change);
-        let domain = Real::constant(lanes, self.steering_domain);
-        let steering = towards(asked[1], state.steering, self.steering_change);
-        state.steering = steering.clamp(-domain, domain);
+        state.steering = towards(asked[1], state.steering, self.steering_change);
     }
 
     /// One step of one vehicle in metres and radians: the reference. The stepper's unit must be 1 m.

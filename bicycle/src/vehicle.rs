@@ -2,6 +2,7 @@
 //! to whoever simulates it.
 
 use serde::{Deserialize, Serialize};
+use std::borrow::Cow;
 
 /// A four-wheeled vehicle with front steering.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -166,7 +167,7 @@ pub struct VehicleError {
     /// Dotted path of the field, e.g. `geometry.wheelbase_m`.
     pub field: &'static str,
     /// The range that would do.
-    pub expected: &'static str,
+    pub expected: Cow<'static, str>,
     /// The value that was given.
     pub found: f64,
 }
@@ -231,7 +232,29 @@ impl Vehicle {
             ("limits.roll_max_rad", self.limits.roll_max_rad),
             ("limits.pitch_max_rad", self.limits.pitch_max_rad),
         ];
-        check(&angles, "an angle in radians below pi/2", |v| v < std::f64::consts::FRAC_PI_2)
+        check(&angles, "an angle in radians below pi/2", |v| v < std::f64::consts::FRAC_PI_2)?;
+        self.geometry.validate()
+    }
+}
+
+impl Geometry {
+    /// Refuses a body that does not reach over its own wheels.
+    fn validate(&self) -> Result<(), VehicleError> {
+        let Self { wheelbase_m, track_m, length_m, width_m, rear_overhang_m, .. } = *self;
+        let refuse = |field, expected: String, found| {
+            Err(VehicleError { field, expected: Cow::Owned(expected), found })
+        };
+        let least_m = wheelbase_m + rear_overhang_m;
+        if length_m < least_m {
+            let expected = format!(
+                "at least {least_m:.3}, the wheelbase of {wheelbase_m} and {rear_overhang_m} behind it"
+            );
+            return refuse("geometry.length_m", expected, length_m);
+        }
+        if width_m < track_m {
+            return refuse("geometry.width_m", format!("at least the track of {track_m}"), width_m);
+        }
+        Ok(())
     }
 }
 
@@ -241,7 +264,7 @@ fn check(
     allowed: impl Fn(f64) -> bool,
 ) -> Result<(), VehicleError> {
     match fields.iter().find(|(_, value)| !(value.is_finite() && allowed(*value))) {
-        Some(&(field, found)) => Err(VehicleError { field, expected, found }),
+        Some(&(field, found)) => Err(VehicleError { field, expected: Cow::Borrowed(expected), found }),
         None => Ok(()),
     }
 }

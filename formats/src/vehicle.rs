@@ -65,6 +65,12 @@ pub fn parse_model(text: &ConfigText) -> Result<Model, ConfigError> {
             let field = format!("effects[{}].{parameter}", place(id));
             Err(text.refuse(&field, format_args!("{low} to {high} {unit}"), found))
         }
+        Err(ModelError::EffectAtSpeed { error, speed_mps }) => {
+            let EffectError { id, parameter, low, high, unit, found } = error;
+            let field = format!("effects[{}].{parameter}", place(id));
+            let expected = format_args!("{low} to {high} {unit} for speeds of up to {speed_mps} m/s");
+            Err(text.refuse(&field, expected, found))
+        }
     }
 }
 
@@ -200,6 +206,21 @@ mod tests {
             format!(
                 "v.toml:{}: body.cog_height_m: expected a finite number > 0, found NaN",
                 line("cog_height_m")
+            )
+        );
+        assert_eq!(
+            refuse("length_m = 4.99", "length_m = 2.5"),
+            format!(
+                "v.toml:{}: geometry.length_m: expected at least 4.140, the wheelbase of 3.02 and 1.12 behind it, \
+                 found 2.5",
+                line("length_m")
+            )
+        );
+        assert_eq!(
+            refuse("width_m = 1.89", "width_m = 0.5"),
+            format!(
+                "v.toml:{}: geometry.width_m: expected at least the track of 1.63, found 0.5",
+                line("width_m")
             )
         );
         assert!(

@@ -177,6 +177,11 @@ pub(crate) trait Definition: Values {
     /// Whether it reads the gradient or the class of the ground.
     const USES_GROUND: bool = false;
 
+    /// Smallest value of the first parameter with which a step is finite at speeds of up to `speed_mps`, where that is
+    /// not what the parameter's bounds say.
+    fn least_at(_speed_mps: f64) -> f64 {
+        f64::NEG_INFINITY
+    }
     /// What a step of `step_s` needs of the parameters.
     fn constants(&self, _step_s: f64) -> [f64; 4] {
         self.values()

@@ -5,7 +5,7 @@ use super::{Effect, Kind};
 use crate::lanes::{Constant, Lanes, Real, Scalar};
 use crate::{Asked, Command};
 
-/// How far back the commands are gone through for what the effects remember at the start [s].
+/// How far back, beyond all delays, the commands are gone through for what the effects remember at the start [s].
 const PAST_S: f64 = 3.0;
 
 #[derive(Clone, Copy, Debug)]
@@ -58,8 +58,13 @@ impl PreparedEffects {
             step_s,
             n_slots: next_held,
             first_held,
-            n_past: (PAST_S / step_s).ceil() as usize,
+            // No delay has fewer slots than steps.
+            n_past: (PAST_S / step_s).ceil() as usize + first_held,
         }
+    }
+
+    pub(crate) fn past_s(&self) -> f64 {
+        self.n_past as f64 * self.step_s
     }
 
     pub(crate) fn is_empty(&self) -> bool {

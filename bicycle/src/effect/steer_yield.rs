@@ -1,7 +1,8 @@
 //! Steering that yields as the speed grows.
 
 use super::definition::{Constants, Definition, Moving, Stage, parameters};
-use crate::lanes::{Lanes, Real};
+use super::gradient;
+use crate::lanes::Lanes;
 
 parameters! {
     /// Steering that yields as the speed grows.
@@ -14,14 +15,16 @@ parameters! {
 impl Definition for SteerYield {
     const ID: &'static str = "steer_yield";
     const CAUSE: &'static str = "understeer";
-    const MEANING: &'static str =
-        "understeer of the steering, not of the tyres: yaw rate = v tan(steering) / (L (1 + K v^2)), whatever pushes sideways";
+    const MEANING: &'static str = "understeer of the steering, not of the tyres: yaw rate = v tan(steering) / (L (1 + K v^2)), whatever pushes sideways";
     const STAGES: &'static [Stage] = &[Stage::Motion];
+
+    fn least_at(speed_mps: f64) -> f64 {
+        gradient::least_at(speed_mps)
+    }
 
     #[inline(always)]
     fn on_motion<L: Lanes>(constants: &Constants, state: &mut Moving<L>) {
-        let lanes = state.forward.0;
-        let gradient = Real::constant(lanes, constants[0]) * state.forward;
-        state.yaw_rate = state.yaw_rate / gradient.mul_add(state.forward, lanes.real(1.0));
+        let [_, divisor] = gradient::of(constants, state.forward);
+        state.yaw_rate = state.yaw_rate / divisor;
     }
 }

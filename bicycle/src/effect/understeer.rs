@@ -1,7 +1,8 @@
 //! Understeer growing with speed.
 
 use super::definition::{Constants, Definition, Moving, Stage, parameters};
-use crate::lanes::{Lanes, Real};
+use super::gradient;
+use crate::lanes::Lanes;
 
 parameters! {
     /// Understeer growing with speed.
@@ -16,11 +17,13 @@ impl Definition for Understeer {
     const MEANING: &'static str = "understeer: yaw rate = (v tan(steering) / L + K v a_side) / (1 + K v^2)";
     const STAGES: &'static [Stage] = &[Stage::Motion];
 
+    fn least_at(speed_mps: f64) -> f64 {
+        gradient::least_at(speed_mps)
+    }
+
     #[inline(always)]
     fn on_motion<L: Lanes>(constants: &Constants, state: &mut Moving<L>) {
-        let lanes = state.forward.0;
-        let gradient = Real::constant(lanes, constants[0]) * state.forward;
-        let turned = gradient.mul_add(state.side_acceleration, state.yaw_rate);
-        state.yaw_rate = turned / gradient.mul_add(state.forward, lanes.real(1.0));
+        let [gradient, divisor] = gradient::of(constants, state.forward);
+        state.yaw_rate = gradient.mul_add(state.side_acceleration, state.yaw_rate) / divisor;
     }
 }

@@ -86,7 +86,8 @@ impl Lanes for V4 {
     }
     #[inline(always)]
     fn wrap_turns(self, a: f32x16) -> f32x16 {
-        cast!(self.avx512dq._mm512_reduce_ps::<0>(cast!(a)))
+        // Not `_mm512_reduce_ps`, for which the rest of infinity is 0.
+        self.sub(a, cast!(self.avx512f._mm512_roundscale_ps::<8>(cast!(a))))
     }
     #[inline(always)]
     fn exceeds(self, a: f32x16, b: f32x16) -> b16 {

@@ -17,6 +17,7 @@ pub(super) fn run(arguments: &GapApplyArguments) -> anyhow::Result<()> {
     let mut model = read_model(&arguments.model)?;
     let effects: Vec<Effect> = effects.into_iter().map(|effect| fitting(effect, &model)).collect();
     model.effects.extend(&effects);
+    model.validate().map_err(|error| told(error.to_string()))?;
     let text = text(&model, &answer, &arguments.model)?;
     formats::write_bytes_atomic(&arguments.out, text.as_bytes())
         .map_err(|error| UsageError(format!("--out: {}", UsageError::from_input(error))))?;
