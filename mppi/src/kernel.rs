@@ -10,6 +10,7 @@ pub(crate) mod functions;
 #[allow(unsafe_code)]
 mod lookup;
 mod portable;
+mod primitives;
 #[allow(unsafe_code)]
 pub(crate) mod workers;
 

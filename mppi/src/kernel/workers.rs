@@ -5,16 +5,12 @@
 //! delays nobody but the chunk it holds. Which thread computes a chunk never changes the chunk's result. Idle threads
 //! watch for work for a moment and then sleep: at ten cycles a second they cost nothing between the cycles.
 
+use super::primitives::{
+    AtomicBool, AtomicPtr, AtomicU32, Builder, JoinHandle, Ordering, PATIENT_LOOKS, WATCHFUL_LOOKS, park,
+    spin_loop, yield_now,
+};
 use std::ops::Range;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicPtr, AtomicU32, Ordering};
-use std::thread::JoinHandle;
-
-/// Looks at the work flag before a thread goes to sleep: some hundred microseconds.
-const WATCHFUL_LOOKS: u32 = 4000;
-/// Looks at a chunk of another thread before it is taken over: some ten microseconds, a few chunks' work, because
-/// moving a chunk from core to core costs as much as computing it.
-const PATIENT_LOOKS: u32 = 600;
 
 /// A job made nameless: how to run one chunk of what `data` points to.
 type RunChunk = unsafe fn(data: *const (), chunk: usize);
@@ -59,7 +55,7 @@ impl Slot {
     /// Watches until somebody claims it; false when nobody does.
     fn is_claimed_soon(&self, round: u32) -> bool {
         (0..PATIENT_LOOKS).any(|_| {
-            std::hint::spin_loop();
+            spin_loop();
             !self.is_unclaimed(round)
         })
     }
@@ -97,7 +93,7 @@ impl Drop for Round<'_> {
         }
         for slot in &shared.slots {
             while slot.finished.load(Ordering::Acquire) != round {
-                std::hint::spin_loop();
+                spin_loop();
             }
         }
     }
@@ -143,9 +139,9 @@ impl Shared {
                 }
                 looks += 1;
                 if looks < WATCHFUL_LOOKS {
-                    std::hint::spin_loop();
+                    spin_loop();
                 } else {
-                    std::thread::park();
+                    park();
                 }
             }
             seen = self.round.load(Ordering::Acquire);
@@ -171,12 +167,12 @@ impl Workers {
         for index in 1..n_threads {
             let shared = Arc::clone(&workers.shared);
             let share = index * n_chunks / n_threads..(index + 1) * n_chunks / n_threads;
-            let builder = std::thread::Builder::new().name(format!("mppi-{index}"));
+            let builder = Builder::new().name(format!("mppi-{index}"));
             workers.threads.push(builder.spawn(move || shared.serve(share))?);
         }
         // A thread allocates while it starts; afterwards nothing does.
         while (workers.shared.started.load(Ordering::Acquire) as usize) < workers.threads.len() {
-            std::thread::yield_now();
+            yield_now();
         }
         Ok(workers)
     }
