@@ -14,6 +14,8 @@ pub(crate) struct Chunk {
     pub(crate) terms: [Row; CostTerm::COUNT],
     /// Cost of every rollout [s]; not finite when the rollout met a number that is not.
     pub(crate) costs: Row,
+    /// Steps of every rollout that break a limit of attitude.
+    pub(crate) n_broken: Row,
     /// Weight of every rollout, not normalised.
     pub(crate) weights: Row,
     /// Weighted sums of the controls of every step.
@@ -30,10 +32,16 @@ impl Chunk {
             controls: vec![[Row::ZERO; 2]; n_steps],
             terms: [Row::ZERO; CostTerm::COUNT],
             costs: Row::ZERO,
+            n_broken: Row::ZERO,
             weights: Row::ZERO,
             sums: vec![[0.0; 2]; n_steps],
             is_negligible: false,
             totals: Totals::default(),
         }
+    }
+
+    /// The controls of one rollout, step by step.
+    pub(crate) fn controls_of(&self, lane: usize) -> impl Iterator<Item = Control> + Clone + '_ {
+        self.controls.iter().map(move |rows| [rows[0].0[lane], rows[1].0[lane]])
     }
 }

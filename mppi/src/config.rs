@@ -6,6 +6,9 @@ use crate::rollout::MAX_SLOTS;
 use bicycle::ModelError;
 use serde::{Deserialize, Serialize};
 
+/// Controls of all rollouts together: half a gigabyte.
+const MOST_CONTROLS: usize = 1 << 26;
+
 /// Configuration of a [`crate::Controller`]. The default is what `surefoot drive` uses.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -14,7 +17,7 @@ pub struct Config {
     pub n_rollouts: usize,
     /// Steps of the horizon; at least 2.
     pub n_steps: usize,
-    /// Length of a step [s].
+    /// Length of a step, from 0.01 to 1 [s].
     pub step_s: f64,
     /// Times that sampling and averaging are repeated per cycle.
     pub n_iterations: usize,
@@ -36,6 +39,8 @@ pub struct Config {
     /// Known delay between a decision and its effect on the actuators: the start of the plan is predicted over it
     /// with the commands that were already sent [s].
     pub delay_s: f64,
+    /// Shortest time between two decisions, from 0.001 to 1 [s]: decides how many commands are remembered for as long as delays reach.
+    pub period_min_s: f64,
     /// How far the commands may run ahead of the measured speed and steering angle, as the time that the limits of
     /// acceleration and steering rate need for it, beyond the lag of the model's own effects; 0 = the plan of a model
     /// without effects starts exactly at the measured state [s].
@@ -163,6 +168,7 @@ impl Default for Config {
                 path_along_s_per_m2: 0.1,
             },
             delay_s: 0.0,
+            period_min_s: 0.01,
             tracking_s: 0.5,
             recovery: Recovery { patience_s: 2.0, progress_m: 0.25, distance_m: 1.5, duration_s: 4.0 },
         }
@@ -218,6 +224,8 @@ impl Config {
             self.n_rollouts as f64,
         )?;
         check(self.n_steps >= 2, "n_steps", "at least 2", self.n_steps as f64)?;
+        let n_controls = self.n_rollouts * self.n_steps;
+        check(n_controls <= MOST_CONTROLS, "n_rollouts x n_steps", "at most 67108864", n_controls as f64)?;
         self.validate_numbers()?;
         if Machine::find(self.isa).is_none() {
             return Err(ConfigError::IsaAbsent { isa: self.isa });
@@ -226,40 +234,42 @@ impl Config {
     }
 
     fn validate_numbers(&self) -> Result<(), ConfigError> {
-        let (costs, recovery) = (&self.costs, &self.recovery);
-        let positive = [
-            ("step_s", self.step_s),
-            ("sampling.speed_std", self.sampling.speed_std),
-            ("sampling.steering_std", self.sampling.steering_std),
-            ("costs.rest_speed_mps", costs.rest_speed_mps),
-            ("recovery.progress_m", recovery.progress_m),
-            ("recovery.distance_m", recovery.distance_m),
-            ("recovery.duration_s", recovery.duration_s),
+        let (sampling, costs, recovery) = (&self.sampling, &self.costs, &self.recovery);
+        let step = ("a time from 0.01 to 1 s", 0.01..=1.0);
+        let period = ("a time from 0.001 to 1 s", 0.001..=1.0);
+        let delay = ("a time from 0 to 2 s", 0.0..=2.0);
+        let time = ("a time from 0 to 100 s", 0.0..=100.0);
+        let deviation = ("a number from 1e-6 to 1000", 1e-6..=1e3);
+        let size = ("a number from 0.001 to 10000", 1e-3..=1e4);
+        let weight = ("a number from 0 to 1e6", 0.0..=1e6);
+        let ranges = [
+            ("step_s", self.step_s, &step),
+            ("period_min_s", self.period_min_s, &period),
+            ("delay_s", self.delay_s, &delay),
+            ("tracking_s", self.tracking_s, &time),
+            ("sampling.speed_std", sampling.speed_std, &deviation),
+            ("sampling.steering_std", sampling.steering_std, &deviation),
+            ("sampling.correlation_s", sampling.correlation_s, &time),
+            ("control_cost", self.control_cost, &weight),
+            ("costs.rest_speed_mps", costs.rest_speed_mps, &size),
+            ("costs.distance_s_per_m", costs.distance_s_per_m, &weight),
+            ("costs.attitude_s", costs.attitude_s, &weight),
+            ("costs.lateral_s", costs.lateral_s, &weight),
+            ("costs.reverse_s", costs.reverse_s, &weight),
+            ("costs.path_across_s_per_m2", costs.path_across_s_per_m2, &weight),
+            ("costs.path_along_s_per_m2", costs.path_along_s_per_m2, &weight),
+            ("recovery.progress_m", recovery.progress_m, &size),
+            ("recovery.distance_m", recovery.distance_m, &size),
+            ("recovery.duration_s", recovery.duration_s, &size),
         ];
-        for (field, found) in positive {
-            check(found.is_finite() && found > 0.0, field, "a finite number > 0", found)?;
-        }
-        let not_negative = [
-            ("sampling.correlation_s", self.sampling.correlation_s),
-            ("control_cost", self.control_cost),
-            ("costs.distance_s_per_m", costs.distance_s_per_m),
-            ("costs.attitude_s", costs.attitude_s),
-            ("costs.lateral_s", costs.lateral_s),
-            ("costs.reverse_s", costs.reverse_s),
-            ("costs.path_across_s_per_m2", costs.path_across_s_per_m2),
-            ("costs.path_along_s_per_m2", costs.path_along_s_per_m2),
-            ("delay_s", self.delay_s),
-            ("tracking_s", self.tracking_s),
-        ];
-        for (field, found) in not_negative {
-            check(found.is_finite() && found >= 0.0, field, "a finite number >= 0", found)?;
+        for (field, found, (expected, range)) in ranges {
+            check(range.contains(&found), field, expected, found)?;
         }
         check(recovery.patience_s > 0.0, "recovery.patience_s", "a number > 0 or inf", recovery.patience_s)?;
-        check(self.delay_s <= 2.0, "delay_s", "at most 2 s", self.delay_s)?;
         match self.temperature {
             Temperature::Fixed { temperature_s: found } => {
-                let allowed = found.is_finite() && found > 0.0;
-                check(allowed, "temperature.fixed.temperature_s", "a finite number > 0", found)
+                let field = "temperature.fixed.temperature_s";
+                check(size.1.contains(&found), field, size.0, found)
             }
             Temperature::EffectiveSampleSize { fraction: found } => {
                 let allowed = found > 0.0 && found < 1.0;

@@ -7,23 +7,31 @@ mod tests;
 use crate::chunk::Chunk;
 use crate::config::{Actuation, Config, ConfigError};
 use crate::diagnostics::Diagnostics;
-use crate::history::History;
 use crate::judgement::Judge;
 use crate::kernel::workers::Workers;
 use crate::kernel::{CHUNK, Machine, functions};
 use crate::lag;
+use crate::ledger::Ledger;
 use crate::objective::{Input, ReferenceStep};
 use crate::plan::Plan;
+use crate::ranking::Ranking;
 use crate::recovery::{Mode, Watch};
 use crate::rollout::MAX_SLOTS;
+use crate::sampling::Control;
 use crate::summary::Totals;
 use crate::weights::WeightSummary;
+use bicycle::lanes::STEERING_DOMAIN_RAD;
 use bicycle::{Command, Decision, Effect, HoldReason, Model, State, Stepper, StopReason};
 use traversability::RiskMapView;
 
 /// Share of the tyres' grip that a plan may ask for: beyond it they slide, and what they then do no model foretells well.
 const GRIP_SHARE: f64 = 0.75;
 const GRAVITY_MPS2: f64 = 9.81;
+/// A cycle that took more of the model's steps than this tells nothing of a single one.
+const LONGEST_STEPS: f64 = 3.0;
+/// Most rollouts that are judged when the plan breaks a limit. Those that the rollouts themselves call feasible come
+/// first, so it takes one or two where there is one.
+const MOST_JUDGED: usize = 64;
 
 /// A part of a decision, for whoever measures where time goes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -51,11 +59,12 @@ pub struct Controller {
     /// Chunks that are sampled, from the first on.
     pub(crate) n_used: usize,
     pub(crate) plan: Plan,
+    ranking: Ranking,
     /// The model with lengths in metres, for judging.
     pub(crate) stepper: Stepper,
     /// The model with lengths in cells, for the rollouts.
     cell_stepper: Stepper,
-    history: History,
+    ledger: Ledger,
     /// Accelerations that the effects hold against the forces that the vehicle met [m/s2].
     held_mps2: Vec<f64>,
     /// Where the step began that is being driven.
@@ -95,16 +104,19 @@ impl Controller {
             return Err(ConfigError::EffectMemory { found: n_slots, step_s: config.step_s });
         }
         let lag_s = lag::of_actuators(&stepper, &model.limits, config.step_s);
+        let reach_s = config.delay_s + LONGEST_STEPS * config.step_s + stepper.past_s();
+        let ledger = Ledger::new(reach_s, config.period_min_s);
         let n_chunks = config.n_rollouts / CHUNK;
         Ok(Self {
             workers: Workers::new(config.n_threads, n_chunks)?,
             chunks: vec![Chunk::new(config.n_steps); n_chunks],
             n_used: n_chunks,
             plan: Plan::new(&config),
+            ranking: Ranking::new(config.n_rollouts),
             cell_stepper: stepper.clone(),
             held_mps2: vec![0.0; stepper.n_held()],
             stepper,
-            history: History::new(),
+            ledger,
             before: None,
             watch: Watch::new(config.recovery),
             lag_s,
@@ -125,7 +137,7 @@ impl Controller {
     /// Forgets plan, history and progress.
     pub fn reset(&mut self) {
         self.is_fresh = true;
-        self.history = History::new();
+        self.ledger.clear();
         self.let_go();
         self.watch.reset();
         self.temperature_s = 1.0;
@@ -154,6 +166,9 @@ impl Controller {
     }
 
     /// Decides what to do now. Allocates nothing.
+    ///
+    /// Takes it that the vehicle is told [`Decision::command`] of the result; where it is told something else, say so
+    /// with [`Controller::note_sent`].
     pub fn decide(&mut self, input: &Input<'_>) -> Decision {
         self.decide_observed(input, |_| ())
     }
@@ -161,13 +176,41 @@ impl Controller {
     /// [`Controller::decide`], telling `observe` at the end of every phase which one it was; with several iterations
     /// each phase ends once per iteration. Cycles that do not sample tell nothing.
     pub fn decide_observed(&mut self, input: &Input<'_>, mut observe: impl FnMut(Phase)) -> Decision {
-        self.history.age(input.elapsed_s.max(0.0));
-        let decision = match self.reason_not_to_plan(input) {
-            Some(decision) => decision,
-            None => self.plan_cycle(input, &mut observe),
-        };
-        self.remember(input, decision);
+        if let Some(decision) = self.reason_not_to_plan(input) {
+            self.stand_by(&decision, input.elapsed_s);
+            return decision;
+        }
+        self.ledger.pass(input.elapsed_s);
+        let decision = self.plan_cycle(input, &mut observe);
+        self.send(&decision);
+        match decision {
+            Decision::Drive(_) => self.before = Some(input.state),
+            Decision::Hold(_) | Decision::Stop(_) => self.let_go(),
+        }
         decision
+    }
+
+    /// A cycle that somebody else decides, `elapsed_s` after the cycle before: time passes and the vehicle is told what
+    /// that decision says. The next plan starts from there, with nothing of the last one.
+    pub fn stand_by(&mut self, decision: &Decision, elapsed_s: f64) {
+        self.ledger.pass(elapsed_s);
+        self.send(decision);
+        self.is_fresh = true;
+        self.let_go();
+        self.watch.reset();
+    }
+
+    /// What the vehicle was really told in the last cycle, where that is not what its decision says: whoever stands
+    /// between controller and vehicle has changed it. Numbers that are not finite are no command and change nothing.
+    pub fn note_sent(&mut self, sent: Command) {
+        if sent.speed_mps.is_finite() && sent.steering_rad.is_finite() {
+            self.ledger.correct(sent);
+        }
+    }
+
+    fn send(&mut self, decision: &Decision) {
+        let last = self.ledger.last().unwrap_or_default();
+        self.ledger.send(decision.command(last));
     }
 
     fn reason_not_to_plan(&self, input: &Input<'_>) -> Option<Decision> {
@@ -196,6 +239,8 @@ impl Controller {
         self.follow_held(input);
         self.recall_slots(input.state, self.config.delay_s);
         self.start = self.predict_start(input);
+        // No model steps from farther: what is measured may exceed what the wheels can do.
+        self.start.steering_rad = self.start.steering_rad.clamp(-STEERING_DOMAIN_RAD, STEERING_DOMAIN_RAD);
         self.recall_slots(self.start, 0.0);
         if std::mem::take(&mut self.is_fresh) {
             self.plan.hold([self.start.speed_mps as f32, self.start.steering_rad as f32]);
@@ -243,57 +288,48 @@ impl Controller {
         };
     }
 
-    /// The plan's first command, if the plan may be driven; else that of the best rollout, if that may.
+    /// The plan's first command, if the plan may be driven; else that of the best rollout that may.
     fn judge(&mut self, input: &Input<'_>, summary: &WeightSummary) -> Decision {
         let finite = self.plan.nominal.iter().flatten().all(|value| value.is_finite());
         if summary.n_non_finite == self.n_rollouts() || !finite {
             self.is_fresh = true;
             return Decision::Stop(StopReason::NonFiniteResult);
         }
-        let judge = Judge { stepper: &self.stepper, limits: &self.model.limits, map: input.map };
-        let n_steps = self.steps_to_stop();
-        let mut memory = self.slots.map(f64::from);
-        let plan = self.plan.nominal.iter().copied().take(n_steps);
-        if !judge.breaks_limits(&self.start, plan, &mut memory) {
-            return Decision::Drive(self.plan.command(0));
+        if !self.may_drive(input, self.plan.nominal.iter().copied()) {
+            let Some((chunk, lane)) = self.best_that_may_be_driven(input) else {
+                self.plan.stop();
+                return Decision::Stop(StopReason::NoFeasibleRollout);
+            };
+            let controls = self.chunks[chunk].controls_of(lane);
+            self.plan.nominal.iter_mut().zip(controls).for_each(|(nominal, control)| *nominal = control);
+            self.diagnostics.is_best_alone = true;
         }
-        let (chunk, lane) = summary.best;
-        let controls = self.chunks[chunk].controls.iter().map(|rows| [rows[0].0[lane], rows[1].0[lane]]);
-        let mut memory = self.slots.map(f64::from);
-        if judge.breaks_limits(&self.start, controls.clone().take(n_steps), &mut memory) {
-            self.plan.stop();
-            return Decision::Stop(StopReason::NoFeasibleRollout);
-        }
-        self.plan.nominal.iter_mut().zip(controls).for_each(|(nominal, control)| *nominal = control);
-        self.diagnostics.is_best_alone = true;
         Decision::Drive(self.plan.command(0))
     }
 
-    /// Steps in which the vehicle could stop, one to spare, from the faster of its speed and the planned one.
-    fn steps_to_stop(&self) -> usize {
-        let speed_mps = self.start.speed_mps.abs().max(f64::from(self.plan.nominal[0][0].abs()));
-        let stop_s = speed_mps / self.model.limits.acceleration_max_mps2 + self.lag_s[0];
-        ((stop_s / self.config.step_s).ceil() as usize + 1).min(self.config.n_steps)
+    /// Chunk and lane of the first rollout in the order of [`Ranking`] that may be driven.
+    fn best_that_may_be_driven(&mut self, input: &Input<'_>) -> Option<(usize, usize)> {
+        let mut ranking = std::mem::take(&mut self.ranking);
+        let best = ranking
+            .first(MOST_JUDGED, &self.chunks[..self.n_used])
+            .find(|&(chunk, lane)| self.may_drive(input, self.chunks[chunk].controls_of(lane)));
+        self.ranking = ranking;
+        best
     }
 
-    /// Keeps what the next cycle needs to know of this decision.
-    fn remember(&mut self, input: &Input<'_>, decision: Decision) {
-        match decision {
-            Decision::Drive(command) => {
-                self.before = Some(input.state);
-                self.history.send(command);
-            }
-            Decision::Hold(_) => {
-                self.watch.reset();
-                self.is_fresh = true;
-                self.let_go();
-                self.history.send(standing(&input.state));
-            }
-            Decision::Stop(_) => {
-                self.let_go();
-                self.history.send(standing(&input.state));
-            }
-        }
+    /// Whether controls keep the limits of attitude for as long as the vehicle would need to stop.
+    fn may_drive(&self, input: &Input<'_>, controls: impl Iterator<Item = Control> + Clone) -> bool {
+        let judge = Judge { stepper: &self.stepper, limits: &self.model.limits, map: input.map };
+        let n_steps = self.steps_to_stop(controls.clone().next().unwrap_or_default());
+        let mut memory = self.slots.map(f64::from);
+        !judge.breaks_limits(&self.start, controls.take(n_steps), &mut memory)
+    }
+
+    /// Steps in which the vehicle could stop, one to spare, from the faster of its speed and the one asked for.
+    fn steps_to_stop(&self, [speed_mps, _]: Control) -> usize {
+        let speed_mps = self.start.speed_mps.abs().max(f64::from(speed_mps.abs()));
+        let stop_s = speed_mps / self.model.limits.acceleration_max_mps2 + self.lag_s[0];
+        ((stop_s / self.config.step_s).ceil() as usize + 1).min(self.config.n_steps)
     }
 }
 
@@ -313,10 +349,4 @@ fn is_usable(map: &RiskMapView<'_>) -> bool {
     let indexable = i32::try_from(map.risks.len()).is_ok();
     let shaped = map.risks.len() == n_cells * map.n_yaws && map.ground.len() == n_cells;
     !map.risks.is_empty() && shaped && indexable && resolution_m.is_finite() && resolution_m > 0.0
-}
-
-/// What stops a vehicle: no speed, the wheels as they are.
-fn standing(state: &State) -> Command {
-    let steering_rad = if state.steering_rad.is_finite() { state.steering_rad as f32 } else { 0.0 };
-    Command { speed_mps: 0.0, steering_rad }
 }

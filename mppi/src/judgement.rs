@@ -1,4 +1,7 @@
 //! Whether a plan may be driven: looked at in f64, step by step, over the distance in which the vehicle could stop.
+//!
+//! Model, start and limits are those of the rollouts, which look at the whole horizon until the goal. The judge looks on
+//! beyond the goal: a vehicle that arrives has yet to stop.
 
 use crate::sampling::Control;
 use bicycle::{Command, GroundSample, Limits, State, Stepper};
@@ -58,8 +61,8 @@ impl Judge<'_> {
         for (t, [speed_mps, steering_rad]) in controls.enumerate() {
             state = self.step_on(risk, &state, Command { speed_mps, steering_rad }, (&mut *memory, t));
             risk = self.risk(&state);
-            let is_worse = risk.roll_rad > start_risk.roll_rad || risk.pitch_rad > start_risk.pitch_rad;
-            if self.is_tilted(risk) && (!is_leaving || is_worse) {
+            let is_no_worse = risk.roll_rad <= start_risk.roll_rad && risk.pitch_rad <= start_risk.pitch_rad;
+            if self.is_tilted(risk) && !(is_leaving && is_no_worse) {
                 return true;
             }
             is_leaving = is_leaving && self.is_tilted(risk);
@@ -67,10 +70,16 @@ impl Judge<'_> {
         false
     }
 
+    /// |roll| and |pitch| where the vehicle stands, if beyond a limit [rad].
+    pub(crate) fn tilt(&self, state: &State) -> Option<[f64; 2]> {
+        let risk = self.risk(state);
+        self.is_tilted(risk).then(|| [risk.roll_rad, risk.pitch_rad].map(f64::from))
+    }
+
     /// A number that is not finite is beyond every limit.
     fn is_tilted(&self, risk: Risk) -> bool {
-        let within = f64::from(risk.roll_rad) <= self.limits.roll_max_rad
-            && f64::from(risk.pitch_rad) <= self.limits.pitch_max_rad;
+        let Limits { roll_max_rad, pitch_max_rad, .. } = *self.limits;
+        let within = risk.roll_rad <= roll_max_rad as f32 && risk.pitch_rad <= pitch_max_rad as f32;
         !within
     }
 }

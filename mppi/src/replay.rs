@@ -34,8 +34,7 @@ impl Controller {
         }
         order.sort_by(|a, b| a.0.total_cmp(&b.0));
         let rollout = |&(cost_s, index, lane): &(f32, usize, usize)| {
-            let controls = self.chunks[index].controls.iter();
-            let states = self.trajectory(map, controls.map(|rows| [rows[0].0[lane], rows[1].0[lane]]));
+            let states = self.trajectory(map, self.chunks[index].controls_of(lane));
             Rollout { cost_s, states }
         };
         order.iter().take(n).map(rollout).collect()

@@ -3,12 +3,17 @@
 //! Positions are kept in cells of the map and yaws in turns, so that the map index is a truncation. Pack after pack
 //! of rollouts walks through all steps; a rollout that leaves the map is trapped on the border, where nothing moves.
 
+mod motion;
+mod stage;
+
 use crate::chunk::Chunk;
 use crate::diagnostics::CostTerm;
 use crate::kernel::{CHUNK, Kernel, Row, Work};
 use crate::objective::{ReferenceStep, TerminalField};
 use bicycle::lanes::Real;
 use bicycle::{GroundSample, LaneState, Stepper};
+use motion::{Bare, Leaving, Motion, Plain, Whole};
+use stage::{PathTask, Stage};
 use traversability::{Ground, Risk};
 
 /// Most numbers per rollout that the effects may carry from step to step.
@@ -21,6 +26,8 @@ pub(crate) struct Scene<'a> {
     pub(crate) stepper: &'a Stepper,
     pub(crate) grid: Grid<'a>,
     pub(crate) start: Start,
+    /// |roll| and |pitch| where the vehicle stands, if beyond a limit [rad]: it may leave.
+    pub(crate) tilted_start: Option<[f64; 2]>,
     /// What the effects remember at the start.
     pub(crate) slots: &'a [f32],
     pub(crate) prices: Prices,
@@ -103,26 +110,41 @@ impl Work for RollOut<'_> {
     #[inline(always)]
     fn run<K: Kernel>(self, kernel: K) {
         let Self { scene, chunk } = self;
-        match (scene.task, scene.stepper.has_effects(), scene.prices.has_manoeuvres()) {
-            (Task::Goal(goal), false, false) => roll_chunk::<K, _, false, false>(kernel, scene, &goal, chunk),
-            (Task::Goal(goal), false, true) => roll_chunk::<K, _, false, true>(kernel, scene, &goal, chunk),
-            (Task::Goal(goal), true, _) => roll_chunk::<K, _, true, true>(kernel, scene, &goal, chunk),
-            (Task::Path(path), _, _) => roll_chunk::<K, _, true, true>(kernel, scene, &PathTask(path), chunk),
+        match &scene.task {
+            Task::Goal(goal) => roll_to(kernel, scene, goal, chunk),
+            Task::Path(path) => roll_along(kernel, scene, &PathTask(path), chunk),
         }
     }
 }
 
+/// To a goal, with no more of a step than the model and the prices ask for.
 #[inline(always)]
-fn roll_chunk<K: Kernel, S: Stage<K>, const EFFECTS: bool, const MANOEUVRES: bool>(
-    kernel: K,
-    scene: &Scene<'_>,
-    stage: &S,
-    chunk: &mut Chunk,
-) {
-    if K::IN_FLIGHT == 2 {
-        roll_packs::<K, S, 2, EFFECTS, MANOEUVRES>(kernel, scene, stage, chunk);
+fn roll_to<K: Kernel>(kernel: K, scene: &Scene<'_>, goal: &GoalTask<'_>, chunk: &mut Chunk) {
+    let is_plain = !scene.stepper.has_effects() && scene.tilted_start.is_none();
+    if is_plain && scene.stepper.has_instant_actuators() && !scene.prices.has_manoeuvres() {
+        roll_chunk::<K, _, Bare>(kernel, scene, goal, chunk);
+    } else if is_plain {
+        roll_chunk::<K, _, Plain>(kernel, scene, goal, chunk);
     } else {
-        roll_packs::<K, S, 1, EFFECTS, MANOEUVRES>(kernel, scene, stage, chunk);
+        roll_along(kernel, scene, goal, chunk);
+    }
+}
+
+/// Whatever the task and the model.
+#[inline(always)]
+fn roll_along<K: Kernel, S: Stage<K>>(kernel: K, scene: &Scene<'_>, stage: &S, chunk: &mut Chunk) {
+    match scene.tilted_start {
+        None => roll_chunk::<K, S, Whole>(kernel, scene, stage, chunk),
+        Some(_) => roll_chunk::<K, S, Leaving>(kernel, scene, stage, chunk),
+    }
+}
+
+#[inline(always)]
+fn roll_chunk<K: Kernel, S: Stage<K>, M: Motion>(kernel: K, scene: &Scene<'_>, stage: &S, chunk: &mut Chunk) {
+    if K::IN_FLIGHT == 2 {
+        roll_packs::<K, S, M, 2>(kernel, scene, stage, chunk);
+    } else {
+        roll_packs::<K, S, M, 1>(kernel, scene, stage, chunk);
     }
 }
 
@@ -136,7 +158,12 @@ struct Flight<K: Kernel> {
     /// Distance to the goal [cells], or nothing.
     distance: Real<K>,
     running: Real<K>,
-    attitude: Real<K>,
+    /// Steps beyond a limit of attitude.
+    n_tilted: Real<K>,
+    /// Of them, those that count as breaking it: all, but for a vehicle that leaves.
+    n_broken: Real<K>,
+    /// 1 until a vehicle that stood beyond a limit has left.
+    leaving: Real<K>,
     lateral: Real<K>,
     reverse: Real<K>,
 }
@@ -153,7 +180,17 @@ impl<K: Kernel> Flight<K> {
             steering: kernel.real(start.steering_rad),
         };
         let under_way = zero.less(kernel.real(1.0));
-        Self { state, under_way, distance: zero, running: zero, attitude: zero, lateral: zero, reverse: zero }
+        Self {
+            state,
+            under_way,
+            distance: zero,
+            running: zero,
+            n_tilted: zero,
+            n_broken: zero,
+            leaving: kernel.real(1.0),
+            lateral: zero,
+            reverse: zero,
+        }
     }
 }
 
@@ -161,57 +198,6 @@ impl<K: Kernel> Flight<K> {
 #[derive(Clone, Copy)]
 #[repr(align(64))]
 struct Memory<K: Kernel>([K::Value; MAX_SLOTS]);
-
-/// What a step and the end cost beside the limits.
-trait Stage<K: Kernel> {
-    fn step(&self, t: usize, flight: &mut Flight<K>);
-    fn finish(&self, flight: &Flight<K>) -> Real<K>;
-}
-
-impl<K: Kernel> Stage<K> for GoalTask<'_> {
-    #[inline(always)]
-    fn step(&self, _t: usize, flight: &mut Flight<K>) {
-        let kernel = flight.state.x.0;
-        let dx = flight.state.x - kernel.real(self.x_cells);
-        let dy = flight.state.y - kernel.real(self.y_cells);
-        flight.distance = dx.mul_add(dx, dy * dy).sqrt();
-        let cost = flight.distance.mul_add(kernel.real(self.distance_s), kernel.real(self.step_s));
-        flight.running = flight.running.add_where(flight.under_way, cost);
-        let away = kernel.real(self.tolerance_cells).less(flight.distance);
-        flight.under_way = kernel.and(flight.under_way, away);
-    }
-
-    #[inline(always)]
-    fn finish(&self, flight: &Flight<K>) -> Real<K> {
-        let kernel = flight.distance.0;
-        let rest = match &self.field {
-            None => flight.distance * kernel.real(self.rest_s),
-            Some(field) => field.seconds(flight.state.x, flight.state.y),
-        };
-        kernel.real(0.0).add_where(flight.under_way, rest)
-    }
-}
-
-/// A moving point to keep up with.
-struct PathTask<'a>(&'a [ReferenceStep]);
-
-impl<K: Kernel> Stage<K> for PathTask<'_> {
-    #[inline(always)]
-    fn step(&self, t: usize, flight: &mut Flight<K>) {
-        let (kernel, reference) = (flight.state.x.0, &self.0[t]);
-        let dx = flight.state.x - kernel.real(reference.x_cells);
-        let dy = flight.state.y - kernel.real(reference.y_cells);
-        let [tx, ty] = reference.tangent.map(|value| kernel.real(value));
-        let (along, across) = (dx.mul_add(tx, dy * ty), dy.mul_add(tx, -(dx * ty)));
-        let along = along * along * kernel.real(reference.along_s);
-        flight.running = flight.running + (across * across).mul_add(kernel.real(reference.across_s), along);
-    }
-
-    #[inline(always)]
-    fn finish(&self, flight: &Flight<K>) -> Real<K> {
-        flight.state.x.0.real(0.0)
-    }
-}
 
 /// Numbers of the grid in every lane.
 struct Index<K: Kernel> {
@@ -240,8 +226,9 @@ impl<K: Kernel> Index<K> {
     #[inline(always)]
     fn cell(&self, state: &LaneState<K>) -> K::Bits {
         let (kernel, zero) = (state.x.0, state.x.0.real(0.0));
-        let col = kernel.truncate(state.x.clamp(zero, self.last_col).1);
-        let row = kernel.truncate(state.y.clamp(zero, self.last_row).1);
+        // In this order NaN becomes a place too.
+        let col = kernel.truncate(state.x.max(zero).min(self.last_col).1);
+        let row = kernel.truncate(state.y.max(zero).min(self.last_row).1);
         kernel.add_bits(kernel.mul_bits(row, self.cols), col)
     }
 
@@ -256,7 +243,7 @@ impl<K: Kernel> Index<K> {
 }
 
 #[inline(always)]
-fn roll_packs<K: Kernel, S: Stage<K>, const G: usize, const EFFECTS: bool, const MANOEUVRES: bool>(
+fn roll_packs<K: Kernel, S: Stage<K>, M: Motion, const G: usize>(
     kernel: K,
     scene: &Scene<'_>,
     stage: &S,
@@ -266,7 +253,7 @@ fn roll_packs<K: Kernel, S: Stage<K>, const G: usize, const EFFECTS: bool, const
     let mut memory = [Memory::<K>([kernel.real(0.0).1; MAX_SLOTS]); G];
     for first in (0..CHUNK).step_by(G * K::WIDTH) {
         let mut flights = [Flight::new(kernel, &scene.start); G];
-        if EFFECTS {
+        if M::HAS_EFFECTS {
             for pack in &mut memory {
                 recall(kernel, scene.slots, pack);
             }
@@ -274,14 +261,14 @@ fn roll_packs<K: Kernel, S: Stage<K>, const G: usize, const EFFECTS: bool, const
         for (t, controls) in chunk.controls.iter().enumerate() {
             // Written out, because flights that a loop indexes would live in memory instead of registers.
             let fly = Fly { scene, index: &index, stage, controls, t };
-            fly.step::<EFFECTS, MANOEUVRES>(&mut flights[0], &mut memory[0], first);
+            fly.step::<M>(&mut flights[0], &mut memory[0], first);
             if G == 2 {
-                fly.step::<EFFECTS, MANOEUVRES>(&mut flights[1], &mut memory[1], first + K::WIDTH);
+                fly.step::<M>(&mut flights[1], &mut memory[1], first + K::WIDTH);
             }
         }
-        settle(stage.finish(&flights[0]), &flights[0], chunk, first);
+        settle::<K, M>(scene, (stage.finish(&flights[0]), &flights[0]), chunk, first);
         if G == 2 {
-            settle(stage.finish(&flights[1]), &flights[1], chunk, first + K::WIDTH);
+            settle::<K, M>(scene, (stage.finish(&flights[1]), &flights[1]), chunk, first + K::WIDTH);
         }
     }
 }
@@ -297,16 +284,11 @@ struct Fly<'a, K: Kernel, S: Stage<K>> {
 
 impl<K: Kernel, S: Stage<K>> Fly<'_, K, S> {
     #[inline(always)]
-    fn step<const EFFECTS: bool, const MANOEUVRES: bool>(
-        &self,
-        flight: &mut Flight<K>,
-        memory: &mut Memory<K>,
-        first: usize,
-    ) {
+    fn step<M: Motion>(&self, flight: &mut Flight<K>, memory: &mut Memory<K>, first: usize) {
         let kernel = flight.state.x.0;
         let [speed, steering] = self.controls;
         let command = [Real(kernel, kernel.load(speed, first)), Real(kernel, kernel.load(steering, first))];
-        advance::<K, EFFECTS, MANOEUVRES>(self.scene, self.index, flight, command, (memory, self.t));
+        advance::<K, M>(self.scene, self.index, flight, command, (memory, self.t));
         self.stage.step(self.t, flight);
     }
 }
@@ -321,12 +303,12 @@ fn recall<K: Kernel>(kernel: K, slots: &[f32], memory: &mut Memory<K>) {
 
 /// One step of one pack: the model over the ground where it stands, and the limits.
 #[inline(always)]
-fn advance<K: Kernel, const EFFECTS: bool, const MANOEUVRES: bool>(
+fn advance<K: Kernel, M: Motion>(
     scene: &Scene<'_>,
     index: &Index<K>,
     flight: &mut Flight<K>,
     command: [Real<K>; 2],
-    (memory, t): (&mut Memory<K>, usize),
+    memory: (&mut Memory<K>, usize),
 ) {
     let kernel = command[0].0;
     let cell = index.cell(&flight.state);
@@ -334,22 +316,14 @@ fn advance<K: Kernel, const EFFECTS: bool, const MANOEUVRES: bool>(
     let [linear_traction, angular_traction, roll, pitch] = risks.map(|value| Real(kernel, value));
     let zero = kernel.real(0.0);
     let mut ground = GroundSample { linear_traction, angular_traction, gradient: [zero; 2], class: zero };
-    let rates = if EFFECTS {
-        if scene.stepper.uses_ground() {
-            let [east, north, class] =
-                kernel.grounds(scene.grid.ground, cell).map(|value| Real(kernel, value));
-            (ground.gradient, ground.class) = ([east, north], class);
-        }
-        scene.stepper.step(&mut flight.state, command, &ground, &mut memory.0, t)
-    } else {
-        scene.stepper.step_bare(&mut flight.state, command, &ground)
-    };
-    let prices = &scene.prices;
-    let tilted = kernel
-        .or(roll.exceeds(kernel.real(prices.roll_max_rad)), pitch.exceeds(kernel.real(prices.pitch_max_rad)));
-    let tilted = kernel.and(tilted, flight.under_way);
-    flight.attitude = flight.attitude.add_where(tilted, kernel.real(prices.attitude_s));
-    if MANOEUVRES {
+    if M::HAS_EFFECTS && scene.stepper.uses_ground() {
+        let [east, north, class] = kernel.grounds(scene.grid.ground, cell).map(|value| Real(kernel, value));
+        (ground.gradient, ground.class) = ([east, north], class);
+    }
+    let rates = M::step(scene.stepper, &mut flight.state, command, &ground, memory);
+    watch_attitude::<K, M>(scene, flight, [roll, pitch]);
+    if M::HAS_MANOEUVRES {
+        let prices = &scene.prices;
         let sideways = (rates.speed * rates.yaw_rate).abs().exceeds(kernel.real(prices.lateral_max_mps2));
         let sideways = kernel.and(sideways, flight.under_way);
         flight.lateral = flight.lateral.add_where(sideways, kernel.real(prices.lateral_s));
@@ -358,15 +332,43 @@ fn advance<K: Kernel, const EFFECTS: bool, const MANOEUVRES: bool>(
     }
 }
 
+/// Counts the poses beyond a limit. A vehicle that stands beyond one may leave: its first poses break a limit only when
+/// they are worse than where it stands. The same rule as [`crate::judgement::Judge::breaks_limits`].
+#[inline(always)]
+fn watch_attitude<K: Kernel, M: Motion>(
+    scene: &Scene<'_>,
+    flight: &mut Flight<K>,
+    [roll, pitch]: [Real<K>; 2],
+) {
+    let kernel = roll.0;
+    let (one, prices) = (kernel.real(1.0), &scene.prices);
+    let beyond = kernel
+        .or(roll.exceeds(kernel.real(prices.roll_max_rad)), pitch.exceeds(kernel.real(prices.pitch_max_rad)));
+    let tilted = kernel.and(beyond, flight.under_way);
+    flight.n_tilted = flight.n_tilted.add_where(tilted, one);
+    if let Some(start) = scene.tilted_start.filter(|_| M::IS_LEAVING) {
+        let [start_roll, start_pitch] = start.map(|angle_rad| kernel.real(angle_rad));
+        let worse = kernel.or(roll.exceeds(start_roll), pitch.exceeds(start_pitch));
+        let counts = kernel.or(worse, flight.leaving.less(one));
+        flight.n_broken = flight.n_broken.add_where(kernel.and(tilted, counts), one);
+        flight.leaving = flight.leaving.or_else(beyond, kernel.real(0.0));
+    }
+}
+
 /// Writes the costs of a pack that has arrived.
 #[inline(always)]
-fn settle<K: Kernel>(terminal: Real<K>, flight: &Flight<K>, chunk: &mut Chunk, first: usize) {
+fn settle<K: Kernel, M: Motion>(
+    scene: &Scene<'_>,
+    (terminal, flight): (Real<K>, &Flight<K>),
+    chunk: &mut Chunk,
+    first: usize,
+) {
     let kernel = terminal.0;
     let control = Real(kernel, kernel.load(&chunk.terms[CostTerm::Control as usize], first));
     let mut total = control;
     for (term, value) in [
         (CostTerm::Running, flight.running),
-        (CostTerm::Attitude, flight.attitude),
+        (CostTerm::Attitude, flight.n_tilted * kernel.real(scene.prices.attitude_s)),
         (CostTerm::Lateral, flight.lateral),
         (CostTerm::Reverse, flight.reverse),
         (CostTerm::Terminal, terminal),
@@ -374,6 +376,8 @@ fn settle<K: Kernel>(terminal: Real<K>, flight: &Flight<K>, chunk: &mut Chunk, f
         total = total + value;
         kernel.store(&mut chunk.terms[term as usize], first, value.1);
     }
+    let n_broken = if M::IS_LEAVING { flight.n_broken } else { flight.n_tilted };
+    kernel.store(&mut chunk.n_broken, first, n_broken.1);
     kernel.store(&mut chunk.costs, first, total.1);
 }
 

@@ -77,9 +77,9 @@ fn total<K: Kernel>(kernel: K, chunk: &Chunk) -> Totals {
         for (sum, row) in sums.iter_mut().zip(&chunk.terms) {
             *sum = sum.add_where(finite, Real(kernel, kernel.load(row, first)));
         }
-        let attitude = Real(kernel, kernel.load(&chunk.terms[CostTerm::Attitude as usize], first));
+        let n_broken = Real(kernel, kernel.load(&chunk.n_broken, first));
         let lateral = Real(kernel, kernel.load(&chunk.terms[CostTerm::Lateral as usize], first));
-        let feasible = kernel.and(finite, (attitude + lateral).less(kernel.real(1e-9)));
+        let feasible = kernel.and(finite, (n_broken + lateral).less(kernel.real(1e-9)));
         n_finite = n_finite.add_where(finite, one);
         n_feasible = n_feasible.add_where(feasible, one);
     }

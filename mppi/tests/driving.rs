@@ -309,3 +309,75 @@ fn the_plan_starts_where_the_commands_on_their_way_lead() {
     assert!((start.speed_mps - speed_mps).abs() < 1e-6 && (start.x_m - x_m).abs() < 1e-3, "{start:?} {x_m}");
     assert!(x_m > 0.02, "{sent:?}");
 }
+
+/// The same at a hundred decisions a second with commands on their way for two seconds: 200 of them are remembered. The
+/// vehicle is measured at rest all the while, so that the oracle follows the commands alone.
+#[test]
+fn a_long_delay_is_replayed_whole_at_a_high_rate() {
+    let (delay_s, period_s) = (2.0, 0.01);
+    let config = Config { delay_s, n_rollouts: 64, ..smooth() };
+    let map = level();
+    let mut controller = Controller::new(config, model(), 5).unwrap();
+    let mut sent = Vec::new();
+    for cycle in 0..300 {
+        let elapsed_s = if cycle == 0 { 0.0 } else { period_s };
+        let input =
+            Input { state: standing(), elapsed_s, map: map.view(), objective: goal([10.0, 0.0]), cycle };
+        let Decision::Drive(_) = controller.decide(&input) else { panic!("level ground") };
+        // Told something of its own instead: a speed that rises and falls, and differs in every cycle.
+        let speed_mps = 1.0 + (0.02 * cycle as f32).sin();
+        controller.note_sent(Command { speed_mps, steering_rad: 0.0 });
+        sent.push(f64::from(speed_mps));
+    }
+    let input = Input {
+        state: standing(),
+        elapsed_s: period_s,
+        map: map.view(),
+        objective: goal([10.0, 0.0]),
+        cycle: 300,
+    };
+    controller.decide(&input);
+    let start = controller.nominal_trajectory(map.view())[0];
+    let (mut speed_mps, mut x_m) = (0.0f64, 0.0);
+    for step in 0..20 {
+        // Steps of 0.1 s; in force in the middle of each is what was sent (2 - 0.05 - 0.1 step) s ago.
+        let age_s = delay_s - STEP_S * (f64::from(step) + 0.5);
+        let command_mps = sent[300 - (age_s / period_s).round() as usize];
+        speed_mps += (command_mps - speed_mps).clamp(-0.2, 0.2);
+        x_m += STEP_S * speed_mps;
+    }
+    // The middle of a step lies on the moment of a sending: one command earlier or later is 0.02 m/s.
+    assert!((start.speed_mps - speed_mps).abs() < 0.03 && (start.x_m - x_m).abs() < 0.05, "{start:?} {x_m}");
+}
+
+#[test]
+fn settings_that_make_no_controller_are_refused_with_field_range_and_value() {
+    let told = |config: Config| match Controller::new(config, model(), 1) {
+        Ok(_) => panic!("must be refused"),
+        Err(error) => error.to_string(),
+    };
+    assert_eq!(
+        told(Config { step_s: 1e-9, ..smooth() }),
+        "step_s: expected a time from 0.01 to 1 s, found 0.000000001"
+    );
+    assert_eq!(
+        told(Config { period_min_s: 1e-9, ..smooth() }),
+        "period_min_s: expected a time from 0.001 to 1 s, found 0.000000001"
+    );
+    assert_eq!(told(Config { delay_s: 3.0, ..smooth() }), "delay_s: expected a time from 0 to 2 s, found 3");
+    assert!(told(Config { tracking_s: f64::NAN, ..smooth() }).starts_with("tracking_s: expected a time"));
+    let many = Config { n_rollouts: 1 << 20, n_steps: 1000, ..smooth() };
+    assert_eq!(told(many), "n_rollouts x n_steps: expected at most 67108864, found 1048576000");
+    // A deviation whose square is no number in f32, a noise that never changes, a cost beyond all others.
+    let sampling = |change: &dyn Fn(&mut mppi::Sampling)| {
+        let mut config = smooth();
+        change(&mut config.sampling);
+        told(config)
+    };
+    assert!(sampling(&|sampling| sampling.speed_std = 1e-30).starts_with("sampling.speed_std"));
+    assert!(sampling(&|sampling| sampling.steering_std = 1e30).starts_with("sampling.steering_std"));
+    assert!(sampling(&|sampling| sampling.correlation_s = 1e30).starts_with("sampling.correlation_s"));
+    let mut config = smooth();
+    config.costs.rest_speed_mps = 1e-300;
+    assert!(told(config).starts_with("costs.rest_speed_mps"));
+}

@@ -11,6 +11,9 @@ use crate::{GuardConfig, NavigatorError};
 /// Vehicles below this length cannot look over what hides ground from them [m].
 const SMALL_LENGTH_M: f64 = 1.0;
 
+/// Poses of a risk map: a gigabyte.
+const MOST_RISKS: usize = 1 << 26;
+
 /// Settings of the pipeline. A file gives only what differs from [`Config::for_vehicle`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -113,21 +116,28 @@ impl Config {
 
     /// Name of the field, what would do, value.
     fn first_invalid(&self) -> Option<(&'static str, &'static str, f64)> {
-        let at_least = |field, found: usize, least: usize, expected| {
-            (found < least).then_some((field, expected, found as f64))
-        };
+        let RiskMapConfig { elevation_cells, n_rows, n_cols, n_yaws, recentre_m } = self.risk_map;
         let share = self.attitude_share;
-        let recentre_m = self.risk_map.recentre_m;
-        at_least("risk_map.elevation_cells", self.risk_map.elevation_cells, 1, "at least 1")
-            .or(at_least("risk_map.n_rows", self.risk_map.n_rows, 3, "at least 3"))
-            .or(at_least("risk_map.n_cols", self.risk_map.n_cols, 3, "at least 3"))
-            .or(at_least("risk_map.n_yaws", self.risk_map.n_yaws, 1, "at least 1"))
-            .or((!(share > 0.0 && share <= 1.0)).then_some(("attitude_share", "a number in (0, 1]", share)))
-            .or((!(recentre_m.is_finite() && recentre_m > 0.0)).then_some((
+        let cells = "a whole number from 1 to 100";
+        let side = "a whole number from 3 to 4096";
+        let yaws = "a whole number from 1 to 360";
+        let n_risks = n_rows.saturating_mul(n_cols).saturating_mul(n_yaws);
+        let checks = [
+            ((1..=100).contains(&elevation_cells), "risk_map.elevation_cells", cells, elevation_cells as f64),
+            ((3..=4096).contains(&n_rows), "risk_map.n_rows", side, n_rows as f64),
+            ((3..=4096).contains(&n_cols), "risk_map.n_cols", side, n_cols as f64),
+            ((1..=360).contains(&n_yaws), "risk_map.n_yaws", yaws, n_yaws as f64),
+            (n_risks <= MOST_RISKS, "risk_map.n_rows x n_cols x n_yaws", "at most 67108864", n_risks as f64),
+            (share > 0.0 && share <= 1.0, "attitude_share", "a number in (0, 1]", share),
+            (
+                recentre_m > 0.0 && recentre_m <= 1e3,
                 "risk_map.recentre_m",
-                "a finite number > 0",
+                "a number > 0 and at most 1000",
                 recentre_m,
-            )))
+            ),
+        ];
+        let own = checks.into_iter().find(|(allowed, ..)| !allowed);
+        own.map(|(_, field, expected, found)| (field, expected, found))
             .or(self.guard.first_invalid().map(|(field, found)| (field, "a finite number > 0", found)))
     }
 }

@@ -1,6 +1,6 @@
 //! One cycle of the pipeline.
 
-use bicycle::{Decision, Model, Odometry, SensorModel, Vehicle};
+use bicycle::{Command, Decision, Model, Odometry, SensorModel, Vehicle};
 use mppi::Controller;
 use terrain::{GridGeometry, GridMap, Scan, SurfaceCell};
 use traversability::{CvarLevel, Risk, RiskMap, RiskMapView};
@@ -125,11 +125,7 @@ impl Navigator {
         let time_to_goal = self.assessor.last_time_to_goal();
         let chart = self.map.as_ref().map(|map| Chart { map: map.view(), time_to_goal });
         let decision = self.pilot.decide(now_ns, chart, &self.destination);
-        let speed_mps = match decision {
-            Decision::Drive(command) => command.speed_mps,
-            Decision::Hold(_) | Decision::Stop(_) => 0.0,
-        };
-        self.surveyor.note_command(speed_mps);
+        self.surveyor.note_command(decision.command(Command::default()).speed_mps);
         if let Some(pose) = self.pilot.take_stuck() {
             self.assessor.note_stuck(pose);
             if let Some(map) = &mut self.map {

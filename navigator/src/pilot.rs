@@ -1,6 +1,6 @@
 //! The third part of the pipeline: the state of the vehicle and a risk map become a decision.
 
-use bicycle::{Decision, HoldReason, Model, Odometry, SensorModel, StopReason};
+use bicycle::{Command, Decision, HoldReason, Model, Odometry, SensorModel, StopReason};
 use mppi::{Controller, CostToGoView, Input, Objective, Terminal};
 use traversability::RiskMapView;
 
@@ -85,12 +85,14 @@ impl Pilot {
     pub fn decide(&mut self, now_ns: u64, chart: Option<Chart<'_>>, destination: &Destination) -> Decision {
         self.elapsed_s =
             self.decided_at_ns.map_or(0.0, |then_ns| now_ns.saturating_sub(then_ns) as f64 * 1e-9);
-        let decision = self.consider(now_ns, chart, destination);
-        let speed_mps = match decision {
-            Decision::Drive(command) => command.speed_mps,
-            Decision::Hold(_) | Decision::Stop(_) => 0.0,
+        let decision = match self.ready(now_ns, chart) {
+            Ok((chart, odometry)) => self.ask(&chart, &odometry, destination),
+            Err(decision) => {
+                self.controller.stand_by(&decision, self.elapsed_s);
+                decision
+            }
         };
-        self.guard.note_command(speed_mps);
+        self.guard.note_command(decision.command(Command::default()).speed_mps);
         self.decided_at_ns = Some(now_ns);
         self.cycle += 1;
         decision
@@ -126,14 +128,20 @@ impl Pilot {
         self.elapsed_s
     }
 
-    fn consider(&mut self, now_ns: u64, chart: Option<Chart<'_>>, destination: &Destination) -> Decision {
-        let fresh = self.fault.map_or_else(|| self.guard.check(now_ns), Err);
-        if let Err(reason) = fresh {
-            return Decision::Stop(reason);
-        }
-        let (Some(chart), Some(odometry)) = (chart, self.odometry) else {
-            return Decision::Hold(HoldReason::NoMap);
-        };
+    /// What the vehicle was really told after the last decision, where that is not what the decision says; see
+    /// [`Controller::note_sent`].
+    pub fn note_sent(&mut self, sent: Command) {
+        self.controller.note_sent(sent);
+        self.guard.note_command(sent.speed_mps);
+    }
+
+    /// What the controller needs to be asked, or what to do without asking it.
+    fn ready<'a>(&self, now_ns: u64, chart: Option<Chart<'a>>) -> Result<(Chart<'a>, Odometry), Decision> {
+        self.fault.map_or_else(|| self.guard.check(now_ns), Err).map_err(Decision::Stop)?;
+        chart.zip(self.odometry).ok_or(Decision::Hold(HoldReason::NoMap))
+    }
+
+    fn ask(&mut self, chart: &Chart<'_>, odometry: &Odometry, destination: &Destination) -> Decision {
         let was_recovering = self.controller.diagnostics().is_recovering;
         let decision = self.controller.decide(&Input {
             state: odometry.state(),
@@ -153,3 +161,6 @@ impl Pilot {
         decision
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use bicycle::{Command, Decision, Model, SensorModel};
+use bicycle::{Command, Model, SensorModel};
 use mppi::{Config, Controller, Input, Objective, ReferencePath};
 use scenarios::{Deviation, OdometrySensor, Plant, TestMachine};
 use traversability::{GridGeometry, Ground, Risk, RiskMap};
@@ -61,10 +61,7 @@ impl Track {
                 }),
                 cycle,
             });
-            command = match decision {
-                Decision::Drive(command) => command,
-                Decision::Hold(_) | Decision::Stop(_) => Command { speed_mps: 0.0, ..command },
-            };
+            command = decision.command(command);
             if let Some(state) = controller.nominal_trajectory(self.map.view()).get(PLAN_AHEAD) {
                 foreseen.push_back([state.x_m, state.y_m]);
             }

@@ -1,6 +1,6 @@
 //! The steps of a cycle, in their order: start, samples, rollouts, weights, average.
 
-use super::Controller;
+use super::{Controller, LONGEST_STEPS};
 use crate::config::{Actuation, Temperature};
 use crate::judgement::Judge;
 use crate::objective::{Input, Objective, ReferencePath, ReferenceStep, Terminal, TerminalField};
@@ -12,9 +12,6 @@ use crate::weights::{Weigh, WeightSummary};
 use bicycle::{Command, State};
 use std::f64::consts::TAU;
 use traversability::RiskMapView;
-
-/// A cycle that took more of the model's steps than this tells nothing of a single one.
-const LONGEST_STEPS: f64 = 3.0;
 
 /// What to sample for, in metres.
 #[derive(Clone, Copy)]
@@ -38,7 +35,7 @@ impl Controller {
             // In force during this step: the command that was sent a delay ago.
             let age_s = self.config.delay_s - (k as f64 + 0.5) * step_s;
             let next =
-                judge.step(&state, self.history.at(age_s).unwrap_or(as_command(&state)), &mut memory, k);
+                judge.step(&state, self.ledger.at(age_s).unwrap_or(as_command(&state)), &mut memory, k);
             let share = step_s / self.config.step_s;
             state = between(&state, &next, share);
         }
@@ -56,7 +53,7 @@ impl Controller {
         self.recall_slots(before, age_s);
         let mut memory = self.slots.map(f64::from);
         let judge = Judge { stepper: &self.stepper, limits: &self.model.limits, map: input.map };
-        let command = self.history.at(age_s - 0.5 * input.elapsed_s).unwrap_or(as_command(&before));
+        let command = self.ledger.at(age_s - 0.5 * input.elapsed_s).unwrap_or(as_command(&before));
         let expected = judge.step(&before, command, &mut memory, 0);
         let share = input.elapsed_s / self.config.step_s;
         let gained_mps = input.state.speed_mps - before.speed_mps;
@@ -73,8 +70,8 @@ impl Controller {
 
     /// What the effects remember at `state`, whose actuators follow the commands `delay_s` late.
     pub(super) fn recall_slots(&mut self, state: State, delay_s: f64) {
-        let (history, slots) = (&self.history, &mut self.slots);
-        let past = |age_s: f64| history.at(age_s + delay_s).unwrap_or(as_command(&state));
+        let (ledger, slots) = (&self.ledger, &mut self.slots);
+        let past = |age_s: f64| ledger.at(age_s + delay_s).unwrap_or(as_command(&state));
         let mut memory = [0.0; MAX_SLOTS];
         self.stepper.held(&mut memory).copy_from_slice(&self.held_mps2);
         self.stepper.recall(&past, &mut memory[..self.stepper.n_slots()]);
@@ -87,7 +84,7 @@ impl Controller {
         let limits = &self.model.limits;
         let reached = [self.start.speed_mps, self.start.steering_rad];
         let last = self
-            .history
+            .ledger
             .last()
             .map_or(reached, |command| [f64::from(command.speed_mps), f64::from(command.steering_rad)]);
         let rates = [limits.acceleration_max_mps2, limits.steering_rate_max_radps];
@@ -176,6 +173,7 @@ impl Controller {
             }
         };
         let [x_cells, y_cells] = cells([self.start.x_m, self.start.y_m]);
+        let judge = Judge { stepper: &self.stepper, limits: &self.model.limits, map: input.map };
         let scene = Scene {
             stepper: &self.cell_stepper,
             grid: grid(&input.map),
@@ -186,6 +184,7 @@ impl Controller {
                 speed_mps: self.start.speed_mps,
                 steering_rad: self.start.steering_rad,
             },
+            tilted_start: judge.tilt(&self.start),
             slots: &self.slots[..self.cell_stepper.n_slots()],
             prices: self.prices(),
             task,

@@ -33,7 +33,7 @@ fn model_limits() -> Limits {
 
 fn stepper(resolution_m: f64) -> Stepper {
     let model = Model { wheelbase_m: WHEELBASE_M, limits: model_limits(), effects: Vec::new() };
-    Stepper::new(&model, STEP_S, resolution_m)
+    Stepper::new(&model, STEP_S, resolution_m).with_instant_actuators()
 }
 
 /// Ground whose risk changes by cell and yaw.
@@ -139,7 +139,7 @@ fn scene<'a>(map: &'a RiskMap, stepper: &'a Stepper, task: Task<'a>) -> Scene<'a
         speed_mps: 0.0,
         steering_rad: 0.0,
     };
-    Scene { stepper, grid: grid(map), start, slots: &[], prices: PRICES, task }
+    Scene { stepper, grid: grid(map), start, tilted_start: None, slots: &[], prices: PRICES, task }
 }
 
 /// Lanes whose f64 path comes within 1e-4 of an edge are left out: there the last bit decides.
@@ -326,5 +326,82 @@ fn rollouts_of_a_whole_model_go_where_one_vehicle_goes() {
             assert!((found - expected).abs() < 3e-3, "{machine:?} lane {lane}: {found} {expected}");
         }
         assert!(n_compared > 40, "{n_compared} compared");
+    }
+}
+
+/// Ground east of 3 m whose numbers are not finite, in one field or the other.
+fn broken(field: usize, number: f32) -> RiskMap {
+    let mut map = RiskMap::constant(GridGeometry::centred(0.5, 60, 50, 1.0, -2.0), 13, Risk::NONE);
+    let geometry = *map.geometry();
+    let (risks, grounds) = map.arrays_mut();
+    for (index, (risks, ground)) in risks.chunks_exact_mut(13).zip(grounds).enumerate() {
+        if geometry.centre_m(geometry.cell(index))[0] > 3.0 {
+            match field {
+                0 => risks.iter_mut().for_each(|risk| risk.linear_traction = number),
+                1 => risks.iter_mut().for_each(|risk| risk.angular_traction = number),
+                _ => ground.gradient = [number, 0.1],
+            }
+        }
+    }
+    map
+}
+
+/// Whether a rollout reads broken ground with a step left to tell, and how near to its edge it comes: in f64 over ground
+/// that is whole.
+fn reads_broken(stepper: &Stepper, slots: usize, lane: usize) -> (bool, f64) {
+    let mut memory = vec![0.0; slots];
+    let mut state = State { x_m: START[0], y_m: START[1], yaw_rad: START[2], ..State::default() };
+    let mut margin = f64::INFINITY;
+    for t in 0..N_STEPS {
+        margin = margin.min((state.x_m - 3.0).abs());
+        if state.x_m > 3.0 {
+            // What the last step leaves behind, only some of the costs see.
+            return if t + 1 < N_STEPS { (true, margin) } else { (false, 0.0) };
+        }
+        let [speed, steering] = control(lane, t);
+        let command = Command { speed_mps: speed as f32, steering_rad: steering as f32 };
+        state = stepper.step_state(&state, command, &GroundSample::FIRM, &mut memory, t);
+    }
+    (false, margin)
+}
+
+/// A number that is not finite makes the rollout that meets it cost no finite number, and no other, whatever the
+/// instruction set: none may round infinity to nothing, nor may a bound turn NaN into itself.
+#[test]
+fn a_rollout_that_meets_no_number_costs_none_on_every_instruction_set() {
+    let friction = Effect::from_values("friction", [0.8, 1.0, 3.0, 0.0]).unwrap();
+    let slope = Effect::from_values("slope_gravity", [1.0, 0.0, 0.0, 0.0]).unwrap();
+    let whole = Model { wheelbase_m: WHEELBASE_M, limits: model_limits(), effects: vec![slope, friction] };
+    let plain = Model { effects: Vec::new(), ..whole.clone() };
+    for (model, field, number) in [
+        (&plain, 0, f32::NAN),
+        (&plain, 0, f32::INFINITY),
+        (&plain, 1, f32::NAN),
+        (&plain, 1, f32::INFINITY),
+        (&plain, 1, f32::NEG_INFINITY),
+        (&whole, 1, f32::INFINITY),
+        (&whole, 2, f32::NAN),
+    ] {
+        let map = broken(field, number);
+        let (stepper, reference) = (Stepper::new(model, STEP_S, 0.5), Stepper::new(model, STEP_S, 1.0));
+        let task = Task::Goal(GoalTask { x_cells: 1e3, ..goal(&map, 0.0, None) });
+        let slots = vec![0.0; stepper.n_slots()];
+        let mut scene = scene(&map, &stepper, task);
+        scene.slots = &slots;
+        for machine in machines() {
+            let mut chunk = chunk();
+            machine.run(RollOut { scene: &scene, chunk: &mut chunk });
+            let (mut n_met, mut n_missed) = (0, 0);
+            for lane in 0..CHUNK {
+                let (is_met, margin) = reads_broken(&reference, stepper.n_slots(), lane);
+                if margin < 1e-3 {
+                    continue;
+                }
+                let cost_s = chunk.costs.0[lane];
+                assert_eq!(!cost_s.is_finite(), is_met, "{machine:?} {field} {number} lane {lane}: {cost_s}");
+                (n_met, n_missed) = (n_met + usize::from(is_met), n_missed + usize::from(!is_met));
+            }
+            assert!(n_met > 10 && n_missed > 10, "{n_met} {n_missed}");
+        }
     }
 }

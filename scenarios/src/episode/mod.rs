@@ -163,10 +163,7 @@ impl Episode {
         if self.outcome().is_some() {
             return Ok(());
         }
-        self.command = match decision {
-            Decision::Drive(command) => *command,
-            Decision::Hold(_) | Decision::Stop(_) => Command { speed_mps: 0.0, ..self.command },
-        };
+        self.command = decision.command(self.command);
         self.plant.set_command(self.command)?;
         let mut motion = self.plant.motion();
         self.trace.push(TraceRow {

@@ -1,0 +1,138 @@
+//! What the controller knows of a drive that others had a hand in.
+#![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
+
+use super::*;
+use crate::{GuardConfig, RiskMapConfig};
+use bicycle::{Geometry, Limits, State};
+use mppi::{CostToGo, CostToGoConfig};
+use physics_prior::PriorConfig;
+use terrain::ElevationConfig;
+use traversability::{GridGeometry, Risk, RiskMap};
+
+const CYCLE_NS: u64 = 100_000_000;
+const CYCLE_S: f64 = 0.1;
+const DELAY_S: f64 = 0.3;
+/// Speed of the drive before the stop, and what the brakes do [m/s, m/s2].
+const SPEED_MPS: f64 = 2.0;
+const BRAKES_MPS2: f64 = 2.0;
+
+fn limits() -> Limits {
+    Limits {
+        speed_max_mps: SPEED_MPS,
+        reverse_speed_max_mps: 0.0,
+        steering_max_rad: 0.5,
+        steering_rate_max_radps: 1.0,
+        acceleration_max_mps2: BRAKES_MPS2,
+        lateral_acceleration_max_mps2: 3.0,
+        roll_max_rad: 0.5,
+        pitch_max_rad: 0.5,
+    }
+}
+
+fn config() -> Config {
+    let geometry = Geometry {
+        wheelbase_m: 2.0,
+        track_m: 1.2,
+        length_m: 3.0,
+        width_m: 1.5,
+        rear_overhang_m: 0.5,
+        ground_clearance_m: 0.3,
+        wheel_radius_m: 0.3,
+    };
+    Config {
+        elevation: ElevationConfig::scaled_to(geometry.length_m),
+        risk_map: RiskMapConfig { elevation_cells: 1, n_rows: 64, n_cols: 64, n_yaws: 8, recentre_m: 1.0 },
+        prior: PriorConfig::for_vehicle(&geometry),
+        cost_to_go: CostToGoConfig::default(),
+        controller: mppi::Config { delay_s: DELAY_S, n_rollouts: 256, ..mppi::Config::default() },
+        guard: GuardConfig::default(),
+        attitude_share: 0.9,
+    }
+}
+
+struct Drive {
+    pilot: Pilot,
+    map: RiskMap,
+    field: CostToGo,
+    goal_m: [f64; 2],
+    state: State,
+    cycle: u64,
+}
+
+impl Drive {
+    /// On level ground to a goal 18 m ahead, with a vehicle that follows its commands 0.3 s late.
+    fn new() -> Self {
+        let config = config();
+        let model = Model { wheelbase_m: 2.0, limits: limits(), effects: Vec::new() };
+        let map = RiskMap::constant(GridGeometry::centred(0.25, 160, 160, 0.0, 0.0), 8, Risk::NONE);
+        let mut field = CostToGo::new(CostToGoConfig::default(), &limits(), 160, 160).unwrap();
+        let goal_m = [18.0, 0.0];
+        field.update(map.view(), goal_m).unwrap();
+        let state = State { x_m: -15.0, speed_mps: SPEED_MPS, ..State::default() };
+        Self { pilot: Pilot::new(model, &config, 1).unwrap(), map, field, goal_m, state, cycle: 0 }
+    }
+
+    fn measure(&mut self) {
+        self.pilot.admit(&Odometry {
+            valid_at_ns: self.cycle * CYCLE_NS,
+            position_m: [self.state.x_m, self.state.y_m, 0.0],
+            velocity_mps: [self.state.speed_mps, 0.0],
+            wheel_speed_mps: self.state.speed_mps,
+            ..Odometry::default()
+        });
+        self.pilot.note_scan(self.cycle * CYCLE_NS);
+    }
+
+    fn decide(&mut self) -> Decision {
+        let chart = Chart { map: self.map.view(), time_to_goal: self.field.view() };
+        let destination = Destination { goal_m: self.goal_m, tolerance_m: 0.5 };
+        let decision = self.pilot.decide(self.cycle * CYCLE_NS, Some(chart), &destination);
+        self.cycle += 1;
+        decision
+    }
+
+    /// Where the controller's plan of the last decision starts.
+    fn planned_from(&self) -> State {
+        self.pilot.controller().nominal_trajectory(self.map.view())[0]
+    }
+}
+
+/// The vehicle drives at 2 m/s; its odometry fails for a second, in which it stands after it braked. Once odometry is
+/// back, what is on its way for the next 0.3 s is that it stands: the plan starts where it stands, at rest. The
+/// commands of before the stop are none of that.
+#[test]
+fn after_a_stop_of_the_guard_the_plan_starts_from_what_was_really_sent() {
+    let mut drive = Drive::new();
+    for _ in 0..10 {
+        drive.measure();
+        let Decision::Drive(command) = drive.decide() else { panic!("level ground") };
+        assert!(command.speed_mps > 1.0, "{command:?}");
+        drive.state.x_m += SPEED_MPS * CYCLE_S;
+    }
+    let mut n_stops = 0;
+    for _ in 0..14 {
+        n_stops += usize::from(matches!(drive.decide(), Decision::Stop(StopReason::StaleOdometry)));
+    }
+    assert!(n_stops >= 10, "{n_stops}");
+    drive.state = State { x_m: drive.state.x_m + 1.0, ..State::default() };
+    drive.measure();
+    let Decision::Drive(command) = drive.decide() else { panic!("it sees again") };
+    let start = drive.planned_from();
+    assert!((start.x_m - drive.state.x_m).abs() < 1e-9 && start.speed_mps.abs() < 1e-9, "{start:?}");
+    // From rest, as far as it may run ahead of it: no more than a step beyond what the tracking allows.
+    assert!((0.0..=0.2 + 1e-6).contains(&f64::from(command.speed_mps)), "{command:?}");
+}
+
+/// Somebody between controller and vehicle lets nothing through: the vehicle is told to stand whatever is decided.
+#[test]
+fn what_was_sent_instead_of_a_decision_is_what_the_next_plan_starts_from() {
+    let mut drive = Drive::new();
+    drive.state.speed_mps = 0.0;
+    for _ in 0..10 {
+        drive.measure();
+        assert!(matches!(drive.decide(), Decision::Drive(_)));
+        drive.pilot.note_sent(Command::default());
+        let start = drive.planned_from();
+        assert!((start.x_m - drive.state.x_m).abs() < 1e-9 && start.speed_mps.abs() < 1e-9, "{start:?}");
+    }
+}
