@@ -52,4 +52,10 @@ pub enum StopReason {
     OutsideMap,
     /// Whoever carries commands out has heard none for longer than their age limit.
     StaleCommand,
+    /// A measurement is finite and cannot be: farther, faster or turned more than any vehicle is.
+    InputOutOfRange,
+    /// Odometry is older than what has been taken in, or another of the same time.
+    InputOutOfOrder,
+    /// A measurement claims to be of a time that is still to come.
+    InputFromFuture,
 }

@@ -1,4 +1,4 @@
-/* Messages of Surefoot, layout version 2. Written from its types; do not edit. */
+/* Messages of Surefoot, layout version 3. Written from its types; do not edit. */
 #ifndef SUREFOOT_LAYOUT_H
 #define SUREFOOT_LAYOUT_H
 
@@ -6,7 +6,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#define SUREFOOT_LAYOUT_VERSION 2u
+#define SUREFOOT_LAYOUT_VERSION 3u
 
 /* First field of every header: whose message it is, and of when. Known to the channels as surefoot.Stamp. */
 typedef struct SurefootStamp {
@@ -115,29 +115,38 @@ typedef struct SurefootSurfaceHeader {
     SurefootGrid grid;
     /* The scan that was fused last. */
     SurefootSource scan;
-    /* The odometry that it was fused at. */
+    /* Where the vehicle was when the scan was taken, or the odometry that showed the jump. */
     SurefootOdometryRecord odometry;
-    /* When that was measured [ns]. */
+    /* When that was [ns]. */
     uint64_t odometry_at_ns;
+    /* When the odometry was measured in whose frame the map lies: the newest that mapping had taken in [ns]. */
+    uint64_t frame_at_ns;
     /* What happened since the last message: 1 = a scan was fused, 2 = the localisation jumped. */
     uint64_t event;
-    /* The jump, if that is what happened: east, north, up [m]. */
+    /* The jump, if that is what happened: p of before lies at R(jump_yaw_rad) p + jump_m [m]. */
     double jump_m[3];
-    /* All jumps so far together [m]. */
+    /* Its turn, counter-clockwise [rad]. */
+    double jump_yaw_rad;
+    /* All jumps so far together, likewise [m]. */
     double shift_m[3];
+    /* Their turn [rad]. */
+    double shift_yaw_rad;
     /* XXH3 of the payload. */
     uint64_t content_hash;
 } SurefootSurfaceHeader;
-static_assert(sizeof(SurefootSurfaceHeader) == 256, "SurfaceHeader");
+static_assert(sizeof(SurefootSurfaceHeader) == 280, "SurfaceHeader");
 static_assert(offsetof(SurefootSurfaceHeader, stamp) == 0, "SurfaceHeader.stamp");
 static_assert(offsetof(SurefootSurfaceHeader, grid) == 40, "SurfaceHeader.grid");
 static_assert(offsetof(SurefootSurfaceHeader, scan) == 80, "SurfaceHeader.scan");
 static_assert(offsetof(SurefootSurfaceHeader, odometry) == 96, "SurfaceHeader.odometry");
 static_assert(offsetof(SurefootSurfaceHeader, odometry_at_ns) == 184, "SurfaceHeader.odometry_at_ns");
-static_assert(offsetof(SurefootSurfaceHeader, event) == 192, "SurfaceHeader.event");
-static_assert(offsetof(SurefootSurfaceHeader, jump_m) == 200, "SurfaceHeader.jump_m");
-static_assert(offsetof(SurefootSurfaceHeader, shift_m) == 224, "SurfaceHeader.shift_m");
-static_assert(offsetof(SurefootSurfaceHeader, content_hash) == 248, "SurfaceHeader.content_hash");
+static_assert(offsetof(SurefootSurfaceHeader, frame_at_ns) == 192, "SurfaceHeader.frame_at_ns");
+static_assert(offsetof(SurefootSurfaceHeader, event) == 200, "SurfaceHeader.event");
+static_assert(offsetof(SurefootSurfaceHeader, jump_m) == 208, "SurfaceHeader.jump_m");
+static_assert(offsetof(SurefootSurfaceHeader, jump_yaw_rad) == 232, "SurfaceHeader.jump_yaw_rad");
+static_assert(offsetof(SurefootSurfaceHeader, shift_m) == 240, "SurfaceHeader.shift_m");
+static_assert(offsetof(SurefootSurfaceHeader, shift_yaw_rad) == 264, "SurfaceHeader.shift_yaw_rad");
+static_assert(offsetof(SurefootSurfaceHeader, content_hash) == 272, "SurfaceHeader.content_hash");
 
 /* Header of a risk map; the payload is risks, grounds and times to the goal, see docs/runtime.md. Known to the channels as surefoot.RiskHeader. */
 typedef struct SurefootRiskHeader {
@@ -310,7 +319,7 @@ typedef struct SurefootStatusRecord {
     uint64_t n_lost;
     /* Messages refused. */
     uint64_t n_refused;
-    /* Figure of the role's own: futures sampled, points mapped, recorded bytes. */
+    /* Figure of the role's own: speed [m/s], jumps made out, futures sampled, recorded bytes. */
     double figure;
 } SurefootStatusRecord;
 static_assert(sizeof(SurefootStatusRecord) == 96, "StatusRecord");

@@ -1,8 +1,8 @@
-"""Messages of Surefoot, layout version 2. Written from its types; do not edit."""
+"""Messages of Surefoot, layout version 3. Written from its types; do not edit."""
 
 import ctypes
 
-LAYOUT_VERSION = 2
+LAYOUT_VERSION = 3
 
 
 class Stamp(ctypes.Structure):
@@ -168,16 +168,22 @@ class SurfaceHeader(ctypes.Structure):
         ("grid", Grid),
         # The scan that was fused last.
         ("scan", Source),
-        # The odometry that it was fused at.
+        # Where the vehicle was when the scan was taken, or the odometry that showed the jump.
         ("odometry", OdometryRecord),
-        # When that was measured [ns].
+        # When that was [ns].
         ("odometry_at_ns", ctypes.c_uint64),
+        # When the odometry was measured in whose frame the map lies: the newest that mapping had taken in [ns].
+        ("frame_at_ns", ctypes.c_uint64),
         # What happened since the last message: 1 = a scan was fused, 2 = the localisation jumped.
         ("event", ctypes.c_uint64),
-        # The jump, if that is what happened: east, north, up [m].
+        # The jump, if that is what happened: p of before lies at R(jump_yaw_rad) p + jump_m [m].
         ("jump_m", ctypes.c_double * 3),
-        # All jumps so far together [m].
+        # Its turn, counter-clockwise [rad].
+        ("jump_yaw_rad", ctypes.c_double),
+        # All jumps so far together, likewise [m].
         ("shift_m", ctypes.c_double * 3),
+        # Their turn [rad].
+        ("shift_yaw_rad", ctypes.c_double),
         # XXH3 of the payload.
         ("content_hash", ctypes.c_uint64),
     ]
@@ -187,16 +193,19 @@ class SurfaceHeader(ctypes.Structure):
         return "surefoot.SurfaceHeader"
 
 
-assert ctypes.sizeof(SurfaceHeader) == 256
+assert ctypes.sizeof(SurfaceHeader) == 280
 assert SurfaceHeader.stamp.offset == 0
 assert SurfaceHeader.grid.offset == 40
 assert SurfaceHeader.scan.offset == 80
 assert SurfaceHeader.odometry.offset == 96
 assert SurfaceHeader.odometry_at_ns.offset == 184
-assert SurfaceHeader.event.offset == 192
-assert SurfaceHeader.jump_m.offset == 200
-assert SurfaceHeader.shift_m.offset == 224
-assert SurfaceHeader.content_hash.offset == 248
+assert SurfaceHeader.frame_at_ns.offset == 192
+assert SurfaceHeader.event.offset == 200
+assert SurfaceHeader.jump_m.offset == 208
+assert SurfaceHeader.jump_yaw_rad.offset == 232
+assert SurfaceHeader.shift_m.offset == 240
+assert SurfaceHeader.shift_yaw_rad.offset == 264
+assert SurfaceHeader.content_hash.offset == 272
 
 
 class RiskHeader(ctypes.Structure):
@@ -426,7 +435,7 @@ class StatusRecord(ctypes.Structure):
         ("n_lost", ctypes.c_uint64),
         # Messages refused.
         ("n_refused", ctypes.c_uint64),
-        # Figure of the role's own: futures sampled, points mapped, recorded bytes.
+        # Figure of the role's own: speed [m/s], jumps made out, futures sampled, recorded bytes.
         ("figure", ctypes.c_double),
     ]
 

@@ -2,11 +2,11 @@
 
 use bicycle::{Limits, Vehicle};
 use mppi::{CostToGo, CostToGoView};
-use terrain::{CellRegion, GridMap, SurfaceCell};
+use terrain::{CellRegion, DistantPosition, GridMap, SurfaceCell};
 use traversability::{CvarLevel, Risk, RiskMapView};
 
 use crate::risk::{Belief, RiskLayer, StuckPose};
-use crate::{Config, NavigatorError};
+use crate::{Config, Jump, NavigatorError};
 
 /// Judges the ground and finds the least time over it to the goal.
 pub struct Assessor {
@@ -43,6 +43,7 @@ impl Assessor {
         surface: &GridMap<SurfaceCell>,
         changed: &CellRegion,
     ) -> Result<(), NavigatorError> {
+        DistantPosition::check(position_m, self.layer.resolution_m())?;
         Ok(self.layer.update(position_m, surface, changed)?)
     }
 
@@ -82,8 +83,8 @@ impl Assessor {
         self.layer.stuck()
     }
 
-    /// The localisation moved by a step, and what is remembered in its frame moves along.
-    pub fn shift_stuck(&mut self, step_m: [f64; 2]) {
-        self.layer.shift_stuck(step_m);
+    /// The localisation jumped, and what is remembered in its frame moves along.
+    pub fn follow_jump(&mut self, jump: &Jump) {
+        self.layer.follow_jump(jump);
     }
 }

@@ -10,6 +10,7 @@ use rayon::prelude::*;
 use terrain::{CellRegion, GridGeometry, GridMap, SurfaceCell};
 use traversability::{CvarLevel, Risk, RiskMapView};
 
+use crate::Jump;
 use crate::author::Author;
 
 /// Fills a window, shape [row, col, yaw], with the risk of the poses of the body frame that a [`RiskMap`] of this
@@ -107,6 +108,11 @@ impl RiskLayer {
         })
     }
 
+    /// Edge of a cell [m].
+    pub fn resolution_m(&self) -> f64 {
+        self.author.risk_map().geometry().resolution_m
+    }
+
     /// What the author says, once there was an update.
     pub fn known(&self) -> Option<RiskMapView<'_>> {
         self.is_filled.then(|| self.author.risk_map().view())
@@ -136,10 +142,12 @@ impl RiskLayer {
         &self.stuck
     }
 
-    /// The localisation moved by a step, and what was remembered in its frame moves along.
-    pub fn shift_stuck(&mut self, step_m: [f64; 2]) {
+    /// The localisation jumped, and what was remembered in its frame moves along.
+    pub fn follow_jump(&mut self, jump: &Jump) {
         for pose in &mut self.stuck {
-            pose.position_m = [0, 1].map(|axis| pose.position_m[axis] + step_m[axis]);
+            let [x_m, y_m] = pose.position_m;
+            let [x_m, y_m, yaw_rad] = jump.pose([x_m, y_m, pose.yaw_rad]);
+            *pose = StuckPose { position_m: [x_m, y_m], yaw_rad };
         }
     }
 

@@ -9,7 +9,6 @@ use crate::channel::{
     Bus, COMMAND, DECISION, Inlet, MISSION, Message, ODOMETRY, Outlet, RISK, RISK_PHYSICS, STUCK,
 };
 use crate::clock::{self, Cycle};
-use crate::frame::Frame;
 use crate::message::{
     CommandRecord, DecisionRecord, MissionRecord, OdometryRecord, RiskHeader, Source, Stamp, StuckRecord,
 };
@@ -67,7 +66,6 @@ struct Inputs {
     physics: MapInput,
     last_odometry: Option<Stamp>,
     n_odometry: u64,
-    frame: Frame,
     destination: Option<Destination>,
 }
 
@@ -101,20 +99,17 @@ impl Inputs {
             physics: map(&RISK_PHYSICS)?,
             last_odometry: None,
             n_odometry: 0,
-            frame: Frame::default(),
             destination: None,
         })
     }
 
     /// Takes in what has come since the last decision.
     fn take(&mut self, pilot: &mut Pilot) {
-        let (last, n_taken, frame) = (&mut self.last_odometry, &mut self.n_odometry, &mut self.frame);
+        let (last, n_taken) = (&mut self.last_odometry, &mut self.n_odometry);
         *n_taken = 0;
         self.odometry.poll(|stamp, records| {
             let Some(record) = records.first() else { return };
-            if let Some(jump) = pilot.admit(&record.odometry(stamp.valid_at_ns)) {
-                frame.note(stamp.valid_at_ns, &jump);
-            }
+            pilot.admit(&record.odometry(stamp.valid_at_ns));
             *last = Some(*stamp);
             *n_taken += 1;
         });
@@ -158,7 +153,7 @@ impl Control {
         let map = self.inputs.map(began_ns).map(|message| (*message.user_header(), message.payload()));
         let chart = map.as_ref().and_then(|(header, payload)| {
             let (map, time_to_goal) = risk_views(header, payload)?;
-            Some(self.inputs.frame.place(Chart { map, time_to_goal }, header.odometry_at_ns))
+            Some(Chart { map, time_to_goal, odometry_at_ns: header.odometry_at_ns })
         });
         let cycle = self.pilot.cycle();
         // Nobody has said where to: the same as knowing nothing of the ground.

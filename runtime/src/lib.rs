@@ -13,7 +13,6 @@ pub mod channel;
 pub mod clock;
 pub mod control;
 mod error;
-pub mod frame;
 pub mod layout;
 pub mod learning;
 pub mod live;

@@ -9,7 +9,7 @@ pub(crate) use convert::drive_row;
 pub use convert::{HOLD_REASONS, STOP_REASONS};
 
 /// Version of everything in this file; messages of another are refused.
-pub const LAYOUT_VERSION: u32 = 2;
+pub const LAYOUT_VERSION: u32 = 3;
 
 record! {
     /// First field of every header: whose message it is, and of when.
@@ -102,16 +102,22 @@ record! {
         grid: Grid,
         /// The scan that was fused last.
         scan: Source,
-        /// The odometry that it was fused at.
+        /// Where the vehicle was when the scan was taken, or the odometry that showed the jump.
         odometry: OdometryRecord,
-        /// When that was measured [ns].
+        /// When that was [ns].
         odometry_at_ns: u64,
+        /// When the odometry was measured in whose frame the map lies: the newest that mapping had taken in [ns].
+        frame_at_ns: u64,
         /// What happened since the last message: 1 = a scan was fused, 2 = the localisation jumped.
         event: u64,
-        /// The jump, if that is what happened: east, north, up [m].
+        /// The jump, if that is what happened: p of before lies at R(jump_yaw_rad) p + jump_m [m].
         jump_m: [f64; 3],
-        /// All jumps so far together [m].
+        /// Its turn, counter-clockwise [rad].
+        jump_yaw_rad: f64,
+        /// All jumps so far together, likewise [m].
         shift_m: [f64; 3],
+        /// Their turn [rad].
+        shift_yaw_rad: f64,
         /// XXH3 of the payload.
         content_hash: u64,
     }
@@ -254,7 +260,7 @@ record! {
         n_lost: u64,
         /// Messages refused.
         n_refused: u64,
-        /// Figure of the role's own: futures sampled, points mapped, recorded bytes.
+        /// Figure of the role's own: speed [m/s], jumps made out, futures sampled, recorded bytes.
         figure: f64,
     }
 }

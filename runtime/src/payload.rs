@@ -2,7 +2,7 @@
 
 use bicycle::Odometry;
 use mppi::CostToGoView;
-use terrain::{GridGeometry, GridMap, Knowledge, SurfaceCell, TerrainClass};
+use terrain::{DistantPosition, GridGeometry, GridMap, Knowledge, SurfaceCell, TerrainClass};
 use traversability::{Ground, Risk, RiskMapView};
 use xxhash_rust::xxh3::xxh3_64;
 
@@ -179,8 +179,11 @@ pub(crate) fn check_surface(header: &SurfaceHeader, payload: &[[f32; 8]]) -> Res
     let geometry = header.grid.geometry().ok_or(Refusal::Malformed)?;
     require(geometry.n_cells() == payload.len(), Refusal::Malformed)?;
     let at = header.odometry.odometry(header.odometry_at_ns);
-    let shifts = header.jump_m.iter().chain(&header.shift_m);
-    require(Odometry::is_finite(&at) && shifts.clone().all(|m| m.is_finite()), Refusal::NonFinite)
+    let [x_m, y_m, _] = at.position_m;
+    let turns = [header.jump_yaw_rad, header.shift_yaw_rad];
+    let shifts = header.jump_m.iter().chain(&header.shift_m).chain(&turns);
+    require(Odometry::is_finite(&at) && shifts.clone().all(|m| m.is_finite()), Refusal::NonFinite)?;
+    require(DistantPosition::check([x_m, y_m], geometry.resolution_m).is_ok(), Refusal::Malformed)
 }
 
 pub(crate) fn check_risk(header: &RiskHeader, payload: &[[f32; 4]]) -> Result<(), Refusal> {

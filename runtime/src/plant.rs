@@ -7,7 +7,7 @@ use crate::RuntimeError;
 use crate::channel::{Bus, COMMAND, Inlet, MISSION, ODOMETRY, Outlet, SCAN};
 use crate::clock::{self, Cycle, SECOND_NS};
 use crate::message::{CommandRecord, MissionRecord, OdometryRecord, PointRecord, ScanHeader, Stamp};
-use crate::status::{Health, Meter, Role};
+use crate::status::{Health, Jumps, Meter, Role};
 use crate::watchdog::Watchdog;
 
 /// Returns of a sweep at the most.
@@ -46,6 +46,8 @@ pub struct PlantReport {
     pub distance_to_goal_m: f64,
     /// Cycles in which the watchdog stopped the vehicle.
     pub n_stopped_by_watchdog: u64,
+    /// How often mapping made out a jump of the localisation.
+    pub n_jumps: u64,
 }
 
 /// Drives until the episode ends or `is_over` says so.
@@ -68,6 +70,7 @@ struct Plant {
     cycle: Cycle,
     watchdog: Watchdog,
     n_stopped_by_watchdog: u64,
+    jumps: Jumps,
     told_mission_at_ns: Option<u64>,
     commands: Inlet<Stamp, CommandRecord>,
     odometry: Outlet<Stamp, OdometryRecord>,
@@ -93,6 +96,7 @@ impl Plant {
             cycle: Cycle::new(began_ns, cycle_ns),
             watchdog: Watchdog::new(vehicle.limits, clock::nanoseconds(command_age_max_s)),
             n_stopped_by_watchdog: 0,
+            jumps: Jumps::new(bus)?,
             told_mission_at_ns: None,
             commands,
             odometry,
@@ -113,6 +117,7 @@ impl Plant {
                 self.watchdog.admit(decision, header.published_at_ns);
             }
         });
+        self.jumps.listen();
         let decision = self.watchdog.decision(clock::now_ns());
         if decision == Decision::Stop(bicycle::StopReason::StaleCommand) {
             self.n_stopped_by_watchdog += 1;
@@ -180,6 +185,7 @@ impl Plant {
             path_length_m: self.episode.path_length_m(),
             distance_to_goal_m: self.episode.task().distance_to_goal_m(pose.x_m, pose.y_m),
             n_stopped_by_watchdog: self.n_stopped_by_watchdog,
+            n_jumps: self.jumps.n(),
         }
     }
 }

@@ -10,7 +10,6 @@ use evidential::Checkpoint;
 use navigator::{Belief, Chart, Destination, NavigatorError, Pilot};
 use traversability::CvarLevel;
 
-use crate::frame::Frame;
 use crate::message::{CommandRecord, DecisionRecord, Source};
 use crate::payload::risk_views;
 use crate::setup::{MachineSetup, SetupError};
@@ -131,7 +130,6 @@ pub fn replay(records: &Records, knowledge: &Knowledge) -> Result<ReplayReport, 
             life = Some(Life {
                 epoch_ns: key.epoch_ns,
                 pilot: Pilot::new(machine.model.clone(), &machine.config, seed)?,
-                frame: Frame::default(),
                 is_lost: false,
             });
         }
@@ -147,7 +145,6 @@ pub fn replay(records: &Records, knowledge: &Knowledge) -> Result<ReplayReport, 
 struct Life {
     epoch_ns: u64,
     pilot: Pilot,
-    frame: Frame,
     /// Something that a decision was made from is missing: what its memory holds from then on is not known.
     is_lost: bool,
 }
@@ -185,7 +182,7 @@ impl Life {
         let chart = made.and_then(|made| {
             self.pilot.note_scan(made.header.stamp.valid_at_ns);
             let (map, time_to_goal) = risk_views(&made.header, &made.payload)?;
-            Some(self.frame.place(Chart { map, time_to_goal }, made.header.odometry_at_ns))
+            Some(Chart { map, time_to_goal, odometry_at_ns: made.header.odometry_at_ns })
         });
         let destination = Destination { goal_m: record.goal_m, tolerance_m: record.tolerance_m };
         self.pilot.use_rollouts(record.n_rollouts as usize);
@@ -217,9 +214,7 @@ impl Life {
             let Some((stamp, odometry)) = records.odometry.get(&Key { epoch_ns, sequence }) else {
                 return Some(format!("odometry {sequence}"));
             };
-            if let Some(jump) = self.pilot.admit(&odometry.odometry(stamp.valid_at_ns)) {
-                self.frame.note(stamp.valid_at_ns, &jump);
-            }
+            self.pilot.admit(&odometry.odometry(stamp.valid_at_ns));
         }
         None
     }

@@ -1,6 +1,6 @@
 //! What every process tells of itself.
 
-use crate::channel::{Bus, Channel, ChannelError, Counts, Outlet, status_channel};
+use crate::channel::{Bus, Channel, ChannelError, Counts, Inlet, Outlet, status_channel};
 use crate::clock::{self, SECOND_NS};
 use crate::message::{Stamp, StatusRecord};
 
@@ -73,6 +73,39 @@ impl Health {
     pub fn with(mut self, counts: &Counts) -> Self {
         self.messages = [self.messages[0] + counts.lost, self.messages[1] + counts.n_refused()];
         self
+    }
+}
+
+/// How often mapping made out a jump of the localisation, over all its lives.
+pub struct Jumps {
+    status: Inlet<Stamp, StatusRecord>,
+    /// In the lives that have ended.
+    n_before: u64,
+    /// Which life tells now, and its count.
+    life: (u64, u64),
+}
+
+impl Jumps {
+    /// Listens from now on.
+    pub fn new(bus: &Bus) -> Result<Self, ChannelError> {
+        Ok(Self { status: bus.inlet(&Role::Mapping.status())?, n_before: 0, life: (0, 0) })
+    }
+
+    /// Takes in what has been told.
+    pub fn listen(&mut self) {
+        let Self { status, n_before, life } = self;
+        status.poll(|stamp, records| {
+            let Some(record) = records.first() else { return };
+            if stamp.epoch_ns != life.0 {
+                *n_before += life.1;
+            }
+            *life = (stamp.epoch_ns, record.figure as u64);
+        });
+    }
+
+    /// All that have been told of.
+    pub fn n(&self) -> u64 {
+        self.n_before + self.life.1
     }
 }
 

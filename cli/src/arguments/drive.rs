@@ -254,8 +254,9 @@ Files written to --out:
                 and risk grids, best rollouts and controller diagnostics; opens
                 in Foxglove
   summary.json  outcome, time to goal, path length, largest roll and pitch,
-                control and map milliseconds, stops by reason, and all that is
-                needed to repeat the drive
+                control and map milliseconds, stops by reason, jumps of the
+                localisation, measurements refused, scans and their points, and
+                all that is needed to repeat the drive
 
 Outcomes:
   goal            the goal was reached

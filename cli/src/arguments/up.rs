@@ -124,8 +124,9 @@ Examples:
   surefoot up --realtime --rate 50
       As regular as the system permits, 50 decisions a second.
 
-`--role all` leaves drive-000.mcap, drive-001.mcap and so on, summary.json and runtime.json: how control kept its
-times (jitter, lateness, misses, age of its maps) and what each process took of processor and memory.
+`--role all` leaves drive-000.mcap, drive-001.mcap and so on, summary.json (how the drive
+ended, how often the localisation jumped) and runtime.json: how control kept its times (jitter, lateness, misses, age of
+its maps) and what each process took of processor and memory.
 
 Exit codes:
   0  the goal was reached, or the process was told to end

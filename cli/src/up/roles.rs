@@ -153,6 +153,7 @@ struct LiveSummary<'a> {
     path_length_m: f64,
     distance_to_goal_m: f64,
     cycles_stopped_by_watchdog: u64,
+    localisation_jumps: u64,
     seed: u64,
     vehicle: &'a str,
     world: &'a str,
@@ -175,7 +176,8 @@ fn run_plant(arguments: &UpArguments, machine: &Machine) -> anyhow::Result<()> {
         command_age_max_s: arguments.command_age,
     };
     let report = plant::run(&Bus::join(&arguments.run)?, setup, &interrupt::interrupted)?;
-    let PlantReport { outcome, time_s, path_length_m, distance_to_goal_m, n_stopped_by_watchdog } = report;
+    let PlantReport { outcome, time_s, path_length_m, distance_to_goal_m, n_stopped_by_watchdog, n_jumps } =
+        report;
     std::fs::create_dir_all(&arguments.drive.out)?;
     formats::write_json_atomic(
         &arguments.drive.out.join("summary.json"),
@@ -185,6 +187,7 @@ fn run_plant(arguments: &UpArguments, machine: &Machine) -> anyhow::Result<()> {
             path_length_m,
             distance_to_goal_m,
             cycles_stopped_by_watchdog: n_stopped_by_watchdog,
+            localisation_jumps: n_jumps,
             seed: arguments.drive.seed,
             vehicle: &machine.vehicle.name,
             world: &world,

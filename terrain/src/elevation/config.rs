@@ -2,6 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::BodyBox;
+
 /// Slope of the steepest ground that is still ground: the tangent of 70 degrees.
 const STEEPEST_GROUND: f64 = 2.747;
 
@@ -52,6 +54,9 @@ pub struct ElevationConfig {
     /// A change of a height below this is not published [m], nor are changes of a variance by less than a fifth
     /// or of a probability by less than a twentieth; 0 = every change is.
     pub publish_step_m: f32,
+    /// The box that the vehicle takes up, with a margin: points inside are the vehicle itself. Empty = the sensor sees
+    /// nothing of it.
+    pub own_body: BodyBox,
 }
 
 impl Default for ElevationConfig {
@@ -69,6 +74,7 @@ impl Default for ElevationConfig {
             evidence_cap: 30.0,
             open_prior: 1.0,
             own_body_m: 0.0,
+            own_body: BodyBox::EMPTY,
             clearance_m: 2.5,
             wall_span_m: 0.8,
             hidden_ground_std_m: 0.15,
@@ -140,6 +146,10 @@ impl ElevationConfig {
         ];
         check(&positive, "a finite number > 0", |v| v.is_finite() && v > 0.0)?;
         check(&not_negative, "a finite number >= 0", |v| v.is_finite() && v >= 0.0)?;
+        let faces = self.own_body.min_m.map(|face| ("own_body.min_m", face));
+        check(&faces, "three finite numbers", f64::is_finite)?;
+        let faces = self.own_body.max_m.map(|face| ("own_body.max_m", face));
+        check(&faces, "three finite numbers", f64::is_finite)?;
         check(&[("recentre_m", self.recentre_m)], "a number > 0, infinity allowed", |v| v > 0.0)
     }
 

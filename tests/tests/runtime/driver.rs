@@ -5,6 +5,7 @@ use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 
 use bicycle::Odometry;
+use navigator::Jump;
 use runtime::channel::{Bus, COMMAND, Inlet, MISSION, ODOMETRY, Outlet, RunName, SCAN};
 use runtime::clock::{nanoseconds, now_ns, sleep_until};
 use runtime::message::{CommandRecord, MissionRecord, OdometryRecord, PointRecord, ScanHeader, Stamp};
@@ -20,6 +21,10 @@ use crate::fixture::{episode_config, machine, task};
 pub struct Misbehaviour {
     /// The localisation has corrected itself by so much, east and north [m].
     pub offset_m: [f64; 2],
+    /// And its heading by so much, about the map's origin [rad].
+    pub turn_rad: f64,
+    /// Odometry comes ten times a second, in cycles in which no scan does.
+    pub is_sparse: bool,
     /// Its clock is ahead by so much [ns].
     pub ahead_ns: i64,
     /// The localisation repeats its last word.
@@ -107,15 +112,17 @@ impl Robot {
         let observation = self.episode.observe().clone();
         if !behaviour.is_frozen {
             self.told = observation.odometry;
-            for (axis, offset_m) in behaviour.offset_m.into_iter().enumerate() {
-                self.told.position_m[axis] += offset_m;
-            }
+            let [east_m, north_m] = behaviour.offset_m;
+            let correction = Jump { step_m: [east_m, north_m, 0.0], yaw_rad: behaviour.turn_rad };
+            self.told = correction.odometry(&self.told);
         }
         let mut record = OdometryRecord::from(&self.told);
         if behaviour.is_not_a_number {
             record.yaw_rate_radps = f64::NAN;
         }
-        self.odometry.send_one(Stamp::default(), record, stamped_ns).unwrap();
+        if !behaviour.is_sparse || self.episode.n_cycles() % 5 == 3 {
+            self.odometry.send_one(Stamp::default(), record, stamped_ns).unwrap();
+        }
         if let Some(scan) = &observation.scan {
             self.send_scan(scan, stamped_ns);
         }

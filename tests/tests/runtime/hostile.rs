@@ -138,10 +138,20 @@ fn maps_with_huge_counts_and_wrong_lengths_never_come_through() {
             .send(SurfaceHeader { stamp: stamp(1), grid, ..SurfaceHeader::default() }, &[[0.0; 8]; 4]);
         assert!(surfaces.newest().is_none(), "{grid:?}");
     }
-    let odd = SurfaceHeader { stamp: stamp(1), grid, jump_m: [f64::NAN; 3], ..SurfaceHeader::default() };
-    hostile_surface.send(odd, &[[0.0; 8]; 4]);
-    assert!(surfaces.newest().is_none());
-    assert_eq!((surfaces.counts().of(Refusal::Malformed), surfaces.counts().of(Refusal::NonFinite)), (4, 1));
+    let header = SurfaceHeader { stamp: stamp(1), grid, ..SurfaceHeader::default() };
+    let odd = [
+        SurfaceHeader { jump_m: [f64::NAN; 3], ..header },
+        SurfaceHeader { jump_yaw_rad: f64::INFINITY, ..header },
+        SurfaceHeader { shift_yaw_rad: f64::NAN, ..header },
+    ];
+    for header in odd {
+        hostile_surface.send(header, &[[0.0; 8]; 4]);
+        assert!(surfaces.newest().is_none(), "{header:?}");
+    }
+    let nowhere = OdometryRecord { position_m: [1e19, 0.0, 0.0], ..OdometryRecord::default() };
+    hostile_surface.send(SurfaceHeader { odometry: nowhere, ..header }, &[[0.0; 8]; 4]);
+    assert!(surfaces.newest().is_none(), "a position that no window can be placed at");
+    assert_eq!((surfaces.counts().of(Refusal::Malformed), surfaces.counts().of(Refusal::NonFinite)), (5, 3));
 }
 
 #[test]
