@@ -26,7 +26,7 @@ pub struct ElevationConfig {
     pub scan_noise_m: f64,
     /// Standard deviation of the tilt that all points of a scan share (attitude error) [rad].
     pub scan_tilt_rad: f64,
-    /// Growth of a height's variance while nothing is seen of it [m2/s].
+    /// Growth of a height's variance while nothing is seen of it [m2/s]; published as every change of a variance is.
     pub fading_m2ps: f64,
     /// Points a class's evidence is remembered for: older ones fade beyond it, > 0.
     pub evidence_cap: f32,

@@ -222,7 +222,8 @@ impl ElevationMap {
         self.changed.include_entered(&old, &new);
     }
 
-    /// Lets what was seen grow uncertain with time. A scan older than the last one fades nothing.
+    /// Lets what was seen grow uncertain with time. A scan older than the last one fades nothing. The surface follows
+    /// when it is published: whoever brings a map up to date with what changed must not read what did not.
     fn fade(&mut self, now_ns: u64) {
         let elapsed_ns = self.fused_at_ns.map_or(0, |then_ns| now_ns.saturating_sub(then_ns));
         self.fused_at_ns = self.fused_at_ns.max(Some(now_ns));
@@ -231,7 +232,6 @@ impl ElevationMap {
             for state in self.states.values_mut() {
                 state.variance_m2 += by_m2;
             }
-            surfacing::fade(&mut self.surface, by_m2);
         }
     }
 
