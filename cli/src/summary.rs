@@ -82,7 +82,7 @@ pub struct Summary {
     /// Share of the ground that was ever known that is unlike what the networks were trained on; null for a method
     /// that cannot tell.
     pub unfamiliar_share: Option<f64>,
-    /// Instruction set that the controller used.
+    /// Instruction set that maps and controller used.
     pub isa: String,
     /// Threads of the controller.
     pub threads: usize,

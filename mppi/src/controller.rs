@@ -10,7 +10,7 @@ use crate::diagnostics::Diagnostics;
 use crate::history::History;
 use crate::judgement::Judge;
 use crate::kernel::workers::Workers;
-use crate::kernel::{CHUNK, Machine, functions};
+use crate::kernel::{CHUNK, functions};
 use crate::lag;
 use crate::objective::{Input, ReferenceStep};
 use crate::plan::Plan;
@@ -18,6 +18,7 @@ use crate::recovery::{Mode, Watch};
 use crate::rollout::MAX_SLOTS;
 use crate::summary::Totals;
 use crate::weights::WeightSummary;
+use bicycle::lanes::Instructions;
 use bicycle::{Command, Decision, Effect, HoldReason, Model, State, Stepper, StopReason};
 use traversability::RiskMapView;
 
@@ -45,7 +46,7 @@ pub struct Controller {
     pub(crate) config: Config,
     pub(crate) model: Model,
     seed: u64,
-    machine: Machine,
+    instructions: Instructions,
     workers: Workers,
     pub(crate) chunks: Vec<Chunk>,
     /// Chunks that are sampled, from the first on.
@@ -84,7 +85,7 @@ impl Controller {
     pub fn new(config: Config, model: Model, seed: u64) -> Result<Self, ConfigError> {
         config.validate()?;
         model.validate()?;
-        let machine = Machine::find(config.isa).ok_or(ConfigError::IsaAbsent { isa: config.isa })?;
+        let instructions = Instructions::find(config.isa)?;
         let stepper = Stepper::new(&model, config.step_s, 1.0);
         let stepper = match config.actuation {
             Actuation::Instant => stepper.with_instant_actuators(),
@@ -114,11 +115,11 @@ impl Controller {
             slots: [0.0; MAX_SLOTS],
             start: State::default(),
             temperature_s: 1.0,
-            diagnostics: Diagnostics::new(machine.isa()),
+            diagnostics: Diagnostics::new(instructions.isa()),
             config,
             model,
             seed,
-            machine,
+            instructions,
         })
     }
 
@@ -228,7 +229,7 @@ impl Controller {
             .fold(Totals::default(), |totals, chunk| totals.plus(&chunk.totals));
         let (chunk, lane) = summary.best;
         self.diagnostics = Diagnostics {
-            isa: self.machine.isa(),
+            isa: self.instructions.isa(),
             best_terms_s: self.chunks[chunk].terms.each_ref().map(|row| row.0[lane]),
             mean_terms_s: totals.mean_terms_s(),
             baseline_s: summary.baseline_s,

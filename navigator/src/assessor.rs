@@ -1,5 +1,6 @@
 //! The second part of the pipeline: the map of the ground becomes risk and time to the goal.
 
+use bicycle::lanes::Instructions;
 use bicycle::{Limits, Vehicle};
 use mppi::{CostToGo, CostToGoView};
 use terrain::{CellRegion, GridMap, SurfaceCell};
@@ -15,7 +16,8 @@ pub struct Assessor {
 }
 
 impl Assessor {
-    /// An assessor of a surface with the settings of `config`; the cost to go keeps to `limits`.
+    /// An assessor of a surface with the settings of `config`, on the instruction set of its controller; the cost to go
+    /// keeps to `limits`.
     pub fn new(
         vehicle: &Vehicle,
         limits: &Limits,
@@ -25,8 +27,9 @@ impl Assessor {
     ) -> Result<Self, NavigatorError> {
         config.validate()?;
         let window = config.risk_map;
+        let instructions = Instructions::find(config.controller.isa).map_err(mppi::ConfigError::from)?;
         Ok(Self {
-            layer: RiskLayer::new(belief, &config.prior, level, &vehicle.geometry, config)?,
+            layer: RiskLayer::new(belief, level, &vehicle.geometry, config, instructions)?,
             cost_to_go: CostToGo::new(
                 config.cost_to_go,
                 &config.allowed(limits),

@@ -4,8 +4,9 @@ use std::f64::consts::TAU;
 use std::sync::Arc;
 
 use bicycle::Geometry;
+use bicycle::lanes::Instructions;
 use evidential::{BeliefMapError, Checkpoint, Learned, Unfamiliar};
-use physics_prior::{Assumption, PriorConfig};
+use physics_prior::Assumption;
 use rayon::prelude::*;
 use terrain::{CellRegion, GridGeometry, GridMap, SurfaceCell};
 use traversability::{CvarLevel, Risk, RiskMapView};
@@ -65,17 +66,19 @@ pub(crate) struct RiskLayer {
 impl RiskLayer {
     pub fn new(
         belief: &Belief,
-        prior: &PriorConfig,
         level: CvarLevel,
         geometry: &Geometry,
         config: &crate::Config,
+        instructions: Instructions,
     ) -> Result<Self, BeliefMapError> {
+        let prior = &config.prior;
         let window = &config.risk_map;
         let resolution_m = config.risk_resolution_m();
         let grid = GridGeometry::centred(resolution_m, window.n_rows, window.n_cols, 0.0, 0.0);
         let surface_m = config.elevation.resolution_m;
-        let by_prior =
-            |assumption: Assumption| Author::prior(geometry, &assumption, surface_m, grid, window.n_yaws);
+        let by_prior = |assumption: Assumption| {
+            Author::prior(geometry, &assumption, surface_m, grid, window.n_yaws, instructions)
+        };
         let author = match belief {
             Belief::Physics => by_prior(Assumption::Physics { prior: *prior, level })?,
             Belief::Learned { checkpoint, unfamiliar } => {
@@ -85,7 +88,7 @@ impl RiskLayer {
                     obstacle_margin_m: prior.obstacle_margin_m,
                     level,
                 };
-                Author::networks(geometry, &learned, surface_m, grid, window.n_yaws)?
+                Author::networks(geometry, &learned, surface_m, grid, window.n_yaws, instructions)?
             }
             Belief::Nominal | Belief::Given(_) => {
                 by_prior(Assumption::Nominal { obstacle_margin_m: prior.obstacle_margin_m })?

@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use bicycle::Geometry;
+use bicycle::lanes::Instructions;
 use terrain::{CellRegion, GridGeometry, GridMap, SurfaceCell};
 use traversability::{CvarLevel, Ground, PartialMoments, Risk};
 
@@ -37,7 +38,7 @@ pub struct PriorField {
 impl PriorField {
     /// A field over the window `risk` for surfaces of the given resolution, all unknown until one is read.
     ///
-    /// `geometry` comes from a vehicle that passed [`bicycle::Vehicle::validate`].
+    /// `geometry` comes from a vehicle that passed [`bicycle::Vehicle::validate`]. Every instruction set gives the same bits.
     ///
     /// # Errors
     /// A parameter of the prior makes no sense, the cells of the two grids never line up, or there is no yaw.
@@ -47,6 +48,7 @@ impl PriorField {
         surface_resolution_m: f64,
         risk: GridGeometry,
         n_yaws: usize,
+        instructions: Instructions,
     ) -> Result<Self, PriorMapError> {
         if n_yaws == 0 {
             return Err(PriorMapError::NoYaws);
@@ -56,7 +58,8 @@ impl PriorField {
             risk_m: risk.resolution_m,
         })?;
         let (lengths, judgement) = judged(geometry, assumption)?;
-        let poses = Poses::new(judgement, lengths, ratio, surface_resolution_m, &risk, n_yaws);
+        let poses =
+            Poses::new(judgement, lengths, (ratio, surface_resolution_m), &risk, n_yaws, instructions);
         Ok(Self { poses, window: risk, read_from: None })
     }
 

@@ -1,6 +1,7 @@
 //! From the known surface to a risk map, whole or where something changed.
 
 use bicycle::Geometry;
+use bicycle::lanes::Instructions;
 use rayon::prelude::*;
 use terrain::{CellRegion, GridGeometry, GridMap, SurfaceCell};
 use traversability::{CvarLevel, Risk, RiskMap};
@@ -68,16 +69,17 @@ pub struct PriorMap {
 impl PriorMap {
     /// A map in the window `risk` for surfaces of the given resolution; [`Risk::OUTSIDE`] until it is updated.
     ///
-    /// `geometry` comes from a vehicle that passed [`bicycle::Vehicle::validate`].
+    /// `geometry` comes from a vehicle that passed [`bicycle::Vehicle::validate`]. Every instruction set gives the same bits.
     pub fn new(
         geometry: &Geometry,
         assumption: &Assumption,
         surface_resolution_m: f64,
         risk: GridGeometry,
         n_yaws: usize,
+        instructions: Instructions,
     ) -> Result<Self, PriorMapError> {
         Ok(Self {
-            field: PriorField::new(geometry, assumption, surface_resolution_m, risk, n_yaws)?,
+            field: PriorField::new(geometry, assumption, surface_resolution_m, risk, n_yaws, instructions)?,
             map: RiskMap::constant(risk, n_yaws, Risk::OUTSIDE),
         })
     }

@@ -6,6 +6,7 @@ mod records;
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use bicycle::lanes::{Instructions, IsaAbsent};
 use evidential::Checkpoint;
 use navigator::{Belief, Chart, Destination, NavigatorError, Pilot};
 use traversability::CvarLevel;
@@ -53,6 +54,9 @@ pub enum ReplayError {
     /// Its settings are none.
     #[error(transparent)]
     Setup(#[from] SetupError),
+    /// It was made with other instructions.
+    #[error("{0}; the recording was made with that one, and its decisions are those of no other")]
+    Instructions(#[from] IsaAbsent),
     /// Its level or seed is none.
     #[error("recorded {what}: expected {expected}, found {found}")]
     Field {
@@ -111,6 +115,7 @@ pub fn read(files: &[PathBuf]) -> Result<Records, ReplayError> {
 pub fn replay(records: &Records, knowledge: &Knowledge) -> Result<ReplayReport, ReplayError> {
     let Some(setup) = &records.setup else { return Err(ReplayError::NoSetup { file: String::new() }) };
     let machine = MachineSetup::read(setup)?;
+    Instructions::find(machine.config.controller.isa)?;
     let level = CvarLevel::new(setup.alpha).map_err(|_| ReplayError::Field {
         what: "alpha",
         expected: "a level in (0, 1]",

@@ -93,7 +93,7 @@ pub struct DriveArguments {
           help_heading = "Run")]
     pub threads: Option<usize>,
 
-    /// Instruction set of the controller; auto takes the best the machine has
+    /// Instruction set of maps and controller; auto takes the best the machine has
     #[arg(long, value_enum, default_value_t = InstructionSet::Auto, help_heading = "Run")]
     pub isa: InstructionSet,
 
@@ -199,7 +199,7 @@ pub enum Pace {
     Real,
 }
 
-/// Instruction set of the controller's kernels.
+/// Instruction set of every kernel between scan and command.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum InstructionSet {
     /// The best the machine has

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use bicycle::lanes::{Instructions, Isa};
 use bicycle::{Model, Vehicle};
 use formats::{ConfigText, ElevationFile, overlay, read_elevation, read_model, read_vehicle};
 use navigator::Config;
@@ -68,9 +69,19 @@ pub(crate) fn machine(arguments: &DriveArguments) -> Result<Machine, UsageError>
         config = overlay(&text, &config).map_err(UsageError::from_input)?;
     }
     config.controller.n_threads = arguments.n_threads();
-    config.controller.isa = arguments.isa.into();
+    config.controller.isa = isa(arguments, config.controller.isa)?;
     let knowledge = Knowledge::choose(arguments, &vehicle)?;
     Ok(Machine { vehicle, model, config, knowledge })
+}
+
+/// The instruction set as asked, else as configured; by its name, so that whoever records the settings tells what was
+/// used.
+fn isa(arguments: &DriveArguments, configured: Isa) -> Result<Isa, UsageError> {
+    let wished = match Isa::from(arguments.isa) {
+        Isa::Auto => configured,
+        asked => asked,
+    };
+    Ok(Instructions::find(wished).map_err(UsageError::from_input)?.isa())
 }
 
 /// Where to drive, from where, where to.
@@ -164,5 +175,32 @@ fn layers(file: ElevationFile) -> WorldLayers {
         low_vegetation_fraction: file.layers.low_vegetation_fraction,
         water: file.layers.water,
         ground_gap_m: file.layers.ground_gap_m,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
+
+    use super::*;
+    use crate::arguments::{Arguments, Command};
+    use clap::Parser;
+
+    fn isa_of(words: &[&str]) -> Isa {
+        let words = ["surefoot", "drive", "--method", "physics"].iter().chain(words);
+        match Arguments::try_parse_from(words).unwrap().command {
+            Command::Drive(arguments) => machine(&arguments).unwrap().config.controller.isa,
+            _ => unreachable!("parsed from `drive`"),
+        }
+    }
+
+    #[test]
+    fn settings_name_the_instruction_set_that_is_used() {
+        assert_eq!(isa_of(&[]), Instructions::widest().isa());
+        assert_eq!(isa_of(&["--isa", "portable"]), Isa::Portable);
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("settings.toml");
+        std::fs::write(&file, "[controller]\nisa = \"portable\"\n").unwrap();
+        assert_eq!(isa_of(&["--config", file.to_str().unwrap()]), Isa::Portable, "as the file says");
     }
 }

@@ -3,7 +3,8 @@
 
 use super::*;
 use crate::cost_to_go::CostToGoView;
-use crate::kernel::{Isa, Machine};
+use crate::kernel;
+use bicycle::lanes::Instructions;
 use bicycle::{Command, Effect, Limits, Model, State};
 use traversability::{GridGeometry, Ground, RiskMap};
 
@@ -14,8 +15,8 @@ const WHEELBASE_M: f64 = 2.0;
 const START: [f64; 3] = [1.2, -1.9, 0.6];
 const GOAL_M: [f64; 2] = [2.6, -1.2];
 
-fn machines() -> Vec<Machine> {
-    [Isa::Portable, Isa::Avx2, Isa::Avx512].into_iter().filter_map(Machine::find).collect()
+fn machines() -> Vec<Instructions> {
+    Instructions::all().collect()
 }
 
 fn model_limits() -> Limits {
@@ -151,7 +152,7 @@ fn rollouts_cost_what_the_plain_loop_says() {
         let scene = scene(&map, &stepper, task);
         for machine in machines() {
             let mut chunk = chunk();
-            machine.run(RollOut { scene: &scene, chunk: &mut chunk });
+            kernel::run(machine, RollOut { scene: &scene, chunk: &mut chunk });
             let (mut n_compared, mut n_arrived) = (0, 0);
             for lane in 0..CHUNK {
                 let (expected, margin) = reference(&map, lane, distance_s_per_m);
@@ -188,7 +189,7 @@ fn the_goal_latches() {
     for machine in machines() {
         let mut chunk = Chunk::new(N_STEPS);
         chunk.controls.iter_mut().for_each(|rows| rows[0].0 = [1.0; CHUNK]);
-        machine.run(RollOut { scene: &scene, chunk: &mut chunk });
+        kernel::run(machine, RollOut { scene: &scene, chunk: &mut chunk });
         // 1.51 m until the rim: reached with the 16th step.
         assert!(chunk.costs.0.iter().all(|cost| (cost - 1.6).abs() < 1e-4), "{}", chunk.costs.0[0]);
     }
@@ -208,7 +209,7 @@ fn the_cost_to_go_field_is_interpolated_between_cells() {
     let scene = scene(&map, &stepper, Task::Goal(task));
     for machine in machines() {
         let mut chunk = chunk();
-        machine.run(RollOut { scene: &scene, chunk: &mut chunk });
+        kernel::run(machine, RollOut { scene: &scene, chunk: &mut chunk });
         for lane in 0..CHUNK {
             let [mut x, mut y, mut yaw] = START;
             for t in 0..N_STEPS {
@@ -289,7 +290,7 @@ fn rollouts_of_a_whole_model_go_where_one_vehicle_goes() {
     let view = map.view();
     for machine in machines() {
         let mut chunk = chunk();
-        machine.run(RollOut { scene: &scene, chunk: &mut chunk });
+        kernel::run(machine, RollOut { scene: &scene, chunk: &mut chunk });
         let mut n_compared = 0;
         for lane in 0..CHUNK {
             let mut memory = remembered.clone();
