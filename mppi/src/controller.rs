@@ -183,7 +183,7 @@ impl Controller {
         if !is_usable(&input.map) {
             return Some(Decision::Hold(HoldReason::NoMap));
         }
-        if (end_m[0] - x_m).hypot(end_m[1] - y_m) <= tolerance_m {
+        if libm::hypot(end_m[0] - x_m, end_m[1] - y_m) <= tolerance_m {
             return Some(Decision::Hold(HoldReason::AtGoal));
         }
         let outside = input.map.geometry.cell_at(x_m, y_m).is_none();

@@ -164,6 +164,6 @@ fn controller(length_m: f64) -> mppi::Config {
 
 /// Limits that keep a cell size readable: 0.1944 becomes 0.19.
 fn round_to_two_digits(length_m: f64) -> f64 {
-    let scale = 10f64.powi(1 - length_m.log10().floor() as i32);
+    let scale = libm::pow(10.0, 1.0 - libm::log10(length_m).floor());
     (length_m * scale).round() / scale
 }

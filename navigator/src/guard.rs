@@ -110,13 +110,13 @@ impl Guard {
     fn jump(&self, last: &Odometry, next: &Odometry) -> Option<Jump> {
         let dt_s = age_s(next.valid_at_ns, last.valid_at_ns);
         let [forward_m, left_m] = [0, 1].map(|i| 0.5 * (last.velocity_mps[i] + next.velocity_mps[i]) * dt_s);
-        let (sin, cos) = (0.5 * (last.attitude_rad[2] + next.attitude_rad[2])).sin_cos();
+        let (sin, cos) = libm::sincos(0.5 * (last.attitude_rad[2] + next.attitude_rad[2]));
         let step_m = [
             next.position_m[0] - last.position_m[0] - (forward_m * cos - left_m * sin),
             next.position_m[1] - last.position_m[1] - (forward_m * sin + left_m * cos),
             next.position_m[2] - last.position_m[2],
         ];
-        (step_m[0].hypot(step_m[1]) > self.config.jump_min_m).then_some(Jump { step_m })
+        (libm::hypot(step_m[0], step_m[1]) > self.config.jump_min_m).then_some(Jump { step_m })
     }
 }
 

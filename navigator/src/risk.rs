@@ -191,13 +191,13 @@ fn block(risks: &mut [Risk], view: &RiskMapView<'_>, stuck: &StuckPose, length_m
     };
     let bins: Vec<usize> = (0..n_yaws).filter(|&bin| turned(bin) <= STUCK_YAW_RAD).collect();
     let ahead_m = STUCK_AHEAD * length_m;
-    let centre_m = [
-        stuck.position_m[0] + ahead_m * stuck.yaw_rad.cos(),
-        stuck.position_m[1] + ahead_m * stuck.yaw_rad.sin(),
-    ];
+    let (sine, cosine) = libm::sincos(stuck.yaw_rad);
+    let centre_m = [stuck.position_m[0] + ahead_m * cosine, stuck.position_m[1] + ahead_m * sine];
+    let radius_m = STUCK_RADIUS * length_m;
     for index in 0..geometry.n_cells() {
         let [x_m, y_m] = geometry.centre_m(geometry.cell(index));
-        if (x_m - centre_m[0]).hypot(y_m - centre_m[1]) <= STUCK_RADIUS * length_m {
+        let (dx_m, dy_m) = (x_m - centre_m[0], y_m - centre_m[1]);
+        if dx_m * dx_m + dy_m * dy_m <= radius_m * radius_m {
             for bin in &bins {
                 let risk = &mut risks[index * n_yaws + bin];
                 *risk = risk.blocked();

@@ -44,6 +44,6 @@ impl Lengths {
 
     /// Longest straight line under the belly [m].
     pub fn belly_diagonal_m(&self) -> f64 {
-        (self.belly.front_m + self.belly.rear_m).hypot(2.0 * self.belly.half_width_m)
+        libm::hypot(self.belly.front_m + self.belly.rear_m, 2.0 * self.belly.half_width_m)
     }
 }

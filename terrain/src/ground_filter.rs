@@ -81,7 +81,7 @@ impl GroundFilter {
     /// How much an opening may lower the ground, given by how much the radius has grown: at the edge of what is
     /// known, a slope along the window's diagonal loses its rise over half of that diagonal.
     fn threshold_m(&self, growth_cells: usize, cell_m: f64) -> f64 {
-        let rise_m = self.slope_max_rad.tan() * std::f64::consts::SQRT_2 * growth_cells as f64 * cell_m;
+        let rise_m = libm::tan(self.slope_max_rad) * std::f64::consts::SQRT_2 * growth_cells as f64 * cell_m;
         (rise_m + self.height_tolerance_m).min(self.step_max_m)
     }
 }
@@ -166,7 +166,7 @@ fn square(values: &[f32], geometry: &GridGeometry, radius: usize, extreme: fn(f3
 fn disc(radius: f64) -> Vec<[i64; 2]> {
     let reach = radius.floor() as i64;
     let offsets = (-reach..=reach).flat_map(|row| (-reach..=reach).map(move |col| [col, row]));
-    offsets.filter(|[col, row]| (*col as f64).hypot(*row as f64) <= radius).collect()
+    offsets.filter(|[col, row]| libm::hypot(*col as f64, *row as f64) <= radius).collect()
 }
 
 /// Height and gradient of the plane through the ground around a cell.

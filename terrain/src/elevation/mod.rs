@@ -168,7 +168,7 @@ impl ElevationMap {
         let normal = motion.rotation * Vector3::z();
         assumed.check(normal.z)?;
         self.follow(pose);
-        let (sin, cos) = pose.yaw_rad.sin_cos();
+        let (sin, cos) = libm::sincos(pose.yaw_rad);
         let contact = motion * Point3::new(0.0, 0.0, -assumed.axle_height_m);
         let geometry = *self.states.geometry();
         for (index, state) in self.states.values_mut().iter_mut().enumerate() {
@@ -259,7 +259,7 @@ fn moved_states(
     after: &Pose,
 ) -> GridMap<CellState> {
     let correction = after.isometry() * before.isometry().inverse();
-    let (sin, cos) = (before.yaw_rad - after.yaw_rad).sin_cos();
+    let (sin, cos) = libm::sincos(before.yaw_rad - after.yaw_rad);
     let mut new = GridMap::filled(geometry, CellState::NEW);
     for (index, state) in new.values_mut().iter_mut().enumerate() {
         let [x_m, y_m] = geometry.centre_m(geometry.cell(index));
