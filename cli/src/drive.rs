@@ -145,7 +145,7 @@ fn follow(
         {
             closed.episode.interrupt();
         }
-        if arguments.pace == Pace::Real {
+        if arguments.pace == Some(Pace::Real) {
             let due = began + Duration::from_secs_f64(closed.episode.time_s());
             std::thread::sleep(due.saturating_duration_since(Instant::now()));
         }

@@ -52,6 +52,28 @@ fn files_that_are_not_there_are_named() {
     }
 }
 
+/// Who carries out commands does not plan: what says how to plan would be ignored.
+#[test]
+fn words_of_planning_are_refused_with_commands() {
+    for words in [
+        &["--goal", "9,5"][..],
+        &["--method", "physics"],
+        &["--weights", "nets"],
+        &["--model", "model.toml"],
+        &["--alpha", "0.2"],
+        &["--config", "config.toml"],
+        &["--oracle-map"],
+        &["--threads", "2"],
+        &["--isa", "portable"],
+    ] {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_surefoot"));
+        let output = command.args(["drive", "--commands", "/nowhere.csv"]).args(words).output().unwrap();
+        let told = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(2), "{words:?}: {told}");
+        assert!(told.contains("--commands") && told.contains(words[0]), "{words:?}: {told}");
+    }
+}
+
 #[test]
 fn vehicle_that_cannot_be_is_named_by_line_and_field() {
     let text = formats::shipped_vehicle_text("rc_car").unwrap();

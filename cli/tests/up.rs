@@ -47,6 +47,39 @@ fn what_up_cannot_do_is_refused_before_anything_starts() {
 }
 
 #[test]
+fn what_up_would_ignore_is_refused() {
+    assert_refused(&["up", "--bush-height", "0.3"], &["--bush-height", "--world arena"]);
+    assert_refused(&["up", "--role", "control", "--bush-height", "0.3"], &["--bush-height", "--world arena"]);
+    assert_refused(&["up", "--pace", "fast"], &["--pace fast", "surefoot drive"]);
+    assert_refused(&["up", "--realtime", "--threads", "2"], &["--threads", "expected 1", "found 2"]);
+    let only = |words: &[&str], roles: &str| {
+        let words: Vec<&str> = ["up"].iter().chain(words).copied().collect();
+        assert_refused(&words, &[words[3], &format!("--role all or {roles}"), words[2]]);
+    };
+    only(&["--role", "control", "--live"], "live");
+    only(&["--role", "mapping", "--learn"], "learning");
+    only(&["--role", "plant", "--validation", "v.safetensors"], "learning");
+    only(&["--role", "recorder", "--json", "s.json"], "plant");
+    only(&["--role", "live", "--realtime"], "plant, mapping, learning, control, recorder");
+}
+
+#[test]
+fn times_that_contradict_each_other_are_refused_with_the_numbers() {
+    assert_refused(
+        &["up", "--rate", "2", "--command-age", "0.3"],
+        &["--command-age", "more than 0.520 s", "decisions every 0.5 s", "found 0.3 s"],
+    );
+    assert_refused(&["up", "--odometry-rate", "50", "--scan-rate", "4"], &["every 0.02 s", "every 0.25 s"]);
+    let folder = tempfile::tempdir().unwrap();
+    let config = folder.path().join("guard.toml");
+    std::fs::write(&config, "[guard]\nscan_age_max_s = 1.0\n").unwrap();
+    assert_refused(
+        &["up", "--scan-rate", "2", "--config", config.to_str().unwrap()],
+        &["guard.scan_age_max_s", "more than 1.500 s", "scans every 0.5 s", "found 1 s"],
+    );
+}
+
+#[test]
 fn files_that_are_none_are_refused_with_what_was_expected() {
     let folder = tempfile::tempdir().unwrap();
     let file = |name: &str, bytes: &[u8]| {
@@ -71,7 +104,9 @@ fn drive_arena(out: &Path) -> Output {
     let words =
         ["up", "--world", "arena", "--method", "physics", "--threads", "1", "--deviation", "mass=1.1"];
     let run = run_name("arena");
-    surefoot(&words).args(["--run", &run, "--out"]).arg(out).output().unwrap()
+    let mut drive = surefoot(&words);
+    drive.args(["--pace", "real", "--run", &run, "--json"]).arg(out.join("asked.json"));
+    drive.arg("--out").arg(out).output().unwrap()
 }
 
 fn json(path: &Path) -> Value {
@@ -101,6 +136,10 @@ fn a_drive_of_processes_is_recorded_and_made_again_and_what_is_cut_off_is_named(
     assert_eq!(run["control"]["period_ms"], 100.0);
     assert_eq!(run["processes"].as_array().unwrap().len(), 5);
     assert!(run["processes"][0]["resident_max_mb"].as_f64().unwrap() > 1.0, "{run}");
+
+    let summary = json(&folder.path().join("summary.json"));
+    assert_eq!(summary, json(&folder.path().join("asked.json")), "where it was asked for, too");
+    assert_eq!(summary["localisation_jumps"], 0, "{summary}");
 
     let recording = folder.path().join("drive-000.mcap");
     let (code, whole, _) = look("inspect", &recording);

@@ -145,9 +145,10 @@ impl Learning {
         let (took_s, n_malformed) = (self.took_s, self.n_malformed);
         let counts = [self.surfaces.counts(), self.missions.counts(), self.stuck.counts()];
         Ok(self.meter.report(now_ns, || {
-            let health = Health { age_s: [surface_s, -1.0, -1.0], figure: took_s, ..Health::default() };
+            let health = Health { age_s: [surface_s, -1.0, -1.0, -1.0], figure: took_s, ..Health::default() };
             let health = counts.into_iter().fold(health, Health::with);
-            Health { messages: [health.messages[0], health.messages[1] + n_malformed], ..health }
+            let [lost, refused, failed] = health.messages;
+            Health { messages: [lost, refused + n_malformed, failed], ..health }
         })?)
     }
 }

@@ -8,10 +8,11 @@ use terrain::Scan;
 use traversability::CvarLevel;
 
 use crate::RuntimeError;
+use crate::ages::AgeLimits;
 use crate::channel::{
     Bus, COMMAND, Inlet, MISSION, ODOMETRY, Outlet, RISK, RISK_PHYSICS, SCAN, STUCK, SURFACE,
 };
-use crate::clock::{self, SECOND_NS};
+use crate::clock;
 use crate::message::{
     CommandRecord, Grid, MissionRecord, OdometryRecord, PointRecord, RiskHeader, ScanHeader, Source, Stamp,
     StuckRecord, SurfaceHeader,
@@ -35,8 +36,6 @@ const POLL_NS: u64 = 2_000_000;
 const ODOMETRY_KEPT: usize = 64;
 /// Farthest that a scan may lie from the odometry that it is placed by [ns].
 const SCAN_APART_NS: u64 = 15_000_000;
-/// Silence of learning after which physics speaks [ns].
-const LEARNING_SILENCE_NS: u64 = SECOND_NS * 4 / 10;
 
 /// What maps.
 pub struct MappingSetup<'a> {
@@ -48,6 +47,8 @@ pub struct MappingSetup<'a> {
     pub level: CvarLevel,
     /// What is believed of the vehicle: limits that plans keep to, and how its sensors misstate its motion.
     pub model: &'a Model,
+    /// How long learning may be silent.
+    pub ages: AgeLimits,
 }
 
 /// Maps until `is_over` says to end.
@@ -81,6 +82,7 @@ struct Fallback {
     missions: Inlet<Stamp, MissionRecord>,
     stuck: Inlet<Stamp, StuckRecord>,
     outlet: Outlet<RiskHeader, [f32; 4]>,
+    silence_max_ns: u64,
     began_ns: u64,
 }
 
@@ -199,7 +201,7 @@ impl Mapping {
         let now_ns = clock::now_ns();
         let age_s =
             |stamp: &Option<Stamp>| stamp.map_or(-1.0, |stamp| clock::age_s(now_ns, stamp.valid_at_ns));
-        let age_s = [age_s(&self.last_odometry), age_s(&self.last_scan), -1.0];
+        let age_s = [age_s(&self.last_odometry), age_s(&self.last_scan), -1.0, -1.0];
         let (n_missed, figure) = (self.n_misplaced, self.surveyor.n_jumps() as f64);
         let counts = [self.odometry.counts(), self.scans.counts(), self.commands.counts()];
         let health = Health { age_s, n_missed, figure, ..Health::default() };
@@ -215,7 +217,7 @@ enum Event {
 
 impl Fallback {
     fn new(bus: &Bus, setup: &MappingSetup<'_>) -> Result<Self, RuntimeError> {
-        let MappingSetup { vehicle, config, level, model } = setup;
+        let MappingSetup { vehicle, config, level, model, ages } = setup;
         let assessor = Assessor::new(vehicle, &model.limits, config, &Belief::Physics, *level)?;
         Ok(Self {
             maker: RiskMaker::new(assessor, PHYSICS, 0),
@@ -223,6 +225,7 @@ impl Fallback {
             missions: bus.inlet(&MISSION)?,
             stuck: bus.inlet(&STUCK)?,
             outlet: bus.outlet(&RISK_PHYSICS, risk_elements(config))?,
+            silence_max_ns: ages.learning_silence_ns,
             began_ns: clock::now_ns(),
         })
     }
@@ -236,7 +239,7 @@ impl Fallback {
 
     fn is_needed(&self) -> bool {
         let heard_at_ns = self.learned.heard_at_ns().unwrap_or(self.began_ns);
-        self.maker.has_goal() && clock::now_ns().saturating_sub(heard_at_ns) > LEARNING_SILENCE_NS
+        self.maker.has_goal() && clock::now_ns().saturating_sub(heard_at_ns) > self.silence_max_ns
     }
 
     fn speak(&mut self, header: &SurfaceHeader, cells: &[[f32; 8]]) -> Result<(), RuntimeError> {

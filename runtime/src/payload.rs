@@ -6,7 +6,7 @@ use terrain::{GridGeometry, GridMap, Knowledge, SurfaceCell, TerrainClass};
 use traversability::{Ground, Risk, RiskMapView};
 use xxhash_rust::xxh3::xxh3_64;
 
-use crate::channel::Refusal;
+use crate::channel::{FUTURE_NS, Refusal};
 use crate::message::{
     CheckpointHeader, CommandRecord, MissionRecord, OdometryRecord, PointRecord, RiskHeader, ScanHeader,
     Stamp, StuckRecord, SurfaceHeader,
@@ -198,8 +198,12 @@ pub(crate) fn check_risk(header: &RiskHeader, payload: &[[f32; 4]]) -> Result<()
     require(map.ground.iter().all(known), Refusal::Malformed)
 }
 
-pub(crate) fn check_command(_: &Stamp, payload: &[CommandRecord]) -> Result<(), Refusal> {
+/// A command decided on what was measured after it was sent would never grow old.
+pub(crate) fn check_command(stamp: &Stamp, payload: &[CommandRecord]) -> Result<(), Refusal> {
     let command = check_one(payload)?;
+    let latest_ns = stamp.published_at_ns.saturating_add(FUTURE_NS);
+    let is_past = command.odometry_at_ns <= latest_ns && command.scan_at_ns <= latest_ns;
+    require(is_past, Refusal::FromFuture)?;
     require(command.speed_mps.is_finite() && command.steering_rad.is_finite(), Refusal::NonFinite)?;
     require(command.decision().is_some(), Refusal::Malformed)
 }
@@ -308,6 +312,8 @@ mod tests {
         let wild = CommandRecord { steering_rad: f32::NAN, ..drive };
         assert_eq!(check_command(&stamp, &[wild]), Err(Refusal::NonFinite));
         assert_eq!(check_command(&stamp, &[CommandRecord::default()]), Err(Refusal::Malformed));
+        let unborn = CommandRecord { scan_at_ns: FUTURE_NS + 1, ..drive };
+        assert_eq!(check_command(&stamp, &[unborn]), Err(Refusal::FromFuture));
         let lost = StuckRecord { yaw_rad: f64::INFINITY, ..StuckRecord::default() };
         assert_eq!(check_stuck(&stamp, &[lost]), Err(Refusal::NonFinite));
         let nowhere = MissionRecord { goal_m: [0.0, f64::NAN], ..MissionRecord::default() };

@@ -7,11 +7,12 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use evidential::Checkpoint;
-use navigator::{Belief, Chart, Destination, NavigatorError, Pilot};
+use navigator::{Belief, Chart, NavigatorError, Pilot};
 use traversability::CvarLevel;
 
 use crate::frame::Frame;
 use crate::message::{CommandRecord, DecisionRecord, Source};
+use crate::mission::{Mission, NOWHERE, with_reason};
 use crate::payload::risk_views;
 use crate::setup::{MachineSetup, SetupError};
 use maps::{Maps, Unmade};
@@ -132,6 +133,7 @@ pub fn replay(records: &Records, knowledge: &Knowledge) -> Result<ReplayReport, 
                 epoch_ns: key.epoch_ns,
                 pilot: Pilot::new(machine.model.clone(), &machine.config, seed)?,
                 frame: Frame::default(),
+                mission_age_max_ns: setup.ages.mission_ns,
                 is_lost: false,
             });
         }
@@ -148,6 +150,7 @@ struct Life {
     epoch_ns: u64,
     pilot: Pilot,
     frame: Frame,
+    mission_age_max_ns: u64,
     /// Something that a decision was made from is missing: what its memory holds from then on is not known.
     is_lost: bool,
 }
@@ -178,6 +181,13 @@ impl Life {
                 }
             },
         };
+        let mission = match records.mission(record.mission) {
+            Ok(mission) => mission,
+            Err(missing) => {
+                self.lose(missing, report);
+                Mission::default()
+            }
+        };
         if self.is_lost {
             report.n_unmade += 1;
             return Ok(());
@@ -187,12 +197,16 @@ impl Life {
             let (map, time_to_goal) = risk_views(&made.header, &made.payload)?;
             Some(self.frame.place(Chart { map, time_to_goal }, made.header.odometry_at_ns))
         });
-        let destination = Destination { goal_m: record.goal_m, tolerance_m: record.tolerance_m };
+        let scan_at_ns = made.map_or(0, |made| made.header.stamp.valid_at_ns);
+        let said = mission.destination(record.decided_at_ns, self.mission_age_max_ns);
+        let chart = chart.filter(|_| said.is_ok());
         self.pilot.use_rollouts(record.n_rollouts as usize);
-        let decision = self.pilot.decide(record.decided_at_ns, chart, &destination);
+        let decided = self.pilot.decide(record.decided_at_ns, chart, &said.unwrap_or(NOWHERE));
+        let decision = with_reason(decided, said);
         // Learning was told by a message of its own, which was recorded.
         self.pilot.take_stuck();
-        let made = CommandRecord::from(&decision);
+        let odometry_at_ns = self.pilot.odometry().map_or(0, |odometry| odometry.valid_at_ns);
+        let made = CommandRecord::from(&decision).decided_on(odometry_at_ns, scan_at_ns);
         if bytemuck::bytes_of(&made) == bytemuck::bytes_of(&record.command) {
             report.n_identical += 1;
         } else {

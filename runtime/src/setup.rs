@@ -4,6 +4,8 @@ use bicycle::{Model, Vehicle};
 use navigator::Config;
 use serde::{Deserialize, Serialize};
 
+use crate::ages::AgeLimits;
+
 /// What was run. Settings are TOML, which knows infinity.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -24,6 +26,8 @@ pub struct RecordedSetup {
     pub alpha: f64,
     /// Decided the samples; as text, because not every reader of JSON knows numbers so large.
     pub seed: String,
+    /// How old what was driven on might be.
+    pub ages: AgeLimits,
     /// Revision of the program.
     pub revision: String,
 }
@@ -78,6 +82,7 @@ impl MachineSetup {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::ages::Periods;
 
     #[test]
     fn settings_survive_the_recording_to_the_last_bit() {
@@ -86,6 +91,7 @@ mod tests {
         let mut config = Config::for_vehicle(&vehicle);
         config.controller.recovery.patience_s = f64::INFINITY;
         config.prior.obstacle_margin_m = 0.1 + 0.2;
+        let machine_guard = config.guard;
         let machine = MachineSetup { vehicle, model, config };
         let [vehicle_toml, model_toml, config_toml] = machine.texts().unwrap();
         let setup = RecordedSetup {
@@ -97,6 +103,7 @@ mod tests {
             checkpoint_sha256: String::new(),
             alpha: 0.6,
             seed: u64::MAX.to_string(),
+            ages: AgeLimits::new(&Periods::default(), &machine_guard, None).unwrap(),
             revision: String::new(),
         };
         assert_eq!(MachineSetup::read(&setup), Ok(machine));

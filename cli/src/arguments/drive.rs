@@ -9,6 +9,10 @@ use super::AskedDeviation;
 use super::values::{self, Goal, StartPose, WorldSource};
 use crate::UsageError;
 
+/// What says how to plan: it means nothing where nobody does.
+const PLANNING: [&str; 9] =
+    ["goal", "method", "weights", "model", "alpha", "config", "oracle_map", "threads", "isa"];
+
 /// What to drive, where, and what to believe.
 #[derive(Args, Clone, Debug)]
 #[command(after_long_help = AFTER_HELP)]
@@ -84,9 +88,9 @@ pub struct DriveArguments {
           allow_hyphen_values = true, help_heading = "Run")]
     pub time_limit: f64,
 
-    /// As fast as the machine allows, or wall-clock time
-    #[arg(long, value_enum, default_value_t = Pace::Fast, help_heading = "Run")]
-    pub pace: Pace,
+    /// As fast as the machine allows, or wall-clock time [default: fast; real where processes drive]
+    #[arg(long, value_enum, help_heading = "Run")]
+    pub pace: Option<Pace>,
 
     /// Threads of the controller, 1 to 256 [default: the machine's]; the result does not depend on it
     #[arg(long, value_name = "N", value_parser = values::thread_count, allow_hyphen_values = true,
@@ -103,7 +107,7 @@ pub struct DriveArguments {
 
     /// Carry out the commands of this drive log (.csv or .mcap: t, cmd_speed, cmd_steer) instead of planning; nothing but
     /// the world's edge, a fall or a standstill ends the drive before they do
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["goal", "method", "weights"], help_heading = "Run")]
+    #[arg(long, value_name = "FILE", conflicts_with_all = PLANNING, help_heading = "Run")]
     pub commands: Option<PathBuf>,
 
     /// Write the summary to this file too

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use bicycle::{Model, Vehicle};
 use formats::{ConfigText, ElevationFile, overlay, read_elevation, read_model, read_vehicle};
-use navigator::Config;
+use navigator::{Config, GuardConfig};
 use scenarios::{
     ArenaConfig, ArenaError, Bounds, LayerConfig, Pair, PairWish, ROCK_FIELD_DISTANCE_M, RockFieldConfig,
     Task, WorldLayers, check_pair, feasible_pair, world_from_layers,
@@ -44,7 +44,7 @@ pub(crate) struct Machine {
 
 /// Reads and builds everything; whatever cannot be is refused here, before anything drives.
 pub(super) fn prepare(arguments: &DriveArguments) -> Result<Scene, UsageError> {
-    let Machine { vehicle, model, config, knowledge } = machine(arguments)?;
+    let Machine { vehicle, model, config, knowledge } = machine(arguments, GuardConfig::default())?;
     let mut task = task(arguments, &vehicle)?;
     let read = |path: &PathBuf| Script::read(path, &vehicle.limits);
     let script = arguments.commands.as_ref().map(read).transpose()?;
@@ -55,14 +55,14 @@ pub(super) fn prepare(arguments: &DriveArguments) -> Result<Scene, UsageError> {
     Ok(Scene { vehicle, model, config, task, knowledge, script })
 }
 
-/// The machine alone.
-pub(crate) fn machine(arguments: &DriveArguments) -> Result<Machine, UsageError> {
+/// The machine alone, with a guard that its configuration may change.
+pub(crate) fn machine(arguments: &DriveArguments, guard: GuardConfig) -> Result<Machine, UsageError> {
     let vehicle = read_vehicle(arguments.vehicle_name_or_path()).map_err(UsageError::from_input)?;
     let model = match &arguments.model {
         Some(path) => read_model(path).map_err(UsageError::from_input)?,
         None => Model::of(&vehicle),
     };
-    let mut config = Config::for_vehicle(&vehicle);
+    let mut config = Config { guard, ..Config::for_vehicle(&vehicle) };
     if let Some(path) = &arguments.config {
         let text = ConfigText::read(path).map_err(UsageError::from_input)?;
         config = overlay(&text, &config).map_err(UsageError::from_input)?;

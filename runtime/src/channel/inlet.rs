@@ -1,6 +1,7 @@
-//! The way out of a channel: one publisher counts, and only what is whole.
+//! The way out of a channel: only what is whole counts, of the publisher that has the channel.
 
 use iceoryx2::identifiers::UniquePublisherId;
+use iceoryx2::port::ReceiveError;
 use iceoryx2::port::subscriber::Subscriber;
 use iceoryx2::prelude::ipc;
 use iceoryx2::sample::Sample;
@@ -13,7 +14,7 @@ use crate::message::{LAYOUT_VERSION, Stamp};
 pub type Message<H, T> = Sample<ipc::Service, [T], H>;
 
 /// How far ahead of the reader's clock a message may claim to be [ns].
-const FUTURE_NS: u64 = 20_000_000;
+pub(crate) const FUTURE_NS: u64 = 20_000_000;
 
 /// Why a message does not count.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -28,7 +29,7 @@ pub enum Refusal {
     FromFuture,
     /// It is older than one that was taken from the same publisher, or the same.
     OutOfOrder,
-    /// Another publisher has the channel.
+    /// Another publisher has had the channel since.
     OtherPublisher,
 }
 
@@ -53,6 +54,8 @@ pub struct Counts {
     pub lost: u64,
     /// Refused, by [`Refusal::ALL`].
     pub refused: [u64; Refusal::ALL.len()],
+    /// Looks that the transport broke off: a publisher that is there and whose memory could not be reached.
+    pub failed: u64,
 }
 
 impl Counts {
@@ -67,24 +70,23 @@ impl Counts {
     }
 }
 
-/// The publisher that has the channel.
+/// The publisher that was heard last, and its last message that counted.
 #[derive(Clone, Copy, Debug)]
-struct Leader {
+struct Heard {
     origin: UniquePublisherId,
     stamp: Stamp,
-    heard_at_ns: u64,
+    at_ns: u64,
 }
 
 /// The way out of a channel.
 ///
-/// The first publisher of a message that counts has the channel until it has been silent for as long as the channel
-/// says; what others send meanwhile is refused. So two controllers never take turns at the wheel, and a restarted one
-/// is heard as soon as its predecessor is known to be silent.
+/// A channel has one publisher at a time, and each begins later than the one before. A reader follows the latest that it
+/// has heard of, so that all readers follow the same one whenever they look: two controllers never take turns at the
+/// wheel, and a restarted one is heard at once.
 pub struct Inlet<H: Header, T: Element> {
     subscriber: Subscriber<ipc::Service, [T], H>,
     check: fn(&H, &[T]) -> Result<(), Refusal>,
-    silence_ns: u64,
-    leader: Option<Leader>,
+    heard: Option<Heard>,
     counts: Counts,
     /// Messages of the present poll; their memory is kept for the next one.
     batch: Vec<Message<H, T>>,
@@ -95,10 +97,10 @@ impl<H: Header, T: Element> Inlet<H, T> {
         Self {
             subscriber,
             check: channel.check,
-            silence_ns: channel.silence_ns,
-            leader: None,
+            heard: None,
             counts: Counts::default(),
-            batch: Vec::with_capacity(super::PUBLISHERS_MAX * (channel.depth + 1)),
+            // Of the present publisher, and what one that died has left.
+            batch: Vec::with_capacity(2 * (channel.depth + 1)),
         }
     }
 
@@ -109,7 +111,7 @@ impl<H: Header, T: Element> Inlet<H, T> {
 
     /// When the last message that counted came in [ns]; `None` before the first.
     pub fn heard_at_ns(&self) -> Option<u64> {
-        self.leader.map(|leader| leader.heard_at_ns)
+        self.heard.map(|heard| heard.at_ns)
     }
 
     /// Takes every waiting message that counts, the oldest first. What arrives meanwhile waits for the next call, so
@@ -139,11 +141,17 @@ impl<H: Header, T: Element> Inlet<H, T> {
         newest
     }
 
-    /// A publisher is passed over once as many of its messages are held as a reader may hold, so this ends whatever
-    /// they do.
+    /// Ends once as many messages are held as a reader may hold, whatever their publisher does meanwhile.
     fn collect(&mut self) {
-        while let Ok(Some(message)) = self.subscriber.receive() {
-            self.batch.push(message);
+        loop {
+            match self.subscriber.receive() {
+                Ok(Some(message)) => self.batch.push(message),
+                Ok(None) | Err(ReceiveError::ExceedsMaxBorrows) => return,
+                Err(ReceiveError::ConnectionFailure(_)) => {
+                    self.counts.failed += 1;
+                    return;
+                }
+            }
         }
     }
 
@@ -159,22 +167,21 @@ impl<H: Header, T: Element> Inlet<H, T> {
     fn judge(&mut self, message: &Message<H, T>, now_ns: u64) -> Result<(), Refusal> {
         let (stamp, origin) = (*message.user_header().stamp(), message.origin());
         check_stamp(&stamp, now_ns)?;
-        let leader =
-            self.leader.filter(|leader| now_ns.saturating_sub(leader.heard_at_ns) <= self.silence_ns);
-        if let Some(leader) = &leader {
-            if leader.origin != origin {
+        if let Some(Heard { origin: last_origin, stamp: last, .. }) = self.heard {
+            if last_origin != origin && stamp.epoch_ns <= last.epoch_ns {
                 return Err(Refusal::OtherPublisher);
             }
-            if stamp.sequence <= leader.stamp.sequence || stamp.valid_at_ns < leader.stamp.valid_at_ns {
+            let follows = stamp.sequence > last.sequence && stamp.valid_at_ns >= last.valid_at_ns;
+            if last_origin == origin && !follows {
                 return Err(Refusal::OutOfOrder);
             }
         }
         (self.check)(message.user_header(), message.payload())?;
-        // Silence is no loss: only a publisher that goes on is asked for what lies between.
-        if let Some(last) = self.leader.filter(|last| last.origin == origin) {
+        // What another publisher sent before it was heard of is no loss: only one that goes on is asked for it.
+        if let Some(last) = self.heard.filter(|last| last.origin == origin) {
             self.counts.lost += stamp.sequence.saturating_sub(last.stamp.sequence + 1);
         }
-        self.leader = Some(Leader { origin, stamp, heard_at_ns: now_ns });
+        self.heard = Some(Heard { origin, stamp, at_ns: now_ns });
         Ok(())
     }
 }
@@ -184,7 +191,7 @@ fn check_stamp(stamp: &Stamp, now_ns: u64) -> Result<(), Refusal> {
         return Err(Refusal::LayoutVersion);
     }
     let latest_ns = now_ns.saturating_add(FUTURE_NS);
-    if stamp.published_at_ns > latest_ns || stamp.valid_at_ns > latest_ns {
+    if [stamp.epoch_ns, stamp.published_at_ns, stamp.valid_at_ns].iter().any(|at_ns| *at_ns > latest_ns) {
         return Err(Refusal::FromFuture);
     }
     Ok(())
@@ -209,6 +216,12 @@ mod tests {
         assert_eq!(check_stamp(&late(now_ns + FUTURE_NS + 1), now_ns), Err(Refusal::FromFuture));
         let ahead = Stamp { valid_at_ns: u64::MAX, ..stamp };
         assert_eq!(check_stamp(&ahead, now_ns), Err(Refusal::FromFuture));
+        let unborn = Stamp { epoch_ns: u64::MAX, ..stamp };
+        assert_eq!(
+            check_stamp(&unborn, now_ns),
+            Err(Refusal::FromFuture),
+            "it would keep out all that follow"
+        );
         let other = Stamp { layout_version: LAYOUT_VERSION + 1, ..stamp };
         assert_eq!(check_stamp(&other, now_ns), Err(Refusal::LayoutVersion));
     }

@@ -6,7 +6,7 @@ use terrain::{GridGeometry, RangePoint, Scan, TerrainClass};
 use super::{CommandRecord, Grid, OdometryRecord, PointRecord, ScanHeader, Source, Stamp};
 
 /// Reasons to stop; the first has the number 1.
-pub const STOP_REASONS: [StopReason; 7] = [
+pub const STOP_REASONS: [StopReason; 8] = [
     StopReason::StaleOdometry,
     StopReason::StaleScan,
     StopReason::NonFiniteInput,
@@ -14,9 +14,10 @@ pub const STOP_REASONS: [StopReason; 7] = [
     StopReason::NonFiniteResult,
     StopReason::OutsideMap,
     StopReason::StaleCommand,
+    StopReason::StaleMission,
 ];
 /// Reasons to hold; the first has the number 1.
-pub const HOLD_REASONS: [HoldReason; 2] = [HoldReason::NoMap, HoldReason::AtGoal];
+pub const HOLD_REASONS: [HoldReason; 3] = [HoldReason::NoMap, HoldReason::AtGoal, HoldReason::NoMission];
 
 /// Numbers of [`CommandRecord::decision`].
 const DRIVE: u32 = 1;
@@ -141,15 +142,17 @@ impl ScanHeader {
 impl From<&Decision> for CommandRecord {
     fn from(decision: &Decision) -> Self {
         let standing = |decision, reason: Option<usize>| Self {
-            speed_mps: 0.0,
-            steering_rad: 0.0,
             decision,
             reason: reason.map_or(0, |place| place as u32 + 1),
+            ..Self::default()
         };
         match decision {
-            Decision::Drive(Command { speed_mps, steering_rad }) => {
-                Self { speed_mps: *speed_mps, steering_rad: *steering_rad, decision: DRIVE, reason: 0 }
-            }
+            Decision::Drive(Command { speed_mps, steering_rad }) => Self {
+                speed_mps: *speed_mps,
+                steering_rad: *steering_rad,
+                decision: DRIVE,
+                ..Self::default()
+            },
             Decision::Hold(reason) => standing(HOLD, HOLD_REASONS.iter().position(|known| known == reason)),
             Decision::Stop(reason) => standing(STOP, STOP_REASONS.iter().position(|known| known == reason)),
         }
@@ -157,6 +160,11 @@ impl From<&Decision> for CommandRecord {
 }
 
 impl CommandRecord {
+    /// With the times of what was decided on; see the fields.
+    pub fn decided_on(self, odometry_at_ns: u64, scan_at_ns: u64) -> Self {
+        Self { odometry_at_ns, scan_at_ns, ..self }
+    }
+
     /// The decision; `None` for a number that is none.
     pub fn decision(&self) -> Option<Decision> {
         let place = (self.reason as usize).wrapping_sub(1);
@@ -191,7 +199,7 @@ mod tests {
 
     #[test]
     fn numbers_that_are_no_decision_are_none() {
-        for (decision, reason) in [(0, 0), (4, 1), (2, 0), (2, 3), (3, 0), (3, 8), (u32::MAX, u32::MAX)] {
+        for (decision, reason) in [(0, 0), (4, 1), (2, 0), (2, 4), (3, 0), (3, 9), (u32::MAX, u32::MAX)] {
             let record = CommandRecord { decision, reason, ..CommandRecord::default() };
             assert_eq!(record.decision(), None, "{decision} {reason}");
         }

@@ -14,9 +14,10 @@ use mcap::sans_io::LinearReaderOptions;
 
 use crate::channel::Header;
 use crate::message::{
-    CheckpointHeader, DecisionRecord, OdometryRecord, PointRecord, RiskHeader, ScanHeader, Source, Stamp,
-    StuckRecord, SurfaceHeader,
+    CheckpointHeader, DecisionRecord, MissionRecord, OdometryRecord, PointRecord, RiskHeader, ScanHeader,
+    Source, Stamp, StuckRecord, SurfaceHeader,
 };
+use crate::mission::Mission;
 use crate::online::hash_of;
 use crate::recorder::topic;
 use crate::setup::RecordedSetup;
@@ -54,6 +55,8 @@ pub struct Records {
     pub risks: [BTreeMap<Key, RiskHeader>; 2],
     /// Stuck poses.
     pub stuck: BTreeMap<Key, (Stamp, StuckRecord)>,
+    /// What was said of where to go.
+    pub missions: BTreeMap<Key, (Stamp, MissionRecord)>,
     /// Decisions.
     pub decisions: BTreeMap<Key, DecisionRecord>,
     /// Networks that were learned while driving, by [`RiskHeader::checkpoint`].
@@ -80,6 +83,17 @@ impl Records {
             records.read_file(path)?;
         }
         Ok(records)
+    }
+
+    /// What a decision knew of where to go; says which message is missing.
+    pub fn mission(&self, source: Source) -> Result<Mission, String> {
+        let mut mission = Mission::default();
+        if source != Source::default() {
+            let (stamp, record) =
+                self.missions.get(&source.into()).ok_or_else(|| format!("mission {}", source.sequence))?;
+            mission.note(stamp, record);
+        }
+        Ok(mission)
     }
 
     fn read_file(&mut self, path: &Path) -> Result<(), ReadError> {
@@ -112,6 +126,7 @@ impl Records {
             topic::SETUP => self.setup = serde_json::from_slice(bytes).ok(),
             topic::ODOMETRY => put(&mut self.odometry, one(bytes)?),
             topic::STUCK => put(&mut self.stuck, one(bytes)?),
+            topic::MISSION => put(&mut self.missions, one(bytes)?),
             topic::DECISION => {
                 let (stamp, decision): (Stamp, DecisionRecord) = one(bytes)?;
                 self.decisions.insert(stamp.source().into(), decision);

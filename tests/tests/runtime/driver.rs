@@ -13,7 +13,7 @@ use runtime::watchdog::Watchdog;
 use scenarios::Episode;
 use terrain::Scan;
 
-use crate::fixture::{episode_config, machine, task};
+use crate::fixture::{ages, episode_config, machine, task};
 
 /// What is wrong with what it sends.
 #[derive(Clone, Copy, Debug, Default)]
@@ -26,6 +26,20 @@ pub struct Misbehaviour {
     pub is_frozen: bool,
     /// The yaw rate is no number.
     pub is_not_a_number: bool,
+    /// What becomes of the mission.
+    pub mission: MissionFate,
+}
+
+/// What becomes of a mission.
+#[derive(Clone, Copy, Debug, Default)]
+pub enum MissionFate {
+    /// It is said again once a second.
+    #[default]
+    UnderWay,
+    /// Nobody says anything more.
+    Lost,
+    /// It is said to be over.
+    Over,
 }
 
 /// The driver, on a thread of its own; it ends with this.
@@ -88,7 +102,7 @@ impl Robot {
         Self {
             episode,
             began_ns: now_ns(),
-            watchdog: Watchdog::new(vehicle.limits, 300_000_000),
+            watchdog: Watchdog::new(vehicle.limits, ages()),
             told: Odometry::default(),
             commands: bus.inlet(&COMMAND).unwrap(),
             odometry: bus.outlet(&ODOMETRY, 1).unwrap(),
@@ -120,7 +134,7 @@ impl Robot {
             self.send_scan(scan, stamped_ns);
         }
         if self.episode.n_cycles().is_multiple_of(50) {
-            self.send_mission(now_ns);
+            self.send_mission(now_ns, behaviour.mission);
         }
         self.follow_commands();
     }
@@ -132,19 +146,20 @@ impl Robot {
         self.scans.send(loan, at_ns).unwrap();
     }
 
-    fn send_mission(&mut self, at_ns: u64) {
+    fn send_mission(&mut self, at_ns: u64, fate: MissionFate) {
+        let outcome = match fate {
+            MissionFate::UnderWay => 0,
+            MissionFate::Over => 7,
+            MissionFate::Lost => return,
+        };
         let goal_m = self.episode.task().goal_m;
-        let mission = MissionRecord { goal_m, tolerance_m: 1.0, ..MissionRecord::default() };
+        let mission = MissionRecord { goal_m, tolerance_m: 1.0, outcome, ..MissionRecord::default() };
         self.missions.send_one(Stamp::default(), mission, at_ns).unwrap();
     }
 
     fn follow_commands(&mut self) {
         let watchdog = &mut self.watchdog;
-        self.commands.poll(|stamp, commands| {
-            if let Some(decision) = commands[0].decision() {
-                watchdog.admit(decision, stamp.published_at_ns);
-            }
-        });
+        self.commands.poll(|stamp, commands| watchdog.admit(&commands[0], stamp.published_at_ns));
         self.episode.apply(&self.watchdog.decision(now_ns())).unwrap();
     }
 }

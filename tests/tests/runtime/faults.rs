@@ -1,8 +1,8 @@
 //! Processes that are killed, stopped and joined by others from outside, and what becomes of the drive.
 
 use bicycle::{Decision, StopReason};
-use runtime::channel::{Bus, COMMAND};
-use runtime::message::{CommandRecord, DecisionRecord, Stamp};
+use runtime::channel::{Bus, COMMAND, ChannelError};
+use runtime::message::DecisionRecord;
 use runtime::replay::{self, Knowledge};
 use runtime::status::Role;
 use rustix::process::Signal;
@@ -121,13 +121,12 @@ fn a_second_control_never_takes_the_wheel() {
     run.start_all(&PLANNERS);
     let mut witness = Witness::new(&run);
     witness.until_driving("all processes up");
-    // A second one that tells the vehicle to stop, ten times as often.
+    // A second one finds the channel taken, for as long as it tries.
     let other = Bus::join(&run.name).unwrap();
-    let mut commands = other.outlet(&COMMAND, 1).unwrap();
-    let stop = CommandRecord::from(&Decision::Stop(StopReason::OutsideMap));
+    let refused = other.outlet(&COMMAND, 1).err();
+    assert!(matches!(refused, Some(ChannelError::Taken { channel: "command" })), "{refused:?}");
     let from_m = witness.last.unwrap().position_m;
     witness.until("it drives on", |witness| {
-        commands.send_one(Stamp::default(), stop, runtime::clock::now_ns()).unwrap();
         let to_m = witness.last.unwrap().position_m;
         (to_m[0] - from_m[0]).hypot(to_m[1] - from_m[1]) > 1.0
     });

@@ -7,6 +7,7 @@ use std::time::{Duration, Instant};
 
 use bicycle::{Model, Vehicle};
 use navigator::{Belief, Config};
+use runtime::ages::{AgeLimits, Periods};
 use runtime::channel::{Bus, RunName};
 use runtime::control::{self, ControlSetup};
 use runtime::learning::{self, LearningSetup};
@@ -53,6 +54,11 @@ pub fn machine() -> (Vehicle, Config) {
     config.controller.n_steps = 30;
     config.controller.n_threads = 1;
     (vehicle, config)
+}
+
+/// Limits on ages as they are with the usual periods.
+pub fn ages() -> AgeLimits {
+    AgeLimits::new(&Periods::default(), &machine().1.guard, None).unwrap()
 }
 
 /// When a recorder under test begins a new file, and how large its disk is.
@@ -217,8 +223,8 @@ fn be(role: Role, run: &RunName, folder: &Path, is_over: &dyn Fn() -> bool) {
             plant::run(&bus, plant_setup(&vehicle), is_over).unwrap();
         }
         Role::Mapping => {
-            mapping::run(&bus, &MappingSetup { vehicle: &vehicle, config, level, model: &model }, is_over)
-                .unwrap();
+            let setup = MappingSetup { vehicle: &vehicle, config, level, model: &model, ages: ages() };
+            mapping::run(&bus, &setup, is_over).unwrap();
         }
         Role::Learning => {
             let belief = Belief::Physics;
@@ -226,7 +232,8 @@ fn be(role: Role, run: &RunName, folder: &Path, is_over: &dyn Fn() -> bool) {
             learning::run(&bus, &setup, is_over).unwrap();
         }
         Role::Control => {
-            control::run(&bus, ControlSetup { model, config, seed: SEED, period_s: 0.1 }, is_over).unwrap();
+            let setup = ControlSetup { model, config, seed: SEED, period_s: 0.1, ages: ages() };
+            control::run(&bus, setup, is_over).unwrap();
         }
         Role::Recorder => {
             let setup = RecorderSetup {
@@ -256,6 +263,7 @@ pub fn recorded_setup() -> RecordedSetup {
         checkpoint_sha256: String::new(),
         alpha: ALPHA,
         seed: SEED.to_string(),
+        ages: ages(),
         revision: String::new(),
     }
 }
@@ -275,5 +283,12 @@ pub fn episode_config(vehicle: &Vehicle) -> EpisodeConfig {
 }
 
 fn plant_setup(vehicle: &Vehicle) -> PlantSetup<'_> {
-    PlantSetup { task: task(), vehicle, episode: episode_config(vehicle), seed: SEED, command_age_max_s: 0.3 }
+    PlantSetup {
+        task: task(),
+        vehicle,
+        episode: episode_config(vehicle),
+        seed: SEED,
+        periods: Periods::default(),
+        ages: ages(),
+    }
 }

@@ -11,6 +11,7 @@ mod fixture;
 mod hostile;
 mod layouts;
 mod measurements;
+mod missions;
 mod onlookers;
 mod recordings;
 mod supervision;

@@ -129,7 +129,7 @@ fn a_localisation_that_jumps_moves_the_map_and_not_the_vehicle() {
         let lost = Some(Decision::Stop(StopReason::OutsideMap));
         assert!(witness.decided.iter().all(|record| command_of(record) != lost), "the map stayed behind");
         let on_old = |record: &&runtime::message::DecisionRecord| {
-            record.decided_at_ns > at_ns + 100_000_000 && record.scan_at_ns < at_ns
+            record.decided_at_ns > at_ns + 100_000_000 && record.command.scan_at_ns < at_ns
         };
         let drives = |record| matches!(command_of(record), Some(Decision::Drive(_)));
         witness.decided.iter().filter(on_old).any(drives)

@@ -63,7 +63,7 @@ impl Witness {
         }
         let (_, config) = machine();
         let age_s = |at_ns: u64| record.decided_at_ns.saturating_sub(at_ns) as f64 * 1e-9;
-        assert!(age_s(record.scan_at_ns) <= config.guard.scan_age_max_s, "an old map: {record:?}");
+        assert!(age_s(record.command.scan_at_ns) <= config.guard.scan_age_max_s, "an old map: {record:?}");
         let Source { epoch_ns, sequence } = record.odometry;
         if let Some(&at_ns) = self.odometry_at_ns.get(&(epoch_ns, sequence)) {
             assert!(age_s(at_ns) <= config.guard.odometry_age_max_s, "old odometry: {record:?}");
