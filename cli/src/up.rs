@@ -49,13 +49,15 @@ fn tell_panics_in_one_line(role: Role) {
     }));
 }
 
-/// Too little shared memory is no fault that a restart would cure.
+/// Too little shared memory, or a folder that others may write into, is no fault that a restart would cure.
 fn refused(error: anyhow::Error) -> anyhow::Error {
-    let is_memory = |cause: &(dyn std::error::Error + 'static)| {
-        matches!(cause.downcast_ref(), Some(ChannelError::Memory { .. }))
-            || matches!(cause.downcast_ref(), Some(RuntimeError::Channel(ChannelError::Memory { .. })))
+    let is_lasting =
+        |error: &ChannelError| matches!(error, ChannelError::Memory { .. } | ChannelError::Folder { .. });
+    let is_refusal = |cause: &(dyn std::error::Error + 'static)| match cause.downcast_ref() {
+        Some(RuntimeError::Channel(error)) => is_lasting(error),
+        _ => cause.downcast_ref().is_some_and(is_lasting),
     };
-    if error.chain().any(is_memory) { UsageError(failure::one_line(&error)).into() } else { error }
+    if error.chain().any(is_refusal) { UsageError(failure::one_line(&error)).into() } else { error }
 }
 
 fn supervise(arguments: &UpArguments) -> anyhow::Result<()> {

@@ -5,6 +5,8 @@ channel decides.
 """
 
 import ctypes
+import os
+import stat
 import time
 
 import iceoryx2 as iox2
@@ -38,14 +40,27 @@ def now_ns() -> int:
     return time.clock_gettime_ns(time.CLOCK_MONOTONIC)
 
 
+def user_folder() -> str:
+    """The folder by which the processes of this user find one another; refuses one that is not his alone."""
+    folder = f"/tmp/surefoot-{os.geteuid()}"
+    try:
+        os.mkdir(folder, 0o700)
+    except FileExistsError:
+        pass
+    about = os.lstat(folder)
+    if not stat.S_ISDIR(about.st_mode) or about.st_uid != os.geteuid() or stat.S_IMODE(about.st_mode) != 0o700:
+        raise PermissionError(f"{folder}: expected a folder of user {os.geteuid()} and nobody else (mode 700)")
+    return folder
+
+
 class Bus:
     """A process among the others of its run."""
 
     def __init__(self, run: str) -> None:
         iox2.set_log_level(iox2.LogLevel.Fatal)
         config = iox2.config.default()
-        config.global_cfg.prefix = iox2.FileName.new(f"surefoot_{run}_")
-        config.global_cfg.root_path = iox2.Path.new(f"/tmp/surefoot/{run}")
+        config.global_cfg.prefix = iox2.FileName.new(f"surefoot_{os.geteuid()}_{run}_")
+        config.global_cfg.root_path = iox2.Path.new(f"{user_folder()}/{run}")
         builder = iox2.NodeBuilder.new().config(config)
         self.node = builder.signal_handling_mode(iox2.SignalHandlingMode.Disabled).create(iox2.ServiceType.Ipc)
         self.epoch_ns = now_ns()

@@ -1,6 +1,7 @@
 //! Channels between the processes: publish and subscribe over shared memory, without a copy on the way.
 
 mod bus;
+mod failures;
 mod inlet;
 mod outlet;
 
@@ -167,6 +168,16 @@ pub enum ChannelError {
         run: String,
         /// What the system said.
         problem: String,
+    },
+    /// The folder by which a user's processes find one another is not his alone.
+    #[error("{folder}: expected a folder of user {user} and nobody else (mode 700), found {found}")]
+    Folder {
+        /// Its path.
+        folder: String,
+        /// Number of the user.
+        user: u32,
+        /// What is there.
+        found: String,
     },
     /// A channel could not be opened, e.g. because another program made one of other types under its name.
     #[error("channel {channel}: expected to open it, found: {problem}")]

@@ -86,7 +86,7 @@ impl MapInput {
 
     fn age_s(&self, now_ns: u64) -> f64 {
         let age_s =
-            |map: &Message<RiskHeader, [f32; 4]>| clock::age_s(now_ns, map.user_header().stamp.valid_at_ns);
+            |map: &Message<RiskHeader, [f32; 4]>| clock::age_s(now_ns, map.header().stamp.valid_at_ns);
         self.held.as_ref().map_or(f64::INFINITY, age_s)
     }
 }
@@ -155,7 +155,7 @@ impl Control {
 
     fn cycle(&mut self, began_ns: u64, lateness_ns: u64) -> Result<(), RuntimeError> {
         self.inputs.take(&mut self.pilot);
-        let map = self.inputs.map(began_ns).map(|message| (*message.user_header(), message.payload()));
+        let map = self.inputs.map(began_ns).map(|message| (*message.header(), message.payload()));
         let chart = map.as_ref().and_then(|(header, payload)| {
             let (map, time_to_goal) = risk_views(header, payload)?;
             Some(self.inputs.frame.place(Chart { map, time_to_goal }, header.odometry_at_ns))

@@ -123,7 +123,7 @@ impl Learning {
         // What is judged is sent, so that whoever has the messages knows all that was judged.
         if let Some(surface) = self.surfaces.newest().filter(|_| maker.has_goal()) {
             let began_ns = clock::now_ns();
-            let header = surface.user_header();
+            let header = surface.header();
             self.stuck.poll(|stamp, stuck| stuck.iter().for_each(|stuck| maker.note_stuck(stamp, stuck)));
             match maker.update(header, surface.payload())? {
                 Ok(()) => send_risk(maker, &mut self.outlet, header.stamp.valid_at_ns)?,

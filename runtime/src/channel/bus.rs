@@ -1,5 +1,7 @@
 //! A process among the others of its run.
 
+mod folder;
+
 use std::os::unix::fs::MetadataExt;
 use std::str::FromStr;
 
@@ -8,13 +10,12 @@ use iceoryx2::node::{Node, NodeBuilder};
 use iceoryx2::prelude::{FileName, LogLevel, Path, SemanticString, SignalHandlingMode, ipc, set_log_level};
 use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
 
+use super::failures::Failures;
 use super::{Channel, ChannelError, Element, Header, Inlet, Outlet, PUBLISHERS_MAX};
 use crate::clock;
 
 /// Where shared memory lies.
 const SHARED_MEMORY: &str = "/dev/shm";
-/// Where the files lie by which processes find one another.
-const ROOT: &str = "/tmp/surefoot";
 
 /// Name of a run: its processes find one another by it, and no others.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -50,16 +51,16 @@ impl std::fmt::Display for RunName {
 impl RunName {
     /// Start of the names of its files in shared memory.
     pub fn prefix(&self) -> String {
-        format!("{}{}_", Self::prefix_of_all(), self.0)
+        format!("{}{}_{}_", Self::prefix_of_all(), folder::user(), self.0)
     }
 
     const fn prefix_of_all() -> &'static str {
         "surefoot_"
     }
 
-    /// Folder of the files by which its processes find one another.
+    /// Folder of the files by which its processes find one another, in the one that its user has alone.
     pub fn folder(&self) -> String {
-        format!("{ROOT}/{}", self.0)
+        format!("{}/{}", folder::root(), self.0)
     }
 }
 
@@ -73,14 +74,12 @@ impl Bus {
     /// Joins the processes of a run; clears away what dead ones have left behind.
     ///
     /// # Errors
-    /// The folder of the run or the shared memory cannot be used.
+    /// The user's folder is not his alone, or the folder of the run or the shared memory cannot be used.
     pub fn join(run: &RunName) -> Result<Self, ChannelError> {
         // Failures come back as values; what else it says is for its own developers.
         set_log_level(LogLevel::Fatal);
         let refused = |problem: String| ChannelError::Join { run: run.to_string(), problem };
-        // Of the reasons why it may fail, this one has a name: another user's folder.
-        let folder = run.folder();
-        std::fs::create_dir_all(&folder).map_err(|error| refused(format!("{folder}: {error}")))?;
+        folder::claim(std::path::Path::new(&folder::root()), folder::user())?;
         let config = config(run).map_err(refused)?;
         let builder = NodeBuilder::new().config(&config).signal_handling_mode(SignalHandlingMode::Disabled);
         let node = builder.create::<ipc::Service>().map_err(|error| refused(error.to_string()))?;
@@ -101,21 +100,27 @@ impl Bus {
         let service = self.service(channel)?;
         let n_samples = channel.n_readers * (2 * channel.depth + 1) + 2;
         check_memory((n_samples * n_max * size_of::<T>()) as f64)?;
+        let failures = Failures::default();
         let publisher = service
             .publisher_builder()
             .initial_max_slice_len(n_max)
             .max_loaned_samples(1)
+            .set_degradation_handler(failures.handler())
             .create()
             .map_err(|error| open_error(channel.name, error))?;
-        Ok(Outlet::new(channel.name, publisher, self.epoch_ns, n_max))
+        Ok(Outlet::new(channel.name, publisher, failures, (self.epoch_ns, n_max)))
     }
 
     /// The way out of a channel.
     pub fn inlet<H: Header, T: Element>(&self, channel: &Channel<H, T>) -> Result<Inlet<H, T>, ChannelError> {
         let service = self.service(channel)?;
-        let subscriber =
-            service.subscriber_builder().create().map_err(|error| open_error(channel.name, error))?;
-        Ok(Inlet::new(channel, subscriber))
+        let failures = Failures::default();
+        let subscriber = service
+            .subscriber_builder()
+            .set_degradation_handler(failures.handler())
+            .create()
+            .map_err(|error| open_error(channel.name, error))?;
+        Ok(Inlet::new(channel, service, subscriber, failures))
     }
 
     /// Clears away what dead processes of the run have left behind; returns of how many.
@@ -189,7 +194,10 @@ mod tests {
 
     #[test]
     fn runs_have_plain_names() {
-        assert_eq!("field-2_b".parse::<RunName>().unwrap().prefix(), "surefoot_field-2_b_");
+        let run: RunName = "field-2_b".parse().unwrap();
+        let user = folder::user();
+        assert_eq!(run.prefix(), format!("surefoot_{user}_field-2_b_"));
+        assert_eq!(run.folder(), format!("/tmp/surefoot-{user}/field-2_b"));
         let long = "x".repeat(33);
         for wrong in ["", "a b", "../up", "a/b", "\u{e4}", &long] {
             assert!(wrong.parse::<RunName>().unwrap_err().to_string().contains("found"), "{wrong}");

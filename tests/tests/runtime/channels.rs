@@ -36,7 +36,7 @@ fn a_risk_map_is_written_once_and_read_where_it_was_written() {
     marked[777].pitch_rad = 0.25;
     outlet.send(loan, 1).unwrap();
     let message = inlet.newest().unwrap();
-    let (view, _) = risk_views(message.user_header(), message.payload()).unwrap();
+    let (view, _) = risk_views(message.header(), message.payload()).unwrap();
     assert_eq!(
         view.risks.as_ptr().cast(),
         message.payload().as_ptr(),
@@ -74,7 +74,7 @@ fn a_risk_map_is_sent_and_read_without_memory_of_its_own() {
         allocation_counter::measure(|| {
             send_risk(&mut maker, outlet, 1).unwrap();
             let message = inlet.newest().unwrap();
-            let (map, time_to_goal) = risk_views(message.user_header(), message.payload()).unwrap();
+            let (map, time_to_goal) = risk_views(message.header(), message.payload()).unwrap();
             let place = message.payload().as_ptr_range();
             assert!(
                 place.contains(&map.risks.as_ptr().cast()) && place.contains(&map.ground.as_ptr().cast())
@@ -131,4 +131,20 @@ fn a_second_publisher_is_not_heard_while_the_first_is() {
     other.send_one(Stamp::default(), record(2.0), 4).unwrap();
     assert_eq!(heard(), [2.0], "silence gives the channel to the next");
     assert_eq!(inlet.counts().of(Refusal::OtherPublisher), 3);
+}
+
+#[test]
+fn a_publisher_whose_memory_cannot_be_reached_is_counted_as_a_failure() {
+    let run = Run::new();
+    let (here, there) = (Bus::join(&run.name).unwrap(), Bus::join(&run.name).unwrap());
+    let files = |run: &Run| std::collections::BTreeSet::from_iter(run.shared_memory());
+    let mut inlet = here.inlet(&ODOMETRY).unwrap();
+    let before = files(&run);
+    let mut outlet = there.outlet(&ODOMETRY, 1).unwrap();
+    for file in files(&run).difference(&before) {
+        std::fs::remove_file(file).unwrap();
+    }
+    outlet.send_one(Stamp::default(), OdometryRecord::default(), 1).unwrap();
+    inlet.poll(|_, _| panic!("nobody can have heard that"));
+    assert!(inlet.counts().failed > 0, "{:?}", inlet.counts());
 }

@@ -13,6 +13,7 @@ mod layouts;
 mod measurements;
 mod onlookers;
 mod recordings;
+mod rewritten;
 mod supervision;
 mod witness;
 
