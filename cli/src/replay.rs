@@ -57,6 +57,9 @@ fn show(report: &ReplayReport) {
 fn verdict(report: &ReplayReport) -> Result<(), WorkFailed> {
     match &report.first_difference {
         Some(difference) => Err(WorkFailed(difference.clone())),
+        None if report.n_decisions == 0 => {
+            Err(WorkFailed("expected decisions to make again, found none in the recording".to_owned()))
+        }
         None if report.n_unmade > 0 => {
             let first = report.missing.first().map_or("", String::as_str);
             Err(WorkFailed(format!("{} decisions not made again, for want of {first}", report.n_unmade)))

@@ -2,9 +2,13 @@
 
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
+use std::collections::BTreeMap;
+use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 
+use formats::DriveRecorder;
+use runtime::setup::{ClockAnchor, MachineSetup, RecordedSetup};
 use serde_json::Value;
 
 fn surefoot(words: &[&str]) -> Command {
@@ -64,6 +68,57 @@ fn files_that_are_none_are_refused_with_what_was_expected() {
     }
     assert_refused(&["inspect", &other], &["notes.txt", "expected a recording"]);
     assert_refused(&["replay", &other], &["notes.txt", "expected a recording"]);
+}
+
+/// A recording that holds nothing but its setup, after a change of that.
+fn record_setup(path: &Path, change: impl FnOnce(&mut serde_json::Map<String, Value>)) {
+    let vehicle = formats::read_vehicle("rc_car").unwrap();
+    let config = navigator::Config::for_vehicle(&vehicle);
+    let machine = MachineSetup { model: bicycle::Model::of(&vehicle), vehicle, config };
+    let [vehicle_toml, model_toml, config_toml] = machine.texts().unwrap();
+    let setup = RecordedSetup {
+        format: RecordedSetup::FORMAT,
+        clock: ClockAnchor::now(),
+        vehicle_name: "rc_car".to_owned(),
+        vehicle_toml,
+        model_toml,
+        config_toml,
+        method: "physics".to_owned(),
+        checkpoint_sha256: String::new(),
+        alpha: 0.6,
+        seed: "1".to_owned(),
+        revision: String::new(),
+    };
+    let mut setup = serde_json::to_value(&setup).unwrap();
+    change(setup.as_object_mut().unwrap());
+    let mut recorder = DriveRecorder::create_new(path, BTreeMap::new()).unwrap();
+    recorder.setup(0, &setup).unwrap();
+    recorder.finish().unwrap();
+}
+
+#[test]
+fn a_recording_without_a_decision_is_no_success() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("drive-000.mcap");
+    record_setup(&path, |_| ());
+    let (code, again, told) = look("replay", &path);
+    assert_eq!((code, &again["n_decisions"]), (Some(1), &0.into()), "{again} {told}");
+    assert_eq!(told.lines().count(), 1, "{told}");
+    assert!(told.contains("expected decisions to make again, found none"), "{told}");
+}
+
+#[test]
+fn recordings_of_another_version_are_refused_with_both_versions() {
+    let folder = tempfile::tempdir().unwrap();
+    let [first, later] = ["first.mcap", "later.mcap"].map(|name| folder.path().join(name));
+    record_setup(&first, |setup| {
+        setup.remove("format");
+        setup.remove("clock");
+    });
+    let expected = format!("expected a recording of version {}, found version", RecordedSetup::FORMAT);
+    assert_refused(&["replay", first.to_str().unwrap()], &["first.mcap", &format!("{expected} 1")]);
+    record_setup(&later, |setup| drop(setup.insert("format".to_owned(), 77.into())));
+    assert_refused(&["replay", later.to_str().unwrap()], &["later.mcap", &format!("{expected} 77")]);
 }
 
 /// Drives over the arena with a heavier machine than the model believes in; returns the folder and what was said.
@@ -194,5 +249,10 @@ fn too_little_shared_memory_is_said_in_one_line() {
     assert_eq!(output.status.code(), Some(2), "{told}");
     assert_eq!(told.lines().count(), 1, "{told}");
     assert!(told.contains("/dev/shm: expected") && told.contains("MB free"), "{told}");
-    drop(std::fs::remove_dir_all(PathBuf::from("/tmp/surefoot").join(run)));
+    // In there it was user 0, whoever that is outside.
+    let folder = PathBuf::from("/tmp/surefoot-0");
+    drop(std::fs::remove_dir_all(folder.join(run)));
+    if folder.metadata().is_ok_and(|about| about.uid() != 0) {
+        drop(std::fs::remove_dir(folder));
+    }
 }

@@ -31,6 +31,16 @@ pub enum RuntimeError {
     /// The system refuses a thread.
     #[error("threads: {0}")]
     Threads(#[from] rayon::ThreadPoolBuildError),
+    /// The recordings of a folder are as large as they may be.
+    #[error("{folder}: expected recordings of at most {quota_mb:.1} MB together, found {found_mb:.1} MB")]
+    Quota {
+        /// Path of the folder.
+        folder: String,
+        /// What they may be together [MB].
+        quota_mb: f64,
+        /// What they are [MB].
+        found_mb: f64,
+    },
     /// The recording.
     #[error(transparent)]
     Record(#[from] formats::RecordError),

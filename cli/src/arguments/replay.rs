@@ -33,5 +33,5 @@ Example:
 
 Exit codes:
   0  every decision was made again to the last bit
-  1  one was not, or something that it needs was not recorded; one line says which
+  1  one was not, or something that it needs was not recorded, or there is none; one line says which
   2  bad usage or input; one line says what was expected and what was found";

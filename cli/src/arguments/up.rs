@@ -46,6 +46,17 @@ pub struct UpArguments {
           default_missing_value = LIVE_DEFAULT, help_heading = "Live view")]
     pub live: Option<SocketAddr>,
 
+    /// Size that all recordings in the output folder together may reach, those of before included [MB]; then the vehicle
+    /// drives on without a recording, and the recorder says so
+    #[arg(long, value_name = "MEGABYTES", value_parser = quota_mb, default_value = "16000",
+          allow_hyphen_values = true, help_heading = "Recording")]
+    pub record_quota: f64,
+
+    /// Time after which what was recorded is put onto the disk (fsync): what a failure of the power may cost [s]
+    #[arg(long, value_name = "SECONDS", value_parser = values::duration_s, default_value = "1",
+          allow_hyphen_values = true, help_heading = "Recording")]
+    pub record_sync: f64,
+
     /// Go on learning from the drive; networks that prove better are used and kept in OUT/learned
     ///
     /// What the vehicle does over what is asked of it becomes labels, as with `surefoot collect`; networks are fitted to
@@ -105,6 +116,10 @@ impl UpRole {
 
 fn rate_hz(word: &str) -> Result<f64, String> {
     values::number_where(word, "a rate from 1 to 50 Hz", |value| (1.0..=50.0).contains(&value))
+}
+
+fn quota_mb(word: &str) -> Result<f64, String> {
+    values::number_where(word, "a size from 1 to 1000000 MB", |value| (1.0..=1e6).contains(&value))
 }
 
 pub(super) const LONG_ABOUT: &str = "\

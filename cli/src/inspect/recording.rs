@@ -17,9 +17,6 @@ use crate::UsageError;
 /// Longest record that is believed: far above what recorders write.
 const RECORD_BYTES_MAX: usize = 1 << 28;
 
-/// Topics of messages as they went over the channels.
-const CHANNELS: &str = "/channel/";
-
 #[derive(Default)]
 struct Topic {
     schema: String,
@@ -71,7 +68,7 @@ pub(super) fn look(path: &Path) -> Result<Value, UsageError> {
         topic.encoding.clone_from(&channel.message_encoding);
         topic.messages += 1;
         topic.bytes += message.data.len() as u64;
-        if channel.topic.starts_with(CHANNELS) {
+        if channel.topic.starts_with(recorder::topic::CHANNELS) {
             replay::recorded_stamp(&message.data).iter().for_each(|stamp| topic.count(stamp));
         }
         if channel.topic == recorder::topic::DECISION

@@ -10,7 +10,7 @@ use runtime::online::Told;
 use runtime::plant::{self, PlantReport, PlantSetup};
 use runtime::realtime;
 use runtime::recorder::{self, RecorderSetup};
-use runtime::setup::{MachineSetup, RecordedSetup};
+use runtime::setup::{ClockAnchor, MachineSetup, RecordedSetup};
 use runtime::status::Role;
 use rustix::process::{Signal, set_parent_process_death_signal};
 use scenarios::{EpisodeConfig, Outcome};
@@ -109,6 +109,8 @@ fn recorder_setup(arguments: &UpArguments, machine: Machine) -> anyhow::Result<R
     let vehicle_name = vehicle.name.clone();
     let [vehicle_toml, model_toml, config_toml] = MachineSetup { vehicle, model, config }.texts()?;
     let setup = RecordedSetup {
+        format: RecordedSetup::FORMAT,
+        clock: ClockAnchor::now(),
         vehicle_name,
         vehicle_toml,
         model_toml,
@@ -120,7 +122,14 @@ fn recorder_setup(arguments: &UpArguments, machine: Machine) -> anyhow::Result<R
         revision: revision().to_owned(),
     };
     let folder = arguments.drive.out.clone();
-    Ok(RecorderSetup { folder, setup, file_bytes_max: FILE_BYTES_MAX, file_time_max_s: FILE_TIME_MAX_S })
+    Ok(RecorderSetup {
+        folder,
+        setup,
+        file_bytes_max: FILE_BYTES_MAX,
+        file_time_max_s: FILE_TIME_MAX_S,
+        quota_bytes: (arguments.record_quota * 1e6) as u64,
+        sync_interval_s: arguments.record_sync,
+    })
 }
 
 fn hexadecimal(bytes: &[u8]) -> String {

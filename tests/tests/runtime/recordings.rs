@@ -1,8 +1,10 @@
 //! Recorders that rotate, die and run out of disk while the vehicle drives.
 
 use std::path::PathBuf;
+use std::time::{Duration, SystemTime};
 
 use navigator::Belief;
+use runtime::channel::Bus;
 use runtime::replay::{self, Knowledge, Records, ReplayReport};
 use runtime::status::Role;
 
@@ -112,4 +114,67 @@ fn a_full_disk_ends_the_recording_and_not_the_drive() {
     let report = made_again(&records);
     assert_eq!(report.first_difference, None, "{report:?}");
     assert!(report.n_decisions > 5, "{report:?}");
+}
+
+#[test]
+fn a_quota_ends_the_recording_and_not_the_drive() {
+    let mut run = Run::new();
+    // Of an earlier drive: it stays, and counts.
+    let earlier = run.folder.path().join("drive-000.mcap");
+    std::fs::write(&earlier, [7; 100_000]).unwrap();
+    run.start_all(&OTHERS);
+    let mut witness = Witness::new(&run);
+    witness.until_driving("all processes up");
+    let bus = Bus::join(&run.name).unwrap();
+    let mut statuses = bus.inlet(&Role::Recorder.status()).unwrap();
+    let quota_bytes = 400_000;
+    run.start_recorder(&RecorderLimits { quota_bytes, file_bytes_max: 120_000, ..Default::default() });
+    witness.until("the quota is reached", |_| run.said_by_recorder().is_some());
+    let said = run.said_by_recorder().unwrap();
+    assert!(said.contains("expected recordings of at most 0.4 MB together, found 0."), "{said}");
+    assert!(said.ends_with("; driving on without a recording\n") && said.lines().count() == 1, "{said}");
+
+    // The vehicle drives on, and the recorder counts what it does not keep.
+    let mut n_missed = 0;
+    witness.decided.clear();
+    witness.until("ten more decisions", |witness| witness.decided.len() >= 10);
+    witness.until_driving("without a recording");
+    witness.until("messages that are not kept are counted", |_| {
+        statuses.poll(|_, statuses| n_missed = statuses[0].n_missed);
+        n_missed > 20
+    });
+    run.end();
+
+    assert_eq!(std::fs::read(&earlier).unwrap(), [7; 100_000], "an earlier recording was written over");
+    let files = run.recordings();
+    let n_bytes: u64 = files.iter().map(|file| file.metadata().unwrap().len()).sum();
+    // What a half second takes, and the index of the last file.
+    assert!(files.len() > 2 && n_bytes < 2 * quota_bytes, "{n_bytes} bytes in {files:?}");
+    let records = read(&files[1..]);
+    assert_eq!(records.ended_early, None);
+    let report = made_again(&records);
+    assert_eq!(report.first_difference, None, "{report:?}");
+}
+
+/// Nanoseconds of UTC since 1970.
+fn utc_ns() -> u64 {
+    SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or(Duration::ZERO).as_nanos() as u64
+}
+
+#[test]
+fn a_recording_is_placed_in_time() {
+    let mut run = Run::new();
+    let began_ns = utc_ns();
+    run.start_all(&OTHERS);
+    run.start(Role::Recorder);
+    let mut witness = Witness::new(&run);
+    witness.until("a second of decisions", |witness| witness.decided.len() >= 10);
+    run.end();
+    let ended_ns = utc_ns();
+    let records = read(&run.recordings());
+    let clock = records.setup.as_ref().unwrap().clock.clone();
+    let [monotonic_ns, utc_ns] =
+        [&clock.monotonic_ns, &clock.utc_ns].map(|text| text.parse::<u64>().unwrap());
+    let decided_ns = last_decision_ns(&records) - monotonic_ns + utc_ns;
+    assert!((began_ns..=ended_ns).contains(&decided_ns), "{began_ns} {decided_ns} {ended_ns}");
 }
