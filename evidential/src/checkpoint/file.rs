@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use safetensors::tensor::{Dtype, SafeTensorError, SafeTensors, TensorView};
+use serde::Deserialize;
 use sha2::{Digest, Sha256};
 use traversability::Bins;
 
@@ -71,6 +72,17 @@ fn require_positive(what: &str, values: &[f32]) -> Result<(), CheckpointError> {
 }
 
 impl Sidecar {
+    /// Reads the version first: what else stands in one of another version means something else, if anything.
+    fn read(json: &[u8]) -> Result<Self, CheckpointError> {
+        #[derive(Deserialize)]
+        struct Version {
+            format: u32,
+        }
+        let Version { format } = serde_json::from_slice(json).map_err(CheckpointError::Json)?;
+        require("format", &Self::FORMAT, &format)?;
+        serde_json::from_slice(json).map_err(CheckpointError::Json)
+    }
+
     /// Refuses what this program cannot use: another format or bins, lengths that contradict one another, numbers out
     /// of range.
     fn validate(&self) -> Result<(), CheckpointError> {
@@ -149,7 +161,7 @@ impl Checkpoint {
     /// Truncated or other bytes, another format, weights of another hash than the sidecar's, other bins, shapes or
     /// lengths than the sidecar's architecture and layout demand, numbers that are not finite.
     pub fn from_bytes(weights: &[u8], sidecar: &[u8]) -> Result<Self, CheckpointError> {
-        let sidecar: Sidecar = serde_json::from_slice(sidecar).map_err(CheckpointError::Json)?;
+        let sidecar = Sidecar::read(sidecar)?;
         sidecar.validate()?;
         require("SHA-256 of the weights", &sidecar.weights_sha256, &sha256(weights))?;
         let mut tensors = BTreeMap::new();

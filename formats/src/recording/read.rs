@@ -9,7 +9,7 @@ use bicycle::DriveLog;
 use mcap::io::MessageReader;
 use mcap::sans_io::LinearReaderOptions;
 
-use super::drive_row;
+use super::drive_row::{self, Fields};
 
 /// Longest record or chunk that is believed: far above what recorders write.
 const RECORD_BYTES_MAX: usize = 1 << 28;
@@ -46,7 +46,8 @@ pub enum McapReadError {
     },
 }
 
-/// Reads the drive log of a recording made by [`super::DriveRecorder`].
+/// Reads the drive log of a recording made by [`super::DriveRecorder`], of this version or another: its own schema says
+/// which column is which, and columns that this program does not know are passed over.
 ///
 /// A recording that breaks off or is damaged gives all rows before that place, and says so. Errors: the file cannot
 /// be opened, or holds no row at all.
@@ -62,10 +63,18 @@ pub fn read_drive_log_mcap(path: &Path) -> Result<McapDriveLog, McapReadError> {
     let mut topics = BTreeSet::new();
     let mut log = DriveLog::default();
     let mut ended_early = None;
+    let mut fields = None;
     for message in MessageReader::new_with_options(source, options) {
         let added = message.map_err(|error| error.to_string()).and_then(|message| {
             topics.insert(message.channel.topic.clone());
-            if message.channel.topic == drive_row::TOPIC { add_row(&mut log, &message.data) } else { Ok(()) }
+            if message.channel.topic != drive_row::TOPIC {
+                return Ok(());
+            }
+            if fields.is_none() {
+                let schema = message.channel.schema.as_ref().and_then(|schema| Fields::of(&schema.data));
+                fields = Some(schema.ok_or("messages without a schema of a drive log")?);
+            }
+            fields.as_ref().map_or(Ok(()), |fields| add_row(fields, &mut log, &message.data))
         });
         if let Err(problem) = added {
             ended_early = Some(format!("after {} rows: {problem}", log.n_rows()));
@@ -80,7 +89,7 @@ pub fn read_drive_log_mcap(path: &Path) -> Result<McapDriveLog, McapReadError> {
     Err(McapReadError::NoRows { file, topic: drive_row::TOPIC, found })
 }
 
-fn add_row(log: &mut DriveLog, bytes: &[u8]) -> Result<(), String> {
-    let (run, row) = drive_row::decode(bytes).ok_or("a message that is no row of a drive log")?;
+fn add_row(fields: &Fields, log: &mut DriveLog, bytes: &[u8]) -> Result<(), String> {
+    let (run, row) = fields.decode(bytes).ok_or("a message that is no row of a drive log")?;
     log.push(&run, &row).map_err(|error| error.to_string())
 }
