@@ -8,7 +8,8 @@ use crate::budget::Budget;
 use crate::channel::{
     Bus, COMMAND, DECISION, Inlet, MISSION, Message, ODOMETRY, Outlet, RISK, RISK_PHYSICS, STUCK,
 };
-use crate::clock::{self, Cycle};
+use crate::choice::is_learned;
+use crate::clock::{self, Cycle, SECOND_NS};
 use crate::frame::Frame;
 use crate::message::{
     CommandRecord, DecisionRecord, MissionRecord, OdometryRecord, RiskHeader, Source, Stamp, StuckRecord,
@@ -16,8 +17,8 @@ use crate::message::{
 use crate::payload::risk_views;
 use crate::status::{Health, Meter, Role};
 
-/// Age of a scan from which on physics' younger map is preferred to a learned one [s].
-const LEARNED_AGE_MAX_S: f64 = 0.6;
+/// Age of a scan from which on physics' younger map is preferred to a learned one [ns].
+pub(crate) const LEARNED_AGE_MAX_NS: u64 = SECOND_NS * 6 / 10;
 
 /// Share of the period that a decision may take; the rest is for what else the processor does.
 const BUDGET_SHARE: f64 = 0.5;
@@ -84,6 +85,14 @@ impl MapInput {
         }
     }
 
+    fn source(&self) -> Source {
+        self.held.as_ref().map_or(Source::default(), |map| map.header().stamp.source())
+    }
+
+    fn scan_at_ns(&self) -> Option<u64> {
+        self.held.as_ref().map(|map| map.header().stamp.valid_at_ns)
+    }
+
     fn age_s(&self, now_ns: u64) -> f64 {
         let age_s =
             |map: &Message<RiskHeader, [f32; 4]>| clock::age_s(now_ns, map.header().stamp.valid_at_ns);
@@ -132,9 +141,8 @@ impl Inputs {
 
     /// The map to drive on: what was learned while it is fresh, else whatever knows of the younger scan.
     fn map(&self, now_ns: u64) -> Option<&Message<RiskHeader, [f32; 4]>> {
-        let [learned_s, physics_s] = [&self.learned, &self.physics].map(|input| input.age_s(now_ns));
-        let is_learned = learned_s <= LEARNED_AGE_MAX_S || learned_s <= physics_s;
-        if is_learned { self.learned.held.as_ref() } else { self.physics.held.as_ref() }
+        let [learned_at_ns, physics_at_ns] = [&self.learned, &self.physics].map(MapInput::scan_at_ns);
+        if is_learned(learned_at_ns, physics_at_ns, now_ns, LEARNED_AGE_MAX_NS) { self.learned.held.as_ref() } else { self.physics.held.as_ref() }
     }
 }
 
@@ -188,6 +196,8 @@ impl Control {
             n_odometry: self.inputs.n_odometry,
             risk: used.map_or(Source::default(), |header| header.stamp.source()),
             author: used.map_or(0, |header| header.author),
+            learned: self.inputs.learned.source(),
+            physics: self.inputs.physics.source(),
             scan_at_ns: used.map_or(0, |header| header.stamp.valid_at_ns),
             goal_m: destination.goal_m,
             tolerance_m: destination.tolerance_m,

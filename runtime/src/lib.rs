@@ -6,6 +6,7 @@
 
 pub mod budget;
 pub mod channel;
+mod choice;
 pub mod clock;
 pub mod control;
 mod error;

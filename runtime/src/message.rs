@@ -174,6 +174,10 @@ record! {
         risk: Source,
         /// Who made that map: 0 = none, 1 = what was learned, 2 = physics alone.
         author: u64,
+        /// The newest map of what was learned that there was to choose from.
+        learned: Source,
+        /// The newest map of physics alone that there was to choose from.
+        physics: Source,
         /// When the scan was measured that the map ends with [ns]; 0 = no map.
         scan_at_ns: u64,
         /// Where to go [m].

@@ -1,5 +1,6 @@
 //! Every decision of a recording, made again from what control said it used.
 
+mod choice;
 mod maps;
 mod records;
 
@@ -10,10 +11,12 @@ use evidential::Checkpoint;
 use navigator::{Belief, Chart, Destination, NavigatorError, Pilot};
 use traversability::CvarLevel;
 
+use crate::control::LEARNED_AGE_MAX_NS;
 use crate::frame::Frame;
 use crate::message::{CommandRecord, DecisionRecord, Source};
 use crate::payload::risk_views;
 use crate::setup::{MachineSetup, SetupError};
+use choice::Choice;
 use maps::{Maps, Unmade};
 pub use records::{Key, ReadError, Records, recorded_decision, recorded_stamp};
 
@@ -32,6 +35,9 @@ pub struct ReplayReport {
     pub n_risk_maps: u64,
     /// The first difference, if there is any.
     pub first_difference: Option<String>,
+    /// Where the recording contradicts itself, whatever was decided on it: decisions on another map than there was to
+    /// decide on.
+    pub contradictions: Vec<String>,
     /// What the recording lacks, each once.
     pub missing: Vec<String>,
     /// Where the recording breaks off, if it does.
@@ -124,7 +130,7 @@ pub fn replay(records: &Records, knowledge: &Knowledge) -> Result<ReplayReport, 
     let mut maps = Maps::new(records, &machine, knowledge, level)?;
     let mut report = ReplayReport { ended_early: records.ended_early.clone(), ..ReplayReport::default() };
     report.n_decisions = records.decisions.len() as u64;
-    let mut life: Option<Life> = None;
+    let mut life: Option<Life<'_>> = None;
     for (key, record) in &records.decisions {
         let goes_on = life.as_ref().is_some_and(|life| life.epoch_ns == key.epoch_ns);
         if !goes_on {
@@ -132,6 +138,7 @@ pub fn replay(records: &Records, knowledge: &Knowledge) -> Result<ReplayReport, 
                 epoch_ns: key.epoch_ns,
                 pilot: Pilot::new(machine.model.clone(), &machine.config, seed)?,
                 frame: Frame::default(),
+                choice: Choice::new(&records.risks, LEARNED_AGE_MAX_NS, key.epoch_ns),
                 is_lost: false,
             });
         }
@@ -144,15 +151,16 @@ pub fn replay(records: &Records, knowledge: &Knowledge) -> Result<ReplayReport, 
 }
 
 /// One life of the control process.
-struct Life {
+struct Life<'a> {
     epoch_ns: u64,
     pilot: Pilot,
     frame: Frame,
+    choice: Choice<'a>,
     /// Something that a decision was made from is missing: what its memory holds from then on is not known.
     is_lost: bool,
 }
 
-impl Life {
+impl Life<'_> {
     fn decide(
         &mut self,
         record: &DecisionRecord,
@@ -160,6 +168,9 @@ impl Life {
         maps: &mut Maps<'_>,
         report: &mut ReplayReport,
     ) -> Result<(), ReplayError> {
+        if let Err(why) = self.choice.check(record) {
+            report.contradictions.push(format!("decision {}: {why}", record.cycle));
+        }
         if let Some(missing) = self.take_odometry(record, records) {
             self.lose(missing, report);
         }

@@ -5,6 +5,7 @@ use std::time::{Duration, SystemTime};
 
 use navigator::Belief;
 use runtime::channel::Bus;
+use runtime::message::Source;
 use runtime::replay::{self, Knowledge, Records, ReplayReport};
 use runtime::status::Role;
 
@@ -177,4 +178,41 @@ fn a_recording_is_placed_in_time() {
         [&clock.monotonic_ns, &clock.utc_ns].map(|text| text.parse::<u64>().unwrap());
     let decided_ns = last_decision_ns(&records) - monotonic_ns + utc_ns;
     assert!((began_ns..=ended_ns).contains(&decided_ns), "{began_ns} {decided_ns} {ended_ns}");
+}
+
+/// What is said of a recording after a change of what it holds.
+fn contradictions_after(run: &Run, change: impl FnOnce(&mut Records)) -> String {
+    let mut records = read(&run.recordings());
+    change(&mut records);
+    made_again(&records).contradictions.join("\n")
+}
+
+#[test]
+fn a_decision_that_names_another_map_than_it_had_is_noticed() {
+    let mut run = Run::new();
+    run.start(Role::Recorder);
+    run.start_all(&OTHERS);
+    let mut witness = Witness::new(&run);
+    witness.until_driving("all processes up");
+    witness.decided.clear();
+    witness.until("two seconds of decisions", |witness| witness.decided.len() >= 20);
+    run.end();
+    assert_eq!(contradictions_after(&run, |_| ()), "");
+    // A later one that was made on a map, and what it says of that map.
+    let last = |records: &Records| *records.decisions.iter().rfind(|(_, made)| made.author != 0).unwrap().0;
+    let told = contradictions_after(&run, |records| {
+        let record = records.decisions.get_mut(&last(records)).unwrap();
+        (record.risk.sequence, record.learned.sequence) = (record.risk.sequence - 1, record.learned.sequence - 1);
+    });
+    assert!(told.contains("or a later one, which it had") || told.contains("which was there"), "{told}");
+    let told = contradictions_after(&run, |records| {
+        let record = records.decisions.get_mut(&last(records)).unwrap();
+        record.risk.sequence -= 1;
+    });
+    assert!(told.contains("expected to be made on learned risk map"), "{told}");
+    let told = contradictions_after(&run, |records| {
+        let record = records.decisions.get_mut(&last(records)).unwrap();
+        (record.risk, record.author) = (Source::default(), 0);
+    });
+    assert!(told.contains("found none of author 0"), "{told}");
 }
