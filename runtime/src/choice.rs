@@ -22,7 +22,10 @@ mod tests {
         let learned = |learned_at_ns, physics_at_ns| is_learned(learned_at_ns, physics_at_ns, 1000, 600);
         assert!(learned(Some(400), Some(900)), "fresh");
         assert!(!learned(Some(399), Some(900)), "too old, and physics knows more");
-        assert!(learned(Some(399), Some(399)) && learned(Some(399), None), "too old, and physics knows no more");
+        assert!(
+            learned(Some(399), Some(399)) && learned(Some(399), None),
+            "too old, and physics knows no more"
+        );
         assert!(!learned(None, Some(1)));
         assert!(learned(Some(2000), Some(1000)), "a clock that is ahead is no age");
     }

@@ -142,7 +142,11 @@ impl Inputs {
     /// The map to drive on: what was learned while it is fresh, else whatever knows of the younger scan.
     fn map(&self, now_ns: u64) -> Option<&Message<RiskHeader, [f32; 4]>> {
         let [learned_at_ns, physics_at_ns] = [&self.learned, &self.physics].map(MapInput::scan_at_ns);
-        if is_learned(learned_at_ns, physics_at_ns, now_ns, LEARNED_AGE_MAX_NS) { self.learned.held.as_ref() } else { self.physics.held.as_ref() }
+        if is_learned(learned_at_ns, physics_at_ns, now_ns, LEARNED_AGE_MAX_NS) {
+            self.learned.held.as_ref()
+        } else {
+            self.physics.held.as_ref()
+        }
     }
 }
 

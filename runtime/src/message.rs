@@ -9,7 +9,7 @@ pub(crate) use convert::drive_row;
 pub use convert::{HOLD_REASONS, STOP_REASONS};
 
 /// Version of everything in this file; messages of another are refused.
-pub const LAYOUT_VERSION: u32 = 2;
+pub const LAYOUT_VERSION: u32 = 3;
 
 record! {
     /// First field of every header: whose message it is, and of when.

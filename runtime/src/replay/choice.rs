@@ -35,11 +35,16 @@ impl<'a> Choice<'a> {
         for (place, (_, name)) in AUTHORS.into_iter().enumerate() {
             if held[place] < before[place] {
                 let [before, held] = [before[place], held[place]].map(told);
-                return Err(format!("expected {name} risk map {before} or a later one, which it had, found {held}"));
+                return Err(format!(
+                    "expected {name} risk map {before} or a later one, which it had, found {held}"
+                ));
             }
             if let Some(missed) = self.overdue(place, held[place], decision.decided_at_ns) {
                 let held = told(held[place]);
-                return Err(format!("expected {name} risk map {}, which was there, found {held}", missed.sequence));
+                return Err(format!(
+                    "expected {name} risk map {}, which was there, found {held}",
+                    missed.sequence
+                ));
             }
         }
         self.check_used(decision, held)
@@ -68,7 +73,10 @@ impl<'a> Choice<'a> {
             return Ok(());
         }
         let (expected, found) = (told(expected), told(key_of(decision.risk)));
-        Err(format!("expected to be made on {name} risk map {expected}, found {found} of author {}", decision.author))
+        Err(format!(
+            "expected to be made on {name} risk map {expected}, found {found} of author {}",
+            decision.author
+        ))
     }
 
     /// The first map later than the one it had that it must have had.
@@ -178,7 +186,10 @@ mod tests {
         let mut first = decision(2500);
         first.physics.sequence = 9;
         first.risk = first.physics;
-        assert_eq!(choice.check(&first).unwrap_err(), "expected physics' risk map 10, which was there, found 9");
+        assert_eq!(
+            choice.check(&first).unwrap_err(),
+            "expected physics' risk map 10, which was there, found 9"
+        );
     }
 
     #[test]

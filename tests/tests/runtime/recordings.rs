@@ -202,7 +202,8 @@ fn a_decision_that_names_another_map_than_it_had_is_noticed() {
     let last = |records: &Records| *records.decisions.iter().rfind(|(_, made)| made.author != 0).unwrap().0;
     let told = contradictions_after(&run, |records| {
         let record = records.decisions.get_mut(&last(records)).unwrap();
-        (record.risk.sequence, record.learned.sequence) = (record.risk.sequence - 1, record.learned.sequence - 1);
+        (record.risk.sequence, record.learned.sequence) =
+            (record.risk.sequence - 1, record.learned.sequence - 1);
     });
     assert!(told.contains("or a later one, which it had") || told.contains("which was there"), "{told}");
     let told = contradictions_after(&run, |records| {
