@@ -82,12 +82,12 @@ impl<'a> Choice<'a> {
     /// The first map later than the one it had that it must have had.
     fn overdue(&self, place: usize, held: Option<Key>, decided_at_ns: u64) -> Option<Key> {
         let after = held.map_or(Bound::Unbounded, Bound::Excluded);
-        let later = self.risks[place].range((after, Bound::Unbounded));
+        let mut later = self.risks[place].range((after, Bound::Unbounded));
         let was_there = |header: &RiskHeader| {
             let sent_at_ns = header.stamp.published_at_ns;
             sent_at_ns >= self.began_ns + ON_THE_WAY_NS && sent_at_ns + ON_THE_WAY_NS < decided_at_ns
         };
-        later.into_iter().find(|(_, header)| was_there(header)).map(|(key, _)| *key)
+        later.find(|(_, header)| was_there(header)).map(|(key, _)| *key)
     }
 }
 
@@ -195,7 +195,7 @@ mod tests {
     #[test]
     fn maps_that_may_still_be_on_their_way_are_not_asked_for() {
         let late = |decision: &mut DecisionRecord| {
-            decision.physics.sequence -= 1;
+            decision.physics.sequence -= 2;
             decision.risk = decision.physics;
         };
         let risks = risks();
