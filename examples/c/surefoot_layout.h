@@ -6,7 +6,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#define SUREFOOT_LAYOUT_VERSION 2u
+#define SUREFOOT_LAYOUT_VERSION 3u
 
 /* First field of every header: whose message it is, and of when. Known to the channels as surefoot.Stamp. */
 typedef struct SurefootStamp {
@@ -207,6 +207,10 @@ typedef struct SurefootDecisionRecord {
     SurefootSource risk;
     /* Who made that map: 0 = none, 1 = what was learned, 2 = physics alone. */
     uint64_t author;
+    /* The newest map of what was learned that there was to choose from. */
+    SurefootSource learned;
+    /* The newest map of physics alone that there was to choose from. */
+    SurefootSource physics;
     /* When the scan was measured that the map ends with [ns]; 0 = no map. */
     uint64_t scan_at_ns;
     /* Where to go [m]. */
@@ -224,7 +228,7 @@ typedef struct SurefootDecisionRecord {
     /* By how much the cycle began after its deadline [ns]. */
     uint64_t lateness_ns;
 } SurefootDecisionRecord;
-static_assert(sizeof(SurefootDecisionRecord) == 184, "DecisionRecord");
+static_assert(sizeof(SurefootDecisionRecord) == 216, "DecisionRecord");
 static_assert(offsetof(SurefootDecisionRecord, command) == 0, "DecisionRecord.command");
 static_assert(offsetof(SurefootDecisionRecord, cycle) == 16, "DecisionRecord.cycle");
 static_assert(offsetof(SurefootDecisionRecord, decided_at_ns) == 24, "DecisionRecord.decided_at_ns");
@@ -232,14 +236,16 @@ static_assert(offsetof(SurefootDecisionRecord, odometry) == 32, "DecisionRecord.
 static_assert(offsetof(SurefootDecisionRecord, n_odometry) == 48, "DecisionRecord.n_odometry");
 static_assert(offsetof(SurefootDecisionRecord, risk) == 56, "DecisionRecord.risk");
 static_assert(offsetof(SurefootDecisionRecord, author) == 72, "DecisionRecord.author");
-static_assert(offsetof(SurefootDecisionRecord, scan_at_ns) == 80, "DecisionRecord.scan_at_ns");
-static_assert(offsetof(SurefootDecisionRecord, goal_m) == 88, "DecisionRecord.goal_m");
-static_assert(offsetof(SurefootDecisionRecord, tolerance_m) == 104, "DecisionRecord.tolerance_m");
-static_assert(offsetof(SurefootDecisionRecord, n_rollouts) == 112, "DecisionRecord.n_rollouts");
-static_assert(offsetof(SurefootDecisionRecord, elapsed_s) == 120, "DecisionRecord.elapsed_s");
-static_assert(offsetof(SurefootDecisionRecord, state) == 128, "DecisionRecord.state");
-static_assert(offsetof(SurefootDecisionRecord, duration_ns) == 168, "DecisionRecord.duration_ns");
-static_assert(offsetof(SurefootDecisionRecord, lateness_ns) == 176, "DecisionRecord.lateness_ns");
+static_assert(offsetof(SurefootDecisionRecord, learned) == 80, "DecisionRecord.learned");
+static_assert(offsetof(SurefootDecisionRecord, physics) == 96, "DecisionRecord.physics");
+static_assert(offsetof(SurefootDecisionRecord, scan_at_ns) == 112, "DecisionRecord.scan_at_ns");
+static_assert(offsetof(SurefootDecisionRecord, goal_m) == 120, "DecisionRecord.goal_m");
+static_assert(offsetof(SurefootDecisionRecord, tolerance_m) == 136, "DecisionRecord.tolerance_m");
+static_assert(offsetof(SurefootDecisionRecord, n_rollouts) == 144, "DecisionRecord.n_rollouts");
+static_assert(offsetof(SurefootDecisionRecord, elapsed_s) == 152, "DecisionRecord.elapsed_s");
+static_assert(offsetof(SurefootDecisionRecord, state) == 160, "DecisionRecord.state");
+static_assert(offsetof(SurefootDecisionRecord, duration_ns) == 200, "DecisionRecord.duration_ns");
+static_assert(offsetof(SurefootDecisionRecord, lateness_ns) == 208, "DecisionRecord.lateness_ns");
 
 /* Where the vehicle got stuck. Known to the channels as surefoot.Stuck. */
 typedef struct SurefootStuckRecord {

@@ -2,7 +2,7 @@
 
 import ctypes
 
-LAYOUT_VERSION = 2
+LAYOUT_VERSION = 3
 
 
 class Stamp(ctypes.Structure):
@@ -287,6 +287,10 @@ class DecisionRecord(ctypes.Structure):
         ("risk", Source),
         # Who made that map: 0 = none, 1 = what was learned, 2 = physics alone.
         ("author", ctypes.c_uint64),
+        # The newest map of what was learned that there was to choose from.
+        ("learned", Source),
+        # The newest map of physics alone that there was to choose from.
+        ("physics", Source),
         # When the scan was measured that the map ends with [ns]; 0 = no map.
         ("scan_at_ns", ctypes.c_uint64),
         # Where to go [m].
@@ -310,7 +314,7 @@ class DecisionRecord(ctypes.Structure):
         return "surefoot.DecisionRecord"
 
 
-assert ctypes.sizeof(DecisionRecord) == 184
+assert ctypes.sizeof(DecisionRecord) == 216
 assert DecisionRecord.command.offset == 0
 assert DecisionRecord.cycle.offset == 16
 assert DecisionRecord.decided_at_ns.offset == 24
@@ -318,14 +322,16 @@ assert DecisionRecord.odometry.offset == 32
 assert DecisionRecord.n_odometry.offset == 48
 assert DecisionRecord.risk.offset == 56
 assert DecisionRecord.author.offset == 72
-assert DecisionRecord.scan_at_ns.offset == 80
-assert DecisionRecord.goal_m.offset == 88
-assert DecisionRecord.tolerance_m.offset == 104
-assert DecisionRecord.n_rollouts.offset == 112
-assert DecisionRecord.elapsed_s.offset == 120
-assert DecisionRecord.state.offset == 128
-assert DecisionRecord.duration_ns.offset == 168
-assert DecisionRecord.lateness_ns.offset == 176
+assert DecisionRecord.learned.offset == 80
+assert DecisionRecord.physics.offset == 96
+assert DecisionRecord.scan_at_ns.offset == 112
+assert DecisionRecord.goal_m.offset == 120
+assert DecisionRecord.tolerance_m.offset == 136
+assert DecisionRecord.n_rollouts.offset == 144
+assert DecisionRecord.elapsed_s.offset == 152
+assert DecisionRecord.state.offset == 160
+assert DecisionRecord.duration_ns.offset == 200
+assert DecisionRecord.lateness_ns.offset == 208
 
 
 class StuckRecord(ctypes.Structure):
