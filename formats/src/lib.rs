@@ -16,6 +16,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod cells;
 mod config;
 mod drive_log_csv;
 mod elevation;
@@ -49,7 +50,7 @@ pub use gap_case_write::{
 pub use model_text::model_text;
 pub use overlay::overlay;
 pub use recording::{
-    DriveRecorder, DriveTopics, McapDriveLog, McapReadError, RecordError, read_drive_log_mcap,
+    DriveRecorder, DriveTopics, McapDriveLog, McapReadError, RecordError, open_recording, read_drive_log_mcap,
 };
 pub use refusal::ArrayFileError;
 pub use results::{OutputError, config_hash, prepare_out_dir, write_bytes_atomic, write_json_atomic};

@@ -3,27 +3,34 @@
 use std::io::{Read, Seek};
 
 use zip::ZipArchive;
+use zip::result::ZipError;
 
+use crate::cells::CellLimit;
 use crate::refusal::Refusal;
 
 /// Longest array header that is read; NumPy's are about 100 bytes.
 const HEADER_BYTES_MAX: usize = 1 << 16;
 
-/// Most elements that an array may hold: 256 MB as f32.
-pub(crate) const ELEMENTS_MAX: usize = 1 << 26;
+/// An archive of arrays.
+pub(crate) struct Archive<R> {
+    zip: ZipArchive<R>,
+    limit: CellLimit,
+}
 
-/// Opens an archive.
-pub(crate) fn open<R: Read + Seek>(file: R) -> Result<ZipArchive<R>, Refusal> {
-    ZipArchive::new(file)
-        .map_err(|error| Refusal::new("file", "a complete NumPy archive (.npz)", one_line(&error)))
+/// Opens an archive of so many bytes.
+pub(crate) fn open<R: Read + Seek>(file: R, n_bytes: u64) -> Result<Archive<R>, Refusal> {
+    let zip = ZipArchive::new(file)
+        .map_err(|error| Refusal::new("file", "a complete NumPy archive (.npz)", one_line(&error)))?;
+    Ok(Archive { zip, limit: CellLimit::of(n_bytes) })
 }
 
 /// The array `cell`: the edge of a cell [m].
-pub(crate) fn read_cell_m<R: Read + Seek>(archive: &mut ZipArchive<R>) -> Result<f64, Refusal> {
+pub(crate) fn read_cell_m<R: Read + Seek>(archive: &mut Archive<R>) -> Result<f64, Refusal> {
     let array = required(archive, "cell")?;
-    let &[cell_m] = array.values.as_slice() else {
+    if array.n_values() != 1 {
         return Err(Refusal::new("cell", "one number", format!("shape {:?}", array.shape)));
-    };
+    }
+    let cell_m = array.value(0);
     check_cell("cell", cell_m)?;
     // 0.2 kept as f32 is 0.20000000298: the shortest decimal that gives the same f32 is what was meant.
     let shortest = || (cell_m as f32).to_string().parse().unwrap_or(cell_m);
@@ -37,10 +44,10 @@ pub(crate) fn check_cell(field: &str, cell_m: f64) -> Result<(), Refusal> {
 }
 
 /// An array that must be there.
-pub(crate) fn required<R: Read + Seek>(archive: &mut ZipArchive<R>, name: &str) -> Result<Array, Refusal> {
+pub(crate) fn required<R: Read + Seek>(archive: &mut Archive<R>, name: &str) -> Result<Array, Refusal> {
     let array = optional(archive, name)?;
     array.ok_or_else(|| {
-        let mut names: Vec<_> = archive.file_names().map(|name| name.trim_end_matches(".npy")).collect();
+        let mut names: Vec<_> = archive.zip.file_names().map(|name| name.trim_end_matches(".npy")).collect();
         names.sort_unstable();
         Refusal::new(name, "an array of this name", format!("only: {}", names.join(", ")))
     })
@@ -48,58 +55,59 @@ pub(crate) fn required<R: Read + Seek>(archive: &mut ZipArchive<R>, name: &str) 
 
 /// An array that may be missing.
 pub(crate) fn optional<R: Read + Seek>(
-    archive: &mut ZipArchive<R>,
+    archive: &mut Archive<R>,
     name: &str,
 ) -> Result<Option<Array>, Refusal> {
     let broken = |error: &dyn std::fmt::Display| Refusal::new(name, "a complete array", one_line(error));
-    match archive.by_name(&format!("{name}.npy")) {
-        Ok(entry) => Array::read(name, entry).map(Some),
-        Err(zip::result::ZipError::FileNotFound) => Ok(None),
+    match archive.zip.by_name(&format!("{name}.npy")) {
+        Ok(entry) => Array::read(name, entry, &archive.limit).map(Some),
+        Err(ZipError::FileNotFound) => Ok(None),
         Err(error) => Err(broken(&error)),
     }
 }
 
-/// An array as NumPy stores it. Values go through f64, which holds every accepted type up to 53 bits.
+/// An array as NumPy stores it.
 pub(crate) struct Array {
     pub shape: Vec<usize>,
     descriptor: String,
+    decoder: Decoder,
     fortran_order: bool,
-    values: Vec<f64>,
+    bytes: Vec<u8>,
 }
 
 impl Array {
     /// Reads the `.npy` format, versions 1 to 3. The header is believed only as far as the data go: nothing is
-    /// allocated for cells that are not there.
-    fn read(name: &str, mut source: impl Read) -> Result<Self, Refusal> {
+    /// allocated for cells that are not there, and no more is unpacked than `limit` says.
+    fn read(name: &str, mut source: impl Read, limit: &CellLimit) -> Result<Self, Refusal> {
         let header = read_header(&mut source)
             .map_err(|error| Refusal::new(name, "a NumPy array (.npy)", one_line(&error)))?;
         let wrong = |part: &str| Refusal::new(name, format!("a NumPy header with {part}"), &header);
         let descriptor = quoted_after(&header, "'descr':").ok_or_else(|| wrong("'descr'"))?;
         let shape = shape_of(&header).ok_or_else(|| wrong("'shape'"))?;
-        let decode = decoder(descriptor).ok_or_else(|| {
+        let decoder = decoder(descriptor).ok_or_else(|| {
             Refusal::new(name, "type f2, f4, f8, i1 to i8, u1 to u8 or b1", format!("type {descriptor}"))
         })?;
-        let n_values = shape.iter().try_fold(1_usize, |n, extent| n.checked_mul(*extent));
-        let Some(n_values) = n_values.filter(|n| *n <= ELEMENTS_MAX) else {
-            return Err(Refusal::new(
-                name,
-                format!("at most {ELEMENTS_MAX} cells"),
-                format!("shape {shape:?}"),
-            ));
-        };
-        let bytes = read_exactly(&mut source, n_values * decode.width)
-            .map_err(|found| Refusal::new(name, format!("{} bytes", n_values * decode.width), found))?;
-        let values = bytes.chunks_exact(decode.width).map(decode.value).collect();
+        let n_bytes = limit.check(name, &shape, format!("shape {shape:?}"))? * decoder.width;
+        let bytes = read_exactly(&mut source, n_bytes)
+            .map_err(|found| Refusal::new(name, format!("{n_bytes} bytes"), found))?;
         let fortran_order = header.contains("'fortran_order': True");
-        Ok(Self { shape, descriptor: descriptor.to_owned(), fortran_order, values })
+        Ok(Self { shape, descriptor: descriptor.to_owned(), decoder, fortran_order, bytes })
+    }
+
+    fn n_values(&self) -> usize {
+        self.bytes.len() / self.decoder.width
+    }
+
+    /// The value at a place of the file; f64 holds every accepted type up to 53 bits.
+    fn value(&self, place: usize) -> f64 {
+        let width = self.decoder.width;
+        (self.decoder.value)(&self.bytes[place * width..][..width])
     }
 
     /// The values with the last index running fastest.
     pub fn into_row_major(self) -> Vec<f32> {
-        if !self.fortran_order {
-            return self.values.iter().map(|value| *value as f32).collect();
-        }
-        (0..self.values.len()).map(|index| self.values[fortran_index(index, &self.shape)] as f32).collect()
+        let place = |index| if self.fortran_order { fortran_index(index, &self.shape) } else { index };
+        (0..self.n_values()).map(|index| self.value(place(index)) as f32).collect()
     }
 }
 

@@ -24,7 +24,7 @@ pub fn parse_scan_points(name: &str, bytes: &[u8]) -> Result<Vec<[f32; 3]>, Arra
 }
 
 fn parse(bytes: &[u8]) -> Result<Vec<[f32; 3]>, Refusal> {
-    let xyz = required(&mut open(Cursor::new(bytes))?, "xyz")?;
+    let xyz = required(&mut open(Cursor::new(bytes), bytes.len() as u64)?, "xyz")?;
     if !matches!(xyz.shape.as_slice(), &[n_points, 3] if n_points > 0) {
         let found = format!("{:?}", xyz.shape);
         return Err(Refusal::new("xyz", "shape [points, 3] with at least one point", found));

@@ -10,9 +10,8 @@ use std::path::Path;
 
 use terrain::{GridGeometry, GridMap};
 use traversability::{Bins, N_BINS, Pmf};
-use zip::ZipArchive;
 
-use crate::numpy::{open, read_cell_m, required};
+use crate::numpy::{Archive, open, read_cell_m, required};
 use crate::refusal::{ArrayFileError, Refusal};
 
 /// How far the sum of twelve probabilities kept in half precision may lie from one; it is normalised away.
@@ -75,14 +74,14 @@ pub fn read_traction_map(path: &Path) -> Result<TractionMap, ArrayFileError> {
 /// Reads a traction map from a file's bytes; `name` is how errors call it.
 ///
 /// # Errors
-/// Truncated archive, missing array, wrong shape or type, other bins than [`Bins::TRACTION`], cell size that is not
+/// Truncated archive, missing array, more cells than such a file holds, wrong shape or type, other bins than [`Bins::TRACTION`], cell size that is not
 /// > 0, no known cell, and in known cells: a height or density that is not finite, a distribution that is none.
 pub fn parse_traction_map(name: &str, bytes: &[u8]) -> Result<TractionMap, ArrayFileError> {
     parse(bytes).map_err(|refusal| ArrayFileError::refused(name, refusal))
 }
 
 fn parse(bytes: &[u8]) -> Result<TractionMap, Refusal> {
-    let mut archive = open(Cursor::new(bytes))?;
+    let mut archive = open(Cursor::new(bytes), bytes.len() as u64)?;
     let cell_m = read_cell_m(&mut archive)?;
     check_bins(&mut archive)?;
     let unknown = required(&mut archive, "unknown")?;
@@ -109,11 +108,13 @@ fn parse(bytes: &[u8]) -> Result<TractionMap, Refusal> {
     })
 }
 
-fn check_bins<R: Read + Seek>(archive: &mut ZipArchive<R>) -> Result<(), Refusal> {
+fn check_bins<R: Read + Seek>(archive: &mut Archive<R>) -> Result<(), Refusal> {
     let values = required(archive, "bin_values")?.into_row_major();
     let ours = Bins::TRACTION.values();
     let same = values.len() == N_BINS && values.iter().zip(ours).all(|(a, b)| (a - b).abs() <= BIN_TOLERANCE);
-    if same { Ok(()) } else { Err(Refusal::new("bin_values", format!("{ours:?}"), format!("{values:?}"))) }
+    // One more than there should be says enough of an array that is too long.
+    let told = &values[..values.len().min(N_BINS + 1)];
+    if same { Ok(()) } else { Err(Refusal::new("bin_values", format!("{ours:?}"), format!("{told:?}"))) }
 }
 
 fn map<T>(geometry: GridGeometry, values: Vec<T>) -> Result<GridMap<T>, Refusal> {
@@ -124,7 +125,7 @@ fn map<T>(geometry: GridGeometry, values: Vec<T>) -> Result<GridMap<T>, Refusal>
 
 /// Reads arrays of one geometry and checks them where the map is known.
 struct Layers<'a, R> {
-    archive: ZipArchive<R>,
+    archive: Archive<R>,
     known: &'a GridMap<bool>,
 }
 

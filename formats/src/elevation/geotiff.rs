@@ -4,11 +4,12 @@
 use std::io::{Read, Seek};
 
 use terrain::GridGeometry;
-use tiff::decoder::{Decoder, DecodingResult};
+use tiff::decoder::{Decoder, DecodingResult, Limits};
 use tiff::tags::Tag;
 use tiff::{ColorType, TiffError};
 
 use super::{ElevationFile, Refusal, assemble, check_cell, check_shape, flip_rows};
+use crate::cells::CellLimit;
 
 /// Keys of the GeoKey directory (GeoTIFF 1.1, section 7) and what they may say.
 mod key {
@@ -20,11 +21,16 @@ mod key {
     pub(super) const LINEAR_UNITS_METRE: u64 = 9001;
 }
 
-pub(super) fn read(file: impl Read + Seek) -> Result<ElevationFile, Refusal> {
-    let mut decoder = Decoder::new(file).map_err(|error| broken("file", &error))?;
+/// Longest value of a tag that is read: far above what tags of ours hold.
+const TAG_BYTES_MAX: usize = 1 << 20;
+
+pub(super) fn read(file: impl Read + Seek, n_bytes: u64) -> Result<ElevationFile, Refusal> {
+    let limit = CellLimit::of(n_bytes);
+    let decoder = Decoder::new(file).map_err(|error| broken("file", &error))?;
+    let mut decoder = decoder.with_limits(limits(&limit));
     let (n_cols, n_rows) = decoder.dimensions().map_err(|error| broken("size", &error))?;
     let (n_rows, n_cols) = (n_rows as usize, n_cols as usize);
-    check_shape("size", n_rows, n_cols)?;
+    check_shape("size", [n_rows, n_cols], &limit)?;
     let color = decoder.colortype().map_err(|error| broken("pixel type", &error))?;
     if !matches!(color, ColorType::Gray(_)) {
         return Err(Refusal::new("pixel type", "one band of heights", format!("{color:?}")));
@@ -34,7 +40,7 @@ pub(super) fn read(file: impl Read + Seek) -> Result<ElevationFile, Refusal> {
     let file_south_west_m = south_west_m(&mut decoder, &keys, cell_m, n_rows)?;
     let no_data = no_data(&mut decoder)?;
     let pixels = decoder.read_image().map_err(|error| broken("pixels", &error))?;
-    let heights_m = heights(&pixels)?;
+    let heights_m = heights(pixels)?;
     if let Some(index) = heights_m.iter().position(|height| height.is_nan()).filter(|_| no_data.is_none()) {
         let place = format!("NaN at row {}, column {} from the north-west", index / n_cols, index % n_cols);
         return Err(Refusal::new(
@@ -48,6 +54,15 @@ pub(super) fn read(file: impl Read + Seek) -> Result<ElevationFile, Refusal> {
     let heights_m: Vec<f32> = flip_rows(&heights_m.collect::<Vec<_>>(), n_cols).collect();
     let geometry = GridGeometry { resolution_m: cell_m, origin: [0, 0], n_rows, n_cols };
     Ok(ElevationFile { file_south_west_m, ..assemble("pixels", geometry, heights_m)? })
+}
+
+/// Up to eight bytes for a cell, as it is decoded and as it is read.
+fn limits(limit: &CellLimit) -> Limits {
+    let mut limits = Limits::default();
+    limits.decoding_buffer_size = 8 * limit.n_cells();
+    limits.intermediate_buffer_size = 8 * limit.n_cells();
+    limits.ifd_value_size = TAG_BYTES_MAX;
+    limits
 }
 
 fn broken(field: &str, error: &TiffError) -> Refusal {
@@ -105,16 +120,16 @@ fn no_data<R: Read + Seek>(decoder: &mut Decoder<R>) -> Result<Option<f64>, Refu
     number.map(Some)
 }
 
-fn heights(pixels: &DecodingResult) -> Result<Vec<f64>, Refusal> {
+fn heights(pixels: DecodingResult) -> Result<Vec<f64>, Refusal> {
     Ok(match pixels {
-        DecodingResult::F32(values) => values.iter().map(|v| f64::from(*v)).collect(),
-        DecodingResult::F64(values) => values.clone(),
-        DecodingResult::U8(values) => values.iter().map(|v| f64::from(*v)).collect(),
-        DecodingResult::I8(values) => values.iter().map(|v| f64::from(*v)).collect(),
-        DecodingResult::U16(values) => values.iter().map(|v| f64::from(*v)).collect(),
-        DecodingResult::I16(values) => values.iter().map(|v| f64::from(*v)).collect(),
-        DecodingResult::U32(values) => values.iter().map(|v| f64::from(*v)).collect(),
-        DecodingResult::I32(values) => values.iter().map(|v| f64::from(*v)).collect(),
+        DecodingResult::F32(values) => values.into_iter().map(f64::from).collect(),
+        DecodingResult::F64(values) => values,
+        DecodingResult::U8(values) => values.into_iter().map(f64::from).collect(),
+        DecodingResult::I8(values) => values.into_iter().map(f64::from).collect(),
+        DecodingResult::U16(values) => values.into_iter().map(f64::from).collect(),
+        DecodingResult::I16(values) => values.into_iter().map(f64::from).collect(),
+        DecodingResult::U32(values) => values.into_iter().map(f64::from).collect(),
+        DecodingResult::I32(values) => values.into_iter().map(f64::from).collect(),
         _ => return Err(Refusal::new("pixel type", "8 to 32 bit integers or floats", "another type")),
     })
 }

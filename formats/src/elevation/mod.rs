@@ -9,7 +9,8 @@ use std::path::Path;
 use terrain::{GridGeometry, GridMap};
 
 use crate::ConfigError;
-use crate::numpy::{ELEMENTS_MAX as CELLS_MAX, check_cell};
+use crate::cells::CellLimit;
+use crate::numpy::check_cell;
 use crate::refusal::Refusal;
 
 pub use png::PngScale;
@@ -71,8 +72,11 @@ pub enum ElevationError {
 /// Reads an elevation file; the format is told by the extension: `.npz`, `.tif`, `.tiff`, or `.png` with a scale in
 /// `<file>.toml` beside it (`hill.png.toml`).
 ///
-/// Errors: unreadable or truncated file, unknown extension, missing array or tag, wrong shape or type, cell size
-/// that is not > 0, infinite height, no height at all.
+/// A file holds up to 64 cells for each of its bytes, and a million whatever its size: what compresses further claims
+/// more than measured ground does.
+///
+/// Errors: unreadable or truncated file, unknown extension, missing array or tag, wrong shape or type, more cells than
+/// that, cell size that is not > 0, infinite height, no height at all.
 pub fn read_elevation(path: &Path) -> Result<ElevationFile, ElevationError> {
     let extension = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
     match extension.as_str() {
@@ -85,25 +89,26 @@ pub fn read_elevation(path: &Path) -> Result<ElevationFile, ElevationError> {
 
 /// Reads a 16-bit PNG with a scale given by the caller. Errors: see [`read_elevation`].
 pub fn read_elevation_png(path: &Path, scale: PngScale) -> Result<ElevationFile, ElevationError> {
-    open_and(path, |file| png::read(file, scale))
+    open_and(path, |file, n_bytes| png::read(file, n_bytes, scale))
 }
 
 type Reader = std::io::BufReader<std::fs::File>;
 
 fn open_and(
     path: &Path,
-    read: impl FnOnce(Reader) -> Result<ElevationFile, Refusal>,
+    read: impl FnOnce(Reader, u64) -> Result<ElevationFile, Refusal>,
 ) -> Result<ElevationFile, ElevationError> {
     let open = || {
         let file = std::fs::File::open(path)?;
-        if file.metadata()?.is_dir() {
+        let about = file.metadata()?;
+        if about.is_dir() {
             return Err(std::io::ErrorKind::IsADirectory.into());
         }
-        Ok(std::io::BufReader::new(file))
+        Ok((std::io::BufReader::new(file), about.len()))
     };
-    let file =
+    let (file, n_bytes) =
         open().map_err(|source| ElevationError::Unreadable { file: path.display().to_string(), source })?;
-    read(file).map_err(|refusal| refusal.of(path))
+    read(file, n_bytes).map_err(|refusal| refusal.of(path))
 }
 
 impl Refusal {
@@ -113,11 +118,13 @@ impl Refusal {
     }
 }
 
-/// Refuses sizes that are no map or do not fit into memory.
-fn check_shape(field: &str, n_rows: usize, n_cols: usize) -> Result<(), Refusal> {
-    let fits = n_rows >= 2 && n_cols >= 2 && n_rows.checked_mul(n_cols).is_some_and(|n| n <= CELLS_MAX);
-    let expected = || format!("2 x 2 to {CELLS_MAX} cells");
-    if fits { Ok(()) } else { Err(Refusal::new(field, expected(), format!("{n_rows} x {n_cols}"))) }
+/// Refuses sizes that are no map, or more than a file of this size holds.
+fn check_shape(field: &str, [n_rows, n_cols]: [usize; 2], limit: &CellLimit) -> Result<(), Refusal> {
+    let found = format!("{n_rows} x {n_cols}");
+    if n_rows < 2 || n_cols < 2 {
+        return Err(Refusal::new(field, "at least 2 x 2 cells", found));
+    }
+    limit.check(field, &[n_rows, n_cols], found).map(drop)
 }
 
 /// Builds the result from rows that start in the south; NaN is a hole, infinity is refused.

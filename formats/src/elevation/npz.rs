@@ -4,20 +4,20 @@
 use std::io::{Read, Seek};
 
 use terrain::{GridGeometry, GridMap};
-use zip::ZipArchive;
 
 use super::{ElevationFile, ElevationLayers, assemble, check_shape};
-use crate::numpy::{open, optional, read_cell_m, required};
+use crate::cells::CellLimit;
+use crate::numpy::{Archive, open, optional, read_cell_m, required};
 use crate::refusal::Refusal;
 
-pub(super) fn read(file: impl Read + Seek) -> Result<ElevationFile, Refusal> {
-    let mut archive = open(file)?;
+pub(super) fn read(file: impl Read + Seek, n_bytes: u64) -> Result<ElevationFile, Refusal> {
+    let mut archive = open(file, n_bytes)?;
     let cell_m = read_cell_m(&mut archive)?;
     let array = required(&mut archive, "elevation")?;
     let &[n_rows, n_cols] = array.shape.as_slice() else {
         return Err(Refusal::new("elevation", "shape [row, col]", format!("shape {:?}", array.shape)));
     };
-    check_shape("elevation", n_rows, n_cols)?;
+    check_shape("elevation", [n_rows, n_cols], &CellLimit::of(n_bytes))?;
     let geometry = GridGeometry { resolution_m: cell_m, origin: [0, 0], n_rows, n_cols };
     let mut file = assemble("elevation", geometry, array.into_row_major())?;
     let mut layer = |name| read_layer(&mut archive, name, geometry);
@@ -31,7 +31,7 @@ pub(super) fn read(file: impl Read + Seek) -> Result<ElevationFile, Refusal> {
 }
 
 fn read_layer<R: Read + Seek>(
-    archive: &mut ZipArchive<R>,
+    archive: &mut Archive<R>,
     name: &str,
     geometry: GridGeometry,
 ) -> Result<Option<GridMap<f32>>, Refusal> {

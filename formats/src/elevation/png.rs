@@ -3,10 +3,11 @@
 use std::io::{BufRead, Seek};
 use std::path::{Path, PathBuf};
 
-use ::png::{BitDepth, ColorType, Decoder};
+use ::png::{BitDepth, ColorType, Decoder, Limits};
 use terrain::GridGeometry;
 
 use super::{ElevationFile, Refusal, assemble, check_shape, flip_rows};
+use crate::cells::CellLimit;
 use crate::{ConfigError, ConfigText};
 
 /// What the grey values of a PNG mean.
@@ -56,11 +57,18 @@ impl PngScale {
     }
 }
 
-pub(super) fn read(file: impl BufRead + Seek, scale: PngScale) -> Result<ElevationFile, Refusal> {
+pub(super) fn read(
+    file: impl BufRead + Seek,
+    n_bytes: u64,
+    scale: PngScale,
+) -> Result<ElevationFile, Refusal> {
     scale.check()?;
-    let mut reader = Decoder::new(file).read_info().map_err(|error| broken("file", &error))?;
+    let limit = CellLimit::of(n_bytes);
+    // Two bytes for a cell; what else the file holds has room in as many.
+    let decoder = Decoder::new_with_limits(file, Limits { bytes: 2 * limit.n_cells() });
+    let mut reader = decoder.read_info().map_err(|error| broken("file", &error))?;
     let (n_rows, n_cols) = (reader.info().height as usize, reader.info().width as usize);
-    check_shape("size", n_rows, n_cols)?;
+    check_shape("size", [n_rows, n_cols], &limit)?;
     let format = reader.output_color_type();
     if format != (ColorType::Grayscale, BitDepth::Sixteen) {
         let found = format!("{:?}, {:?} bits", format.0, format.1);

@@ -4,6 +4,7 @@ mod drive_row;
 mod ending;
 mod grids;
 mod json;
+mod messages;
 mod raw;
 mod read;
 mod scene;
@@ -24,6 +25,7 @@ use traversability::RiskMapView;
 use raw::RawChannels;
 use watched_file::{Fault, WatchedFile};
 
+pub use messages::open_recording;
 pub use topics::DriveTopics;
 
 pub use read::{McapDriveLog, McapReadError, read_drive_log_mcap};

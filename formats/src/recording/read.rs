@@ -1,18 +1,11 @@
 //! The drive log out of a recording, as far as the recording goes.
 
 use std::collections::BTreeSet;
-use std::fs::File;
-use std::io::BufReader;
 use std::path::Path;
 
 use bicycle::DriveLog;
-use mcap::io::MessageReader;
-use mcap::sans_io::LinearReaderOptions;
 
-use super::drive_row;
-
-/// Longest record or chunk that is believed: far above what recorders write.
-const RECORD_BYTES_MAX: usize = 1 << 28;
+use super::{drive_row, open_recording};
 
 /// A drive log from a recording.
 #[derive(Clone, Debug)]
@@ -52,17 +45,14 @@ pub enum McapReadError {
 /// be opened, or holds no row at all.
 pub fn read_drive_log_mcap(path: &Path) -> Result<McapDriveLog, McapReadError> {
     let file = path.display().to_string();
-    let source = match File::open(path) {
-        Ok(source) => BufReader::new(source),
+    let messages = match open_recording(path) {
+        Ok(messages) => messages,
         Err(source) => return Err(McapReadError::Unreadable { file, source }),
     };
-    let options = LinearReaderOptions::default()
-        .with_record_length_limit(RECORD_BYTES_MAX)
-        .with_prevalidate_chunk_crcs(true);
     let mut topics = BTreeSet::new();
     let mut log = DriveLog::default();
     let mut ended_early = None;
-    for message in MessageReader::new_with_options(source, options) {
+    for message in messages {
         let added = message.map_err(|error| error.to_string()).and_then(|message| {
             topics.insert(message.channel.topic.clone());
             if message.channel.topic == drive_row::TOPIC { add_row(&mut log, &message.data) } else { Ok(()) }

@@ -178,3 +178,31 @@ fn png_refusals_name_file_line_and_field() {
         "{message}"
     );
 }
+
+/// Rewrites a number of 32 bits of a file.
+fn overwrite(path: &PathBuf, at: usize, bytes: [u8; 4]) {
+    let mut file = std::fs::read(path).unwrap();
+    file[at..at + 4].copy_from_slice(&bytes);
+    std::fs::write(path, file).unwrap();
+}
+
+#[test]
+fn images_that_claim_more_than_a_file_of_their_size_holds_are_refused() {
+    let folder = Folder::new();
+    let path = folder.path("a.png");
+    let mut encoder = png::Encoder::new(std::fs::File::create(&path).unwrap(), 2000, 1000);
+    encoder.set_color(png::ColorType::Grayscale);
+    encoder.set_depth(png::BitDepth::Sixteen);
+    encoder.write_header().unwrap().write_image_data(&vec![0; 2 * 2000 * 1000]).unwrap();
+    let message = read_elevation_png(&path, HILL_SCALE).unwrap_err().to_string();
+    assert!(message.contains("size: expected at most 1048576 cells in a file of "), "{message}");
+    assert!(message.ends_with(" bytes, found 1000 x 2000"), "{message}");
+    // The first entry of the directory is the width; its value stands in its last four bytes.
+    let path = geotiff(&folder, &hill_from_north(0.0), &[scale_m(2.0, 2.0)], None);
+    let bytes = std::fs::read(&path).unwrap();
+    let directory = u32::from_le_bytes(bytes[4..8].try_into().unwrap()) as usize;
+    overwrite(&path, directory + 2 + 8, 1_000_000_u32.to_le_bytes());
+    let message = folder.refusal(&path);
+    assert!(message.starts_with("a.tif: size: expected at most 1048576 cells in a file of "), "{message}");
+    assert!(message.ends_with(" bytes, found 3 x 1000000"), "{message}");
+}

@@ -121,7 +121,7 @@ fn npz_refusals_name_file_field_expected_and_found() {
     );
     assert_eq!(
         refuse(&Array2::zeros((1, 4)), 1.0),
-        "a.npz: elevation: expected 2 x 2 to 67108864 cells, found 1 x 4"
+        "a.npz: elevation: expected at least 2 x 2 cells, found 1 x 4"
     );
 }
 
@@ -171,6 +171,24 @@ fn raw_npz(folder: &Folder, header: &str, data: &[u8]) -> PathBuf {
 }
 
 #[test]
+fn ground_that_is_too_flat_to_be_measured_is_unpacked_up_to_a_million_cells() {
+    let folder = Folder::new();
+    let flat = |side: usize| {
+        let path = folder.path("a.npz");
+        let mut npz = NpzWriter::new_compressed(std::fs::File::create(&path).unwrap());
+        npz.add_array("elevation", &Array2::<f32>::zeros((side, side))).unwrap();
+        npz.add_array("cell", &arr0(1.0_f64)).unwrap();
+        npz.finish().unwrap();
+        path
+    };
+    assert_eq!(read_elevation(&flat(1024)).unwrap().elevation.geometry().n_cells(), 1 << 20);
+    // 10 MB in some 10 kB.
+    let told = folder.refusal(&flat(1600));
+    assert!(told.starts_with("a.npz: elevation: expected at most 1048576 cells in a file of "), "{told}");
+    assert!(told.ends_with(" bytes, found shape [1600, 1600]"), "{told}");
+}
+
+#[test]
 fn a_hostile_npz_is_refused_without_being_believed() {
     let folder = Folder::new();
     let refuse = |descriptor: &str, shape: &str, data: &[u8]| {
@@ -178,16 +196,15 @@ fn a_hostile_npz_is_refused_without_being_believed() {
         folder.refusal(&raw_npz(&folder, &header, data))
     };
     // 4 TB by its header, 16 bytes in truth.
+    let told = refuse("<f4", "(1000000, 1000000)", &[0; 16]);
+    assert!(told.starts_with("a.npz: elevation: expected at most 1048576 cells in a file of "), "{told}");
+    assert!(told.ends_with(" bytes, found shape [1000000, 1000000]"), "{told}");
     assert_eq!(
-        refuse("<f4", "(1000000, 1000000)", &[0; 16]),
-        "a.npz: elevation: expected at most 67108864 cells, found shape [1000000, 1000000]"
-    );
-    assert_eq!(
-        refuse("<f4", "(8000, 8000)", &[0; 16]),
-        "a.npz: elevation: expected 256000000 bytes, found 16 bytes"
+        refuse("<f4", "(1000, 1000)", &[0; 16]),
+        "a.npz: elevation: expected 4000000 bytes, found 16 bytes"
     );
     assert_eq!(refuse("<f4", "(2, 2)", &[0; 20]), "a.npz: elevation: expected 16 bytes, found more bytes");
-    assert!(refuse("<f4", "(18446744073709551615, 2)", &[]).contains("expected at most 67108864 cells"));
+    assert!(refuse("<f4", "(18446744073709551615, 2)", &[]).contains("expected at most 1048576 cells"));
     assert!(refuse("<f4", "(-3, 2)", &[]).contains("expected a NumPy header with 'shape'"));
     assert_eq!(
         refuse("<U8", "(2, 2)", &[0; 128]),
