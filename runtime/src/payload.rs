@@ -95,6 +95,8 @@ pub fn risk_views<'a>(
 ) -> Option<(RiskMapView<'a>, CostToGoView<'a>)> {
     let geometry = header.grid.geometry()?;
     let n_yaws = (1..=YAWS_MAX).contains(&header.n_yaws).then_some(header.n_yaws as usize)?;
+    // Times are interpolated between cells: one row or column has nothing to interpolate between.
+    let geometry = Some(geometry).filter(|geometry| geometry.n_rows.min(geometry.n_cols) >= 2)?;
     let parts = RiskParts::new(&geometry, n_yaws);
     (parts.n_elements() == payload.len()).then(|| {
         let map =
@@ -180,7 +182,8 @@ pub(crate) fn check_surface(header: &SurfaceHeader, payload: &[[f32; 8]]) -> Res
     require(geometry.n_cells() == payload.len(), Refusal::Malformed)?;
     let at = header.odometry.odometry(header.odometry_at_ns);
     let shifts = header.jump_m.iter().chain(&header.shift_m);
-    require(Odometry::is_finite(&at) && shifts.clone().all(|m| m.is_finite()), Refusal::NonFinite)
+    require(Odometry::is_finite(&at) && shifts.clone().all(|m| m.is_finite()), Refusal::NonFinite)?;
+    require(header.grid.is_in_reach(&header.odometry.position_m), Refusal::Malformed)
 }
 
 pub(crate) fn check_risk(header: &RiskHeader, payload: &[[f32; 4]]) -> Result<(), Refusal> {

@@ -209,11 +209,11 @@ impl Life {
             return Some(format!("decisions {} to {}", self.pilot.cycle(), record.cycle));
         }
         let Source { epoch_ns, sequence } = record.odometry;
-        let first = (sequence + 1).checked_sub(record.n_odometry);
+        let first = sequence.checked_add(1).and_then(|next| next.checked_sub(record.n_odometry));
         let Some(first) = first.filter(|&first| first > 0 || record.n_odometry == 0) else {
             return Some(format!("odometry of before {sequence}, of another life of its publisher"));
         };
-        for sequence in first..first + record.n_odometry {
+        for sequence in first..=sequence {
             let Some((stamp, odometry)) = records.odometry.get(&Key { epoch_ns, sequence }) else {
                 return Some(format!("odometry {sequence}"));
             };

@@ -116,7 +116,7 @@ impl Timing {
         let before = self.last.replace((*stamp, *decision));
         // Over a restart, or a decision that was lost, nothing is known.
         let follows = |(of, before): &(Stamp, DecisionRecord)| {
-            of.epoch_ns == stamp.epoch_ns && before.cycle + 1 == decision.cycle
+            of.epoch_ns == stamp.epoch_ns && before.cycle.checked_add(1) == Some(decision.cycle)
         };
         if let Some((_, before)) = before.filter(follows) {
             self.pair(&before, decision);
@@ -134,7 +134,7 @@ impl Timing {
             n_decisions: self.n_decisions,
             n_drive: self.n_drive,
             period_ms,
-            n_missed: self.apart_ms.iter().map(missed).sum(),
+            n_missed: self.apart_ms.iter().map(missed).fold(0, u64::saturating_add),
             jitter: Percentiles::of(&self.jitter_ms),
             lateness: Percentiles::of(&self.lateness_ms),
             decision: Percentiles::of(&self.decision_ms),

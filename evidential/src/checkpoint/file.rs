@@ -9,9 +9,6 @@ use traversability::Bins;
 use super::{Checkpoint, Sidecar, Tensor};
 use crate::FeatureLayout;
 
-/// Patches with more rows or columns than this are no patches of a footprint.
-const PATCH_SIDE_MAX: usize = 1024;
-
 /// Why bytes are no checkpoint, or one that does not fit.
 #[derive(Debug, thiserror::Error)]
 pub enum CheckpointError {
@@ -77,14 +74,8 @@ impl Sidecar {
         require("format", &Self::FORMAT, &self.format)?;
         require("traction_bins", &Bins::TRACTION.values().to_vec(), &self.traction_bins)?;
         require("attitude_bins_rad", &Bins::ATTITUDE.values().to_vec(), &self.attitude_bins_rad)?;
-        for (name, patch) in [("height", self.layout.height_patch), ("cover", self.layout.cover_patch)] {
-            if patch.n_rows.max(patch.n_cols) > PATCH_SIDE_MAX {
-                return Err(CheckpointError::Mismatch {
-                    what: format!("layout, {name} patch"),
-                    expected: format!("at most {PATCH_SIDE_MAX} rows and columns"),
-                    found: format!("{} x {}", patch.n_rows, patch.n_cols),
-                });
-            }
+        if let Some((name, expected, found)) = self.layout.first_huge_patch() {
+            return Err(CheckpointError::Mismatch { what: format!("layout, {name} patch"), expected, found });
         }
         require_positive("layout, height_scale_m", &[self.layout.height_scale_m as f32])?;
         let n_features = self.layout.n_features();

@@ -172,7 +172,8 @@ impl<H: Header, T: Element> Inlet<H, T> {
         (self.check)(message.user_header(), message.payload())?;
         // Silence is no loss: only a publisher that goes on is asked for what lies between.
         if let Some(last) = self.leader.filter(|last| last.origin == origin) {
-            self.counts.lost += stamp.sequence.saturating_sub(last.stamp.sequence + 1);
+            let missing = stamp.sequence.saturating_sub(last.stamp.sequence.saturating_add(1));
+            self.counts.lost = self.counts.lost.saturating_add(missing);
         }
         self.leader = Some(Leader { origin, stamp, heard_at_ns: now_ns });
         Ok(())

@@ -43,6 +43,11 @@ impl From<&GridGeometry> for Grid {
 }
 
 impl Grid {
+    /// Whether a place lies where cells can lie; farther out, their numbers would not fit [m].
+    pub(crate) fn is_in_reach(&self, place_m: &[f64]) -> bool {
+        place_m.iter().all(|m| (m / self.resolution_m).abs() <= LATTICE_MAX as f64)
+    }
+
     /// The geometry, if it is one.
     pub fn geometry(&self) -> Option<GridGeometry> {
         let Self { resolution_m, origin, n_rows, n_cols } = *self;

@@ -5,6 +5,9 @@ use serde::{Deserialize, Serialize};
 /// Slope of the steepest ground that is still ground: the tangent of 70 degrees.
 const STEEPEST_GROUND: f64 = 2.747;
 
+/// Most cells of a window: beyond all that a vehicle looks over, and still in memory.
+const CELLS_MAX: usize = 1 << 22;
+
 /// How points become ground. Every length is in metres, every default is meant for a vehicle of 1 to 4 m
 /// with a spinning range sensor of 64 beams.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -14,7 +17,7 @@ pub struct ElevationConfig {
     pub resolution_m: f64,
     /// Rows of the window, > 0.
     pub n_rows: usize,
-    /// Columns of the window, > 0.
+    /// Columns of the window, > 0; at most 4,194,304 cells in all.
     pub n_cols: usize,
     /// The window follows the vehicle once it is this far from the centre along x or y [m]; infinite = never.
     pub recentre_m: f64,
@@ -139,6 +142,8 @@ impl ElevationConfig {
             ("publish_step_m", f64::from(self.publish_step_m)),
         ];
         check(&positive, "a finite number > 0", |v| v.is_finite() && v > 0.0)?;
+        let n_cells = self.n_rows.saturating_mul(self.n_cols);
+        check(&[("n_rows x n_cols", n_cells as f64)], "at most 4194304 cells", |n| n <= CELLS_MAX as f64)?;
         check(&not_negative, "a finite number >= 0", |v| v.is_finite() && v >= 0.0)?;
         check(&[("recentre_m", self.recentre_m)], "a number > 0, infinity allowed", |v| v > 0.0)
     }
