@@ -25,7 +25,7 @@ use traversability::RiskMapView;
 use raw::RawChannels;
 use watched_file::{Fault, WatchedFile};
 
-pub use messages::open_recording;
+pub use messages::{RecordedChannel, RecordedMessage, RecordingError, RecordingMessages, open_recording};
 pub use topics::DriveTopics;
 
 pub use read::{McapDriveLog, McapReadError, read_drive_log_mcap};

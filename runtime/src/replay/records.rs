@@ -2,15 +2,11 @@
 
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
-use std::fs::File;
-use std::io::BufReader;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use bytemuck::AnyBitPattern;
 use evidential::Checkpoint;
-use mcap::io::MessageReader;
-use mcap::sans_io::LinearReaderOptions;
 
 use crate::channel::Header;
 use crate::message::{
@@ -20,9 +16,6 @@ use crate::message::{
 use crate::online::hash_of;
 use crate::recorder::topic;
 use crate::setup::RecordedSetup;
-
-/// Longest record that is believed: far above what recorders write.
-const RECORD_BYTES_MAX: usize = 1 << 28;
 
 /// A message, by its publisher's life and its number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -84,11 +77,8 @@ impl Records {
 
     fn read_file(&mut self, path: &Path) -> Result<(), ReadError> {
         let file = path.display().to_string();
-        let source = File::open(path).map_err(|source| ReadError { file: file.clone(), source })?;
-        let options = LinearReaderOptions::default()
-            .with_record_length_limit(RECORD_BYTES_MAX)
-            .with_prevalidate_chunk_crcs(true);
-        for message in MessageReader::new_with_options(BufReader::new(source), options) {
+        let messages = formats::open_recording(path);
+        for message in messages.map_err(|source| ReadError { file: file.clone(), source })? {
             match message {
                 Ok(message) => {
                     if self.take(&message.channel.topic, &message.data).is_none() {
