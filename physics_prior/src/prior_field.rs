@@ -13,6 +13,9 @@ use crate::poses::{Judgement, Physics, Poses};
 use crate::tails::Tails;
 use crate::{Assumption, PriorBelief, PriorConfig, PriorConfigError, PriorMapError};
 
+/// Cells across a footprint beyond which nothing is judged in time.
+const FOOTPRINT_CELLS_MAX: f64 = 500.0;
+
 /// What the prior says of one pose, for whoever mixes it with something else.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PosePrior {
@@ -56,6 +59,11 @@ impl PriorField {
             risk_m: risk.resolution_m,
         })?;
         let (lengths, judgement) = judged(geometry, assumption)?;
+        let found = 2.0 * lengths.reach_m() / surface_resolution_m;
+        if found.is_nan() || found > FOOTPRINT_CELLS_MAX {
+            let (most, surface_m) = (FOOTPRINT_CELLS_MAX, surface_resolution_m);
+            return Err(PriorMapError::Footprint { most, surface_m, found });
+        }
         let poses = Poses::new(judgement, lengths, ratio, surface_resolution_m, &risk, n_yaws);
         Ok(Self { poses, window: risk, read_from: None })
     }

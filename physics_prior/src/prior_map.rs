@@ -49,6 +49,16 @@ pub enum PriorMapError {
         /// What came [m].
         found_m: f64,
     },
+    /// A vehicle that covers more cells than are judged in any time, or cells that are none for it.
+    #[error("footprint: expected at most {most} cells of {surface_m} m across, found {found:.0}")]
+    Footprint {
+        /// What would do.
+        most: f64,
+        /// Resolution of the surface [m].
+        surface_m: f64,
+        /// What it is.
+        found: f64,
+    },
     /// A map without yaws.
     #[error("number of yaw bins: expected at least 1, found 0")]
     NoYaws,
