@@ -8,6 +8,7 @@ mod untrained;
 use std::sync::Arc;
 
 use bicycle::Geometry;
+use bicycle::lanes::{Instructions, Isa};
 use evidential::{BeliefMap, Checkpoint, FeatureLayout, Learned, Predictor, Unfamiliar};
 use physics_prior::{Assumption, PriorMap};
 use rand::SeedableRng;
@@ -33,6 +34,8 @@ pub struct Request {
     pub n_updates: usize,
     /// Sizes of the networks; every one is measured.
     pub sizes: Vec<Sizes>,
+    /// Instruction set.
+    pub isa: Isa,
 }
 
 /// What was measured.
@@ -40,6 +43,8 @@ pub struct Request {
 pub struct Report {
     /// Threads that shared the work.
     pub threads: usize,
+    /// Instruction set that was used.
+    pub isa: Isa,
     /// Maps made of every network.
     pub updates: usize,
     /// Poses of a map: cells times yaws.
@@ -91,14 +96,16 @@ pub fn measure(request: &Request) -> Result<Report, BenchError> {
     if request.n_updates == 0 || request.sizes.is_empty() {
         return Err(BenchError::NoUpdates);
     }
+    let instructions = Instructions::find(request.isa).map_err(mppi::ConfigError::from)?;
     let pool = rayon::ThreadPoolBuilder::new().num_threads(request.n_threads).build()?;
     let geometry = formats::read_vehicle("rc_car")?.geometry;
     let networks = request.sizes.iter().map(|sizes| {
         let checkpoint = untrained(&geometry, "rc_car", sizes, SEED)?;
-        pool.install(|| measure_network(&geometry, checkpoint, sizes, request.n_updates))
+        pool.install(|| measure_network(&geometry, checkpoint, sizes, request.n_updates, instructions))
     });
     Ok(Report {
         threads: request.n_threads,
+        isa: instructions.isa(),
         updates: request.n_updates,
         poses: WINDOW.n_cells() * N_YAWS,
         changed_cells: CHANGED[0] * CHANGED[1],
@@ -111,10 +118,11 @@ fn measure_network(
     checkpoint: Checkpoint,
     sizes: &Sizes,
     n_updates: usize,
+    instructions: Instructions,
 ) -> Result<NetworkReport, BenchError> {
     let level = CvarLevel::new(CVAR_LEVEL)?;
     let assumption = Assumption::Physics { prior: checkpoint.sidecar.prior, level };
-    let predictor = Predictor::new(&checkpoint).map_err(evidential::BeliefMapError::from)?;
+    let predictor = Predictor::new(&checkpoint, instructions).map_err(evidential::BeliefMapError::from)?;
     let multiply_adds = checkpoint.sidecar.architecture.multiply_adds();
     let learned = Learned {
         checkpoint: Arc::new(checkpoint),
@@ -122,8 +130,9 @@ fn measure_network(
         obstacle_margin_m: 0.0,
         level,
     };
-    let mut prior = PriorMap::new(geometry, &assumption, WINDOW.resolution_m, WINDOW, N_YAWS)?;
-    let mut map = BeliefMap::new(geometry, &learned, WINDOW.resolution_m, WINDOW, N_YAWS)?;
+    let resolution_m = WINDOW.resolution_m;
+    let mut prior = PriorMap::new(geometry, &assumption, resolution_m, WINDOW, N_YAWS, instructions)?;
+    let mut map = BeliefMap::new(geometry, &learned, resolution_m, WINDOW, N_YAWS, instructions)?;
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(SEED);
     let mut ground = GridMap::filled(WINDOW, SurfaceCell::UNKNOWN);
     roughen(&mut ground, &CellRegion::whole(&WINDOW), &mut rng);
@@ -183,7 +192,8 @@ mod tests {
     #[test]
     fn the_work_is_what_it_says() {
         let sizes = Sizes { encoder_hidden: vec![8], n_latent: 4, ..Sizes::default() };
-        let report = measure(&Request { n_threads: 1, n_updates: 1, sizes: vec![sizes] }).unwrap();
+        let report =
+            measure(&Request { n_threads: 1, n_updates: 1, sizes: vec![sizes], isa: Isa::Auto }).unwrap();
         assert_eq!((report.threads, report.updates, report.poses), (1, 1, 81 * 96 * 13));
         let network = &report.networks[0];
         // 144 x 8 + 8 x 4, four heads of 32 x (4 + 12), 16 x (4 + 4), and 3 x 8 x 4 of the flow.
@@ -197,9 +207,9 @@ mod tests {
 
     #[test]
     fn nothing_to_measure_is_refused() {
-        let request = Request { n_threads: 1, n_updates: 0, sizes: vec![Sizes::default()] };
+        let request = Request { n_threads: 1, n_updates: 0, sizes: vec![Sizes::default()], isa: Isa::Auto };
         assert!(matches!(measure(&request), Err(BenchError::NoUpdates)));
-        let request = Request { n_threads: 1, n_updates: 1, sizes: Vec::new() };
+        let request = Request { n_threads: 1, n_updates: 1, sizes: Vec::new(), isa: Isa::Auto };
         assert!(matches!(measure(&request), Err(BenchError::NoUpdates)));
     }
 }

@@ -2,6 +2,7 @@
 
 use crate::stopwatch::timed_ms;
 use crate::{BenchError, Spread};
+use bicycle::lanes::{Instructions, Isa};
 use physics_prior::{Assumption, PriorConfig, PriorMap};
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -24,6 +25,8 @@ pub struct Request {
     pub n_threads: usize,
     /// Maps to make.
     pub n_updates: usize,
+    /// Instruction set.
+    pub isa: Isa,
 }
 
 /// What was measured.
@@ -31,6 +34,8 @@ pub struct Request {
 pub struct Report {
     /// Threads that shared the work.
     pub threads: usize,
+    /// Instruction set that was used.
+    pub isa: Isa,
     /// Maps made.
     pub updates: usize,
     /// Poses of a map: cells times yaws.
@@ -58,12 +63,14 @@ pub fn measure(request: Request) -> Result<Report, BenchError> {
     if request.n_updates == 0 {
         return Err(BenchError::NoUpdates);
     }
+    let instructions = Instructions::find(request.isa).map_err(mppi::ConfigError::from)?;
     let pool = rayon::ThreadPoolBuilder::new().num_threads(request.n_threads).build()?;
     let vehicle = formats::read_vehicle("rc_car")?;
     let prior = PriorConfig::for_vehicle(&vehicle.geometry);
     let level = CvarLevel::new(CVAR_LEVEL)?;
     let assumption = Assumption::Physics { prior, level };
-    let mut map = PriorMap::new(&vehicle.geometry, &assumption, WINDOW.resolution_m, WINDOW, N_YAWS)?;
+    let resolution_m = WINDOW.resolution_m;
+    let mut map = PriorMap::new(&vehicle.geometry, &assumption, resolution_m, WINDOW, N_YAWS, instructions)?;
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(SEED);
     let mut ground = GridMap::filled(WINDOW, SurfaceCell::UNKNOWN);
     roughen(&mut ground, &CellRegion::whole(&WINDOW), &mut rng);
@@ -83,6 +90,7 @@ pub fn measure(request: Request) -> Result<Report, BenchError> {
     }
     Ok(Report {
         threads: request.n_threads,
+        isa: instructions.isa(),
         updates: request.n_updates,
         poses: WINDOW.n_cells() * N_YAWS,
         changed_cells: CHANGED[0] * CHANGED[1],
@@ -120,8 +128,9 @@ mod tests {
 
     #[test]
     fn the_work_is_what_it_says() {
-        let report = measure(Request { n_threads: 1, n_updates: 2 }).unwrap();
+        let report = measure(Request { n_threads: 1, n_updates: 2, isa: Isa::Portable }).unwrap();
         assert_eq!((report.threads, report.updates, report.poses), (1, 2, 81 * 96 * 13));
+        assert_eq!(report.isa, Isa::Portable);
         let share = report.changed_cells as f64 / WINDOW.n_cells() as f64;
         assert!((share - 0.02).abs() < 2e-4, "{share}");
         for spread in [report.ms.full, report.ms.changed] {
@@ -131,7 +140,8 @@ mod tests {
 
     #[test]
     fn nothing_to_measure_is_refused() {
-        assert!(matches!(measure(Request { n_threads: 1, n_updates: 0 }), Err(BenchError::NoUpdates)));
+        let request = Request { n_threads: 1, n_updates: 0, isa: Isa::Auto };
+        assert!(matches!(measure(request), Err(BenchError::NoUpdates)));
     }
 
     #[test]

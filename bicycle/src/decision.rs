@@ -25,13 +25,15 @@ impl Decision {
 }
 
 /// Why the vehicle waits.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum HoldReason {
     /// Nothing of the ground is known yet.
     NoMap,
     /// The goal is reached.
     AtGoal,
+    /// Nobody has said where to go, or whoever did has said that it is over.
+    NoMission,
 }
 
 /// Why the vehicle must stop.
@@ -50,6 +52,14 @@ pub enum StopReason {
     NonFiniteResult,
     /// The pose lies outside the map.
     OutsideMap,
-    /// Whoever carries commands out has heard none for longer than their age limit.
+    /// What the last command was decided on is older than whoever carries it out may follow.
     StaleCommand,
+    /// Where to go has not been said again within its age limit.
+    StaleMission,
+    /// A measurement is finite and cannot be: farther, faster or turned more than any vehicle is.
+    InputOutOfRange,
+    /// Odometry is older than what has been taken in, or another of the same time.
+    InputOutOfOrder,
+    /// A measurement claims to be of a time that is still to come.
+    InputFromFuture,
 }

@@ -1,7 +1,7 @@
 //! The catalogue of effects: what a real machine does and the kinematic bicycle does not.
 //!
 //! An effect is one file: its id, what it is, its parameters with bounds and units, and how it changes a step.
-//! It acts at one or more [`Stage`]s of a step: on the command before the actuators follow it, on the
+//! It acts at one or more stages of a step: on the command before the actuators follow it, on the
 //! acceleration, on the motion before the ground takes its share, or on what the sensors say. Effects of a model
 //! act in the order in which the model lists them, and the same effect may stand there more than once: two
 //! lags in series are two lags. To add one, write the file and name it in [`catalogue!`] below.

@@ -2,11 +2,13 @@
 //!
 //! [`Scalar`] computes in f64 and is the reference; the packs compute in f32, one vehicle per lane.
 
+mod instructions;
 mod packs;
 mod polynomial;
 mod portable;
 mod scalar;
 
+pub use instructions::{Instructions, Isa, IsaAbsent};
 pub use portable::Portable;
 pub use scalar::Scalar;
 
@@ -63,7 +65,7 @@ pub trait Lanes: Copy + Send + Sync + 'static {
     fn min(self, a: Self::Value, b: Self::Value) -> Self::Value;
     /// Larger of both; `b` where either is NaN.
     fn max(self, a: Self::Value, b: Self::Value) -> Self::Value;
-    /// Square root; of a tiny or negative number, a small number >= 0; of NaN, NaN. Relative error below 1e-6.
+    /// Square root, rounded once; of a negative number, 0; of NaN, NaN.
     fn sqrt(self, a: Self::Value) -> Self::Value;
     /// An angle in turns brought to [-1/2, 1/2] by whole turns; |a| < 4 million. Of what is not finite, NaN.
     fn wrap_turns(self, a: Self::Value) -> Self::Value;

@@ -35,7 +35,11 @@ pub(crate) fn run_control(arguments: &BenchControlArguments) -> anyhow::Result<(
 pub(crate) fn run_prior_map(arguments: &BenchPriorMapArguments) -> anyhow::Result<()> {
     let json = arguments.json.as_deref();
     json.map_or(Ok(()), output::prepare_json)?;
-    let request = prior_map::Request { n_threads: arguments.n_threads(), n_updates: arguments.updates };
+    let request = prior_map::Request {
+        n_threads: arguments.n_threads(),
+        n_updates: arguments.updates,
+        isa: arguments.isa.into(),
+    };
     let report = prior_map::measure(request).map_err(told)?;
     show(&report, json)
 }
@@ -43,9 +47,7 @@ pub(crate) fn run_prior_map(arguments: &BenchPriorMapArguments) -> anyhow::Resul
 /// An instruction set that the machine lacks is the user's choice; all else is not.
 fn told(error: BenchError) -> anyhow::Error {
     match error {
-        BenchError::Controller(refused @ mppi::ConfigError::IsaAbsent { .. }) => {
-            UsageError::from_input(refused).into()
-        }
+        BenchError::Controller(refused @ mppi::ConfigError::Isa(_)) => UsageError::from_input(refused).into(),
         other => other.into(),
     }
 }

@@ -145,7 +145,7 @@ fn follow(
         {
             closed.episode.interrupt();
         }
-        if arguments.pace == Pace::Real {
+        if arguments.pace == Some(Pace::Real) {
             let due = began + Duration::from_secs_f64(closed.episode.time_s());
             std::thread::sleep(due.saturating_duration_since(Instant::now()));
         }
@@ -205,6 +205,9 @@ fn summarise(
         map_ms: Milliseconds::from_samples(&tally.map_ms),
         deadline_misses: tally.deadline_misses,
         stops: tally.stops.clone(),
+        localisation_jumps: closed.navigator.n_jumps(),
+        measurements_refused: closed.navigator.refused().clone(),
+        scans: *closed.navigator.scans(),
         seed: arguments.seed,
         vehicle: scene.vehicle.name.clone(),
         world: scene.task.world.name.clone(),

@@ -57,6 +57,13 @@ fn show(report: &ReplayReport) {
 fn verdict(report: &ReplayReport) -> Result<(), WorkFailed> {
     match &report.first_difference {
         Some(difference) => Err(WorkFailed(difference.clone())),
+        None if !report.contradictions.is_empty() => {
+            let n_more = report.contradictions.len() - 1;
+            Err(WorkFailed(format!("{}; {n_more} more such contradictions", report.contradictions[0])))
+        }
+        None if report.n_decisions == 0 => {
+            Err(WorkFailed("expected decisions to make again, found none in the recording".to_owned()))
+        }
         None if report.n_unmade > 0 => {
             let first = report.missing.first().map_or("", String::as_str);
             Err(WorkFailed(format!("{} decisions not made again, for want of {first}", report.n_unmade)))

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::fmt;
 
 use bicycle::StopReason;
+use navigator::ScanTally;
 use serde::{Deserialize, Serialize};
 
 use crate::WorkFailed;
@@ -62,6 +63,15 @@ pub struct Summary {
     pub deadline_misses: u64,
     /// Cycles in which the controller asked for a stop, by reason.
     pub stops: BTreeMap<StopReason, u64>,
+    /// How often the localisation corrected itself by a jump.
+    #[serde(default)]
+    pub localisation_jumps: u64,
+    /// Measurements that were refused, by reason.
+    #[serde(default)]
+    pub measurements_refused: BTreeMap<StopReason, u64>,
+    /// What became of the scans and their points.
+    #[serde(default)]
+    pub scans: ScanTally,
     /// Decides everything random.
     pub seed: u64,
     /// Name of the machine.
@@ -82,7 +92,7 @@ pub struct Summary {
     /// Share of the ground that was ever known that is unlike what the networks were trained on; null for a method
     /// that cannot tell.
     pub unfamiliar_share: Option<f64>,
-    /// Instruction set that the controller used.
+    /// Instruction set that maps and controller used.
     pub isa: String,
     /// Threads of the controller.
     pub threads: usize,
@@ -119,16 +129,15 @@ impl Summary {
             reason => format!("{}: {reason}", self.outcome),
         }
     }
+}
 
-    fn told_stops(&self) -> String {
-        let told: Vec<String> = self
-            .stops
-            .iter()
-            .filter(|(_, count)| **count > 0)
-            .map(|(reason, count)| format!("{} {count}x", name_of(*reason)))
-            .collect();
-        if told.is_empty() { "none".to_owned() } else { told.join(", ") }
-    }
+fn told_counts(counts: &BTreeMap<StopReason, u64>) -> String {
+    let told: Vec<String> = counts
+        .iter()
+        .filter(|(_, count)| **count > 0)
+        .map(|(reason, count)| format!("{} {count}x", name_of(*reason)))
+        .collect();
+    if told.is_empty() { "none".to_owned() } else { told.join(", ") }
 }
 
 /// A reason as it stands in the JSON, with spaces.
@@ -153,7 +162,9 @@ impl fmt::Display for Summary {
         row("control", told_milliseconds(self.control_ms))?;
         row("map", told_milliseconds(self.map_ms))?;
         row("cycles", format!("{}, {} too late", self.cycles, self.deadline_misses))?;
-        row("stops", self.told_stops())?;
+        row("stops", told_counts(&self.stops))?;
+        row("localisation", format!("{} jumps", self.localisation_jumps))?;
+        row("refused", told_counts(&self.measurements_refused))?;
         row("world", format!("{}, seed {}", self.world, self.seed))?;
         row("start", format!("{:.2},{:.2},{:.3}", self.start.x_m, self.start.y_m, self.start.yaw_rad))?;
         row("goal", format!("{:.2},{:.2}", self.goal.x_m, self.goal.y_m))?;
@@ -200,6 +211,9 @@ mod tests {
             map_ms: None,
             deadline_misses: 0,
             stops: BTreeMap::from([(StopReason::NoFeasibleRollout, 3), (StopReason::StaleScan, 0)]),
+            localisation_jumps: 2,
+            measurements_refused: BTreeMap::from([(StopReason::InputOutOfOrder, 5)]),
+            scans: ScanTally { fused: 40, blind: 1, ..ScanTally::default() },
             seed: 1,
             vehicle: "pietra_full_size".to_owned(),
             world: "rocks".to_owned(),

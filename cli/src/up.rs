@@ -9,15 +9,15 @@ use std::path::Path;
 use std::process::Command;
 
 use runtime::RuntimeError;
-use runtime::channel::{Bus, ChannelError};
+use runtime::channel::ChannelError;
 use runtime::status::Role;
 use runtime::supervisor::{RestartPolicy, RunEnd, RunReport, Supervisor};
 
-use crate::arguments::{MapSource, Method, UpArguments, UpRole};
+use crate::arguments::{MapSource, Method, Pace, UpArguments, UpRole};
 use crate::{UsageError, WorkFailed, failure, interrupt};
 
 pub(crate) fn run(arguments: &UpArguments) -> anyhow::Result<()> {
-    refuse_what_needs_one_process(arguments)?;
+    refuse_what_has_no_meaning(arguments)?;
     interrupt::catch_interrupts()?;
     match arguments.role.role() {
         Some(role) => {
@@ -29,15 +29,58 @@ pub(crate) fn run(arguments: &UpArguments) -> anyhow::Result<()> {
     }
 }
 
-/// Who knows the truth must sit in the plant's process; who follows a file of commands needs no processes.
+/// What would be ignored is refused instead.
+fn refuse_what_has_no_meaning(arguments: &UpArguments) -> Result<(), UsageError> {
+    arguments.drive.bush_height_m()?;
+    refuse_what_needs_one_process(arguments)?;
+    refuse_what_concerns_another_role(arguments)?;
+    match arguments.drive.threads {
+        Some(n @ 2..) if arguments.realtime => Err(UsageError(format!(
+            "--threads: expected 1 with --realtime, where control has one core of its own, found {n}"
+        ))),
+        _ => Ok(()),
+    }
+}
+
+/// Who knows the truth must sit in the plant's process; who follows a file of commands needs no processes; time that
+/// passes for several processes is that of the clock.
 fn refuse_what_needs_one_process(arguments: &UpArguments) -> Result<(), UsageError> {
     let refused = match (&arguments.drive.method, arguments.drive.map_source()) {
         (Some(Method::Truth), _) => "--method truth",
         (_, MapSource::Oracle) => "--oracle-map",
         _ if arguments.drive.commands.is_some() => "--commands",
+        _ if arguments.drive.pace == Some(Pace::Fast) => "--pace fast",
         _ => return Ok(()),
     };
     Err(UsageError(format!("{refused}: expected only with surefoot drive, found with surefoot up")))
+}
+
+/// Words that ask one role for something more. Processes that `--role all` starts are given them all.
+fn refuse_what_concerns_another_role(arguments: &UpArguments) -> Result<(), UsageError> {
+    let UpArguments { role, supervised, live, learn, validation, realtime, drive, .. } = arguments;
+    let asked = [
+        ("--live", live.is_some(), &[UpRole::Live][..]),
+        ("--learn", *learn, &[UpRole::Learning]),
+        ("--validation", validation.is_some(), &[UpRole::Learning]),
+        ("--json", drive.json.is_some(), &[UpRole::Plant]),
+        (
+            "--realtime",
+            *realtime,
+            &[UpRole::Plant, UpRole::Mapping, UpRole::Learning, UpRole::Control, UpRole::Recorder],
+        ),
+    ];
+    let is_ignored = |roles: &[UpRole]| !supervised && *role != UpRole::All && !roles.contains(role);
+    let Some((word, _, roles)) =
+        asked.into_iter().find(|(_, is_asked, roles)| *is_asked && is_ignored(roles))
+    else {
+        return Ok(());
+    };
+    let names: Vec<&str> = roles.iter().map(|role| role.name()).collect();
+    Err(UsageError(format!(
+        "{word}: expected only with --role all or {}, found with --role {}",
+        names.join(", "),
+        role.name()
+    )))
 }
 
 /// Whatever happens to a process, it says so in one line that names it.
@@ -49,13 +92,15 @@ fn tell_panics_in_one_line(role: Role) {
     }));
 }
 
-/// Too little shared memory is no fault that a restart would cure.
+/// Too little shared memory, or a folder that others may write into, is no fault that a restart would cure.
 fn refused(error: anyhow::Error) -> anyhow::Error {
-    let is_memory = |cause: &(dyn std::error::Error + 'static)| {
-        matches!(cause.downcast_ref(), Some(ChannelError::Memory { .. }))
-            || matches!(cause.downcast_ref(), Some(RuntimeError::Channel(ChannelError::Memory { .. })))
+    let is_lasting =
+        |error: &ChannelError| matches!(error, ChannelError::Memory { .. } | ChannelError::Folder { .. });
+    let is_refusal = |cause: &(dyn std::error::Error + 'static)| match cause.downcast_ref() {
+        Some(RuntimeError::Channel(error)) => is_lasting(error),
+        _ => cause.downcast_ref().is_some_and(is_lasting),
     };
-    if error.chain().any(is_memory) { UsageError(failure::one_line(&error)).into() } else { error }
+    if error.chain().any(is_refusal) { UsageError(failure::one_line(&error)).into() } else { error }
 }
 
 fn supervise(arguments: &UpArguments) -> anyhow::Result<()> {
@@ -70,7 +115,7 @@ fn supervise(arguments: &UpArguments) -> anyhow::Result<()> {
         command
     };
     let _live = arguments.live.map(|_| live::Viewer::start(&program, &words)).transpose()?;
-    let bus = Bus::join(&arguments.run)?;
+    let bus = roles::join(arguments)?;
     let mut supervisor = Supervisor::new(&bus, &Role::ALL, RestartPolicy::default(), &command)?;
     let end = supervisor.run(&interrupt::interrupted, &mut |lines, mission| {
         if let Some(mission) = mission {

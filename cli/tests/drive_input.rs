@@ -2,16 +2,24 @@
 
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
+mod ground;
+
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use tempfile::TempDir;
-use terrain::{Cell, GridMap};
 
-const TERRAIN: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/data/terrain/");
-
-fn terrain_file(name: &str) -> String {
-    format!("{TERRAIN}{name}")
+/// A terrace of 18 m above a plain, both level, with 42 degrees between them from 70 to 90 m east, from border to
+/// border; on the plain a pond from (20, 80) to (35, 95) m. The file, in a folder that lives as long as the first value.
+fn terrace() -> (TempDir, String) {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("terrace.npz");
+    let height_m = |x: f64, _: f64| 0.9 * (x - 70.0).clamp(0.0, 20.0);
+    let is_pond = |x: f64, y: f64| (20.0..35.0).contains(&x) && (80.0..95.0).contains(&y);
+    let water = |x: f64, y: f64| f64::from(is_pond(x, y));
+    ground::write(&path, 120, &[("elevation", &height_m), ("water", &water)]);
+    let path = path.to_str().unwrap().to_owned();
+    (folder, path)
 }
 
 /// Drives with `--out` in a fresh folder, expects a refusal that holds every part, and that no output folder is made.
@@ -52,6 +60,28 @@ fn files_that_are_not_there_are_named() {
     }
 }
 
+/// Who carries out commands does not plan: what says how to plan would be ignored.
+#[test]
+fn words_of_planning_are_refused_with_commands() {
+    for words in [
+        &["--goal", "9,5"][..],
+        &["--method", "physics"],
+        &["--weights", "nets"],
+        &["--model", "model.toml"],
+        &["--alpha", "0.2"],
+        &["--config", "config.toml"],
+        &["--oracle-map"],
+        &["--threads", "2"],
+        &["--isa", "portable"],
+    ] {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_surefoot"));
+        let output = command.args(["drive", "--commands", "/nowhere.csv"]).args(words).output().unwrap();
+        let told = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(2), "{words:?}: {told}");
+        assert!(told.contains("--commands") && told.contains(words[0]), "{words:?}: {told}");
+    }
+}
+
 #[test]
 fn vehicle_that_cannot_be_is_named_by_line_and_field() {
     let text = formats::shipped_vehicle_text("rc_car").unwrap();
@@ -88,7 +118,8 @@ fn settings_that_cannot_be_are_named_with_their_file() {
 
 #[test]
 fn truncated_world_is_named() {
-    let whole = std::fs::read(terrain_file("bijou_gully_5m.npz")).unwrap();
+    let (_terrace, path) = terrace();
+    let whole = std::fs::read(path).unwrap();
     for n_bytes in [0, 100, whole.len() / 2, whole.len() - 1] {
         let (_folder, path) = file("half.npz", &whole[..n_bytes]);
         assert_refused(&["--world", path.to_str().unwrap()], &["half.npz: ", "expected", "found"]);
@@ -100,60 +131,28 @@ fn ends_outside_the_map_are_refused_with_the_maps_corners() {
     let map = "expected a point of the map from (";
     assert_refused(&["--start", "10,10,0", "--goal", "99,5"], &["goal: ", map, "found (99.0, 5.0) m"]);
     assert_refused(&["--start", "-3,10,0", "--goal", "9,5"], &["start: ", map, "found (-3.0, 10.0) m"]);
-    let bijou = terrain_file("bijou_gully_5m.npz");
-    assert_refused(&["--world", &bijou, "--goal", "9999,5"], &["goal: ", map, "found (9999.0, 5.0) m"]);
-}
-
-/// First cell with this and its neighbours in both directions, two each, as `is_wanted`; its centre [m].
-fn place(map: &GridMap<f32>, is_wanted: impl Fn(f32) -> bool) -> [f64; 2] {
-    let geometry = map.geometry();
-    let near = |at: usize| at - 2..=at + 2;
-    let found =
-        (20..geometry.n_rows - 20).flat_map(|row| (20..geometry.n_cols - 20).map(move |col| (row, col)));
-    let all_around = |&(row, col): &(usize, usize)| {
-        near(row).all(|row| near(col).all(|col| is_wanted(map[Cell { row, col }])))
-    };
-    let (row, col) = found.into_iter().find(all_around).unwrap();
-    geometry.centre_m(Cell { row, col })
+    let (_folder, path) = terrace();
+    assert_refused(&["--world", &path, "--goal", "9999,5"], &["goal: ", map, "found (9999.0, 5.0) m"]);
 }
 
 #[test]
-fn start_in_the_lake_is_refused() {
-    let path = terrain_file("lidr_topography.npz");
-    let world = formats::read_elevation(Path::new(&path)).unwrap();
-    let [x_m, y_m] = place(&world.layers.water.unwrap(), |share| share > 0.0);
-    let start = format!("{x_m},{y_m},0");
-    assert_refused(
-        &["--world", &path, "--start", &start],
-        &["start: expected free ground, found an obstacle"],
-    );
+fn start_in_water_is_refused() {
+    let (_folder, path) = terrace();
+    let parts = ["start: expected free ground, found an obstacle"];
+    assert_refused(&["--world", &path, "--start", "27,88,0"], &parts);
 }
 
 #[test]
 fn start_on_a_slope_beyond_the_limits_is_refused_with_its_angle() {
-    let path = terrain_file("bijou_gully_5m.npz");
-    let heights = formats::read_elevation(Path::new(&path)).unwrap().elevation;
-    let geometry = *heights.geometry();
-    // Central differences over 10 m: where they say 35 degrees or more, no heading up or down keeps 30 degrees.
-    let rise = |row: usize, col: usize| {
-        let at = |row, col| f64::from(heights[Cell { row, col }]);
-        let span_m = 2.0 * geometry.resolution_m;
-        [(at(row, col + 1) - at(row, col - 1)) / span_m, (at(row + 1, col) - at(row - 1, col)) / span_m]
-    };
-    let inner =
-        (10..geometry.n_rows - 10).flat_map(|row| (10..geometry.n_cols - 10).map(move |col| (row, col)));
-    let steep = |&(row, col): &(usize, usize)| rise(row, col)[0].hypot(rise(row, col)[1]);
-    let (row, col) = inner.max_by(|a, b| steep(a).total_cmp(&steep(b))).unwrap();
-    assert!(steep(&(row, col)).atan().to_degrees() > 35.0, "the gully has walls");
-    let ([east, north], [x_m, y_m]) = (rise(row, col), geometry.centre_m(Cell { row, col }));
-    let start = format!("{x_m},{y_m},{}", north.atan2(east));
-    let parts = ["start: expected roll and pitch up to 27 and 27 degrees, found "];
-    assert_refused(&["--world", &path, "--start", &start], &parts);
+    let (_folder, path) = terrace();
+    let parts = ["start: expected roll and pitch up to 27 and 27 degrees, found 0.0 and 4"];
+    assert_refused(&["--world", &path, "--start", "80,40,0"], &parts);
 }
 
 #[test]
 fn goal_without_a_way_to_it_is_refused() {
-    let words = ["--world", &terrain_file("bijou_gully_5m.npz"), "--start", "200,200,0", "--goal", "240,200"];
+    let (_folder, path) = terrace();
+    let words = ["--world", &path, "--start", "40,40,0", "--goal", "105,40"];
     assert_refused(&words, &["goal: expected a way from the start", "found none"]);
 }
 

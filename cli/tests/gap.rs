@@ -1,4 +1,5 @@
-//! `surefoot gap diagnose` and `apply` from the outside: a labelled case, what is written, and what is refused.
+//! `surefoot gap diagnose` and `apply` from the outside: a case whose cause is known, what is written, and what is
+//! refused.
 
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
@@ -8,15 +9,75 @@ use std::process::{Command, Output, Stdio};
 use std::sync::LazyLock;
 
 use bicycle::{Column, DriveLog};
+use formats::{DriveLogFile, GapGround, GapNoise, GapVehicle};
+use scenarios::{Deviation, Style, TestMachine, World, test_drive};
 use sim_to_real::Answer;
+use terrain::TerrainClass;
 
-const OPEN: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/gap/open/");
-/// Steering lag of 0.35 s in a third-party multi-body plant.
-const CASE: &str = "cases/open_10";
-const VEHICLE: &str = "vehicles/veh_d";
+/// By this the servo of the robot answers later than that of its simulator [s].
+const LATE_S: f64 = 0.35;
 
-fn open(path: &str) -> String {
-    format!("{OPEN}{path}")
+/// A machine on its hills, nominal drives of the rigid-body plant, and drives of it with a late servo, as files.
+static DRIVES: LazyLock<tempfile::TempDir> = LazyLock::new(|| {
+    let folder = tempfile::tempdir().unwrap();
+    let machine = TestMachine::draw(&formats::read_vehicle("sedan").unwrap(), "machine", 4).unwrap();
+    formats::write_gap_vehicle(folder.path(), &described(&machine)).unwrap();
+    let late = [Deviation::SteeringResponse { added_s: LATE_S }];
+    let drives: [(&str, &[Deviation]); 5] = [
+        ("sim_1.csv", &[]),
+        ("sim_2.csv", &[]),
+        ("real_train_1.csv", &late),
+        ("real_heldout.csv", &late),
+        ("real_sound.csv", &[]),
+    ];
+    for (seed, (file, deviations)) in drives.into_iter().enumerate() {
+        let log = test_drive(&machine, deviations, Style::Rich, seed as u64).unwrap();
+        let file = folder.path().join(file);
+        formats::write_drive_log_csv(&file, &DriveLogFile { log, other_columns: Vec::new() }).unwrap();
+    }
+    folder
+});
+
+/// What the owner of the simulator would say of the machine.
+fn described(machine: &TestMachine) -> GapVehicle {
+    let sensors = &machine.sensors;
+    GapVehicle {
+        name: machine.vehicle.name.clone(),
+        wheelbase_m: machine.vehicle.geometry.wheelbase_m,
+        steering_max_rad: Some(machine.steering_max_rad),
+        speed_max_mps: Some(machine.speeds_mps[1]),
+        noise: GapNoise {
+            x: Some(sensors.position_noise_m),
+            y: Some(sensors.position_noise_m),
+            yaw: Some(sensors.attitude_noise_rad),
+            vx: Some(sensors.velocity_noise_mps),
+            wz: Some(sensors.yaw_rate_noise_radps),
+        },
+        ground: Some(ground(&machine.world)),
+    }
+}
+
+/// The hills with a node at every cell's centre, columns of the world as rows.
+fn ground(world: &World) -> GapGround {
+    let geometry = *world.geometry();
+    let [n_east, n_north] = [geometry.n_cols, geometry.n_rows];
+    let cells: Vec<usize> = (0..n_east * n_north).map(|k| k % n_north * n_east + k / n_north).collect();
+    let class = |cell: &usize| match world.patches.values()[*cell].class {
+        TerrainClass::Open | TerrainClass::Obstacle => 0,
+        TerrainClass::Loose => 1,
+        TerrainClass::Vegetation => 2,
+    };
+    GapGround {
+        origin_m: geometry.centre_m(geometry.cell(0)),
+        resolution_m: geometry.resolution_m,
+        n_nodes: [n_east, n_north],
+        height_m: cells.iter().map(|&cell| world.heights.values()[cell]).collect(),
+        class: cells.iter().map(class).collect(),
+    }
+}
+
+fn drive(file: &str) -> String {
+    DRIVES.path().join(file).to_str().unwrap().to_owned()
 }
 
 fn surefoot(folder: &Path, words: &[&str]) -> Output {
@@ -48,15 +109,13 @@ fn names(folder: &Path) -> Vec<String> {
     names
 }
 
-/// Two nominal drives and one real one of the labelled case, so that a calibration takes seconds.
+/// A case of two nominal drives and one real one.
 fn write_case(folder: &Path, name: &str, heldout: &str) -> String {
-    let list =
-        |names: &[&str]| names.iter().map(|name| format!("'{}'", open(name))).collect::<Vec<_>>().join(", ");
-    let sim = list(&["vehicles/veh_d/sim_1.csv", "vehicles/veh_d/sim_2.csv"]);
-    let (vehicle, real) =
-        (open(&format!("{VEHICLE}/vehicle.toml")), list(&["cases/open_10/real_train_1.csv"]));
+    let [vehicle, first, second, real] =
+        ["vehicle.toml", "sim_1.csv", "sim_2.csv", "real_train_1.csv"].map(drive);
     let text = format!(
-        "name = '{name}'\nvehicle = '{vehicle}'\nsim = [{sim}]\nreal = [{real}]\nheldout = ['{heldout}']\n"
+        "name = '{name}'\nvehicle = '{vehicle}'\nsim = ['{first}', '{second}']\nreal = ['{real}']\n\
+         heldout = ['{heldout}']\n"
     );
     let path = folder.join(format!("{name}.toml"));
     fs::write(&path, text).unwrap();
@@ -66,7 +125,7 @@ fn write_case(folder: &Path, name: &str, heldout: &str) -> String {
 /// Keeps the calibration of [`write_case`]'s nominal drives for all tests.
 static CACHE: LazyLock<tempfile::TempDir> = LazyLock::new(|| {
     let folder = tempfile::tempdir().unwrap();
-    let case = write_case(folder.path(), "first", &open(&format!("{CASE}/real_heldout.csv")));
+    let case = write_case(folder.path(), "first", &drive("real_heldout.csv"));
     succeed(folder.path(), &["diagnose", &case, "--json", "a.json", "--baseline-cache", "cache"]);
     folder
 });
@@ -93,10 +152,10 @@ fn position_error_2s_m(predictions: &str, drive: &DriveLog, model: &str) -> f64 
 }
 
 #[test]
-fn a_labelled_case_is_diagnosed_verified_written_and_applied() {
+fn a_case_is_diagnosed_verified_written_and_applied() {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name);
-    let case = write_case(folder.path(), "late", &open(&format!("{CASE}/real_heldout.csv")));
+    let case = write_case(folder.path(), "late", &drive("real_heldout.csv"));
     let words = [
         "diagnose",
         &case,
@@ -114,7 +173,7 @@ fn a_labelled_case_is_diagnosed_verified_written_and_applied() {
     assert_eq!(answer.case, "late");
     assert_eq!(answer.effects[0].id, "steer_lag", "{:?}", answer.effects);
     let lag = answer.effects[0].parameters["time_constant_s"];
-    assert!((lag.value - 0.35).abs() < 0.07 && lag.low <= lag.value && lag.value <= lag.high, "{lag:?}");
+    assert!((lag.value - LATE_S).abs() < 0.07 && lag.low <= lag.value && lag.value <= lag.high, "{lag:?}");
     assert!(
         told.contains("The gap comes from steer_lag") && told.contains("position error after 2 s"),
         "{told}"
@@ -137,11 +196,11 @@ fn a_labelled_case_is_diagnosed_verified_written_and_applied() {
     assert_eq!(html.matches("data:image/png;base64,").count(), pictures.len());
     assert_eq!(names(Path::new(&cache())).len(), 1, "calibrated once");
 
-    let drive = formats::read_drive(Path::new(&open(&format!("{CASE}/real_heldout.csv")))).unwrap().log;
+    let heldout = formats::read_drive(Path::new(&drive("real_heldout.csv"))).unwrap().log;
     let predictions = fs::read_to_string(path("p.csv")).unwrap();
     let told = answer.shrink.position_error_2s_m.unwrap();
     for (model, told) in [("nominal", told.before), ("repaired", told.after)] {
-        let found = position_error_2s_m(&predictions, &drive, model);
+        let found = position_error_2s_m(&predictions, &heldout, model);
         assert!((found / told - 1.0).abs() < 0.01, "{model}: {found} against {told}");
     }
 
@@ -159,8 +218,8 @@ fn the_prediction_stands_before_the_held_out_drives_are_opened() {
         surefoot(folder.path(), &["diagnose", &case, "--out", out, "--baseline-cache", &cache()])
     };
     let file = |name: &str| fs::read(folder.path().join(name)).unwrap();
-    assert!(run(&open("cases/open_10/real_heldout.csv"), "one").status.success());
-    assert!(run(&open("cases/open_01/real_heldout.csv"), "two").status.success());
+    assert!(run(&drive("real_heldout.csv"), "one").status.success());
+    assert!(run(&drive("real_sound.csv"), "two").status.success());
     assert_eq!(file("one/prediction.json"), file("two/prediction.json"));
     assert_ne!(file("one/answer.json"), file("two/answer.json"));
     // A held-out drive that nobody can read does not keep the prediction from standing.
@@ -169,15 +228,14 @@ fn the_prediction_stands_before_the_held_out_drives_are_opened() {
     assert_eq!(file("one/prediction.json"), file("three/prediction.json"));
     assert!(!folder.path().join("three/answer.json").exists());
     // Under another name the same drive is still one that was used before.
-    fs::copy(open("cases/open_10/real_train_1.csv"), folder.path().join("copy.csv")).unwrap();
+    fs::copy(drive("real_train_1.csv"), folder.path().join("copy.csv")).unwrap();
     let told = String::from_utf8(run("copy.csv", "four").stderr).unwrap();
     assert!(told.contains("copy.csv: expected a drive not used before, found the drive of"), "{told}");
 }
 
 /// A real drive of the case with a column changed, as a file.
 fn changed(folder: &Path, name: &str, column: Column, change: impl Fn(f64) -> f64) -> PathBuf {
-    let mut file =
-        formats::read_drive_log_csv(Path::new(&open(&format!("{CASE}/real_train_1.csv")))).unwrap();
+    let mut file = formats::read_drive_log_csv(Path::new(&drive("real_train_1.csv"))).unwrap();
     let mut log = DriveLog::default();
     for run in file.log.runs() {
         for row in run.drive_rows() {
@@ -193,8 +251,8 @@ fn changed(folder: &Path, name: &str, column: Column, change: impl Fn(f64) -> f6
 #[test]
 fn drives_that_would_be_misread_are_refused_with_the_suspicion() {
     let folder = tempfile::tempdir().unwrap();
-    let vehicle = open(&format!("{VEHICLE}/vehicle.toml"));
-    let sim = open(&format!("{VEHICLE}/sim_1.csv"));
+    let vehicle = drive("vehicle.toml");
+    let sim = drive("sim_1.csv");
     let diagnose = |real: &str| {
         let words = ["diagnose", "--vehicle", &vehicle, "--sim", &sim, "--real", real, "--json", "a.json"];
         refuse(folder.path(), &words)
@@ -204,8 +262,8 @@ fn drives_that_would_be_misread_are_refused_with_the_suspicion() {
     changed(folder.path(), "steer.csv", Column::CmdSteer, degrees);
     changed(folder.path(), "mirrored.csv", Column::CmdSteer, |angle| -angle);
     changed(folder.path(), "kmh.csv", Column::Vx, |speed| 3.6 * speed);
-    changed(folder.path(), "nan.csv", Column::Wz, |rate| if rate > 0.3 { f64::NAN } else { rate });
-    let text = fs::read_to_string(open(&format!("{CASE}/real_train_1.csv"))).unwrap();
+    changed(folder.path(), "nan.csv", Column::Wz, |rate| if rate > 0.1 { f64::NAN } else { rate });
+    let text = fs::read_to_string(drive("real_train_1.csv")).unwrap();
     let lines: Vec<&str> = text.lines().collect();
     fs::write(folder.path().join("short.csv"), lines[..101].join("\n")).unwrap();
     let backwards = [&lines[..1000], &lines[500..600]].concat().join("\n");
@@ -230,10 +288,12 @@ fn drives_that_would_be_misread_are_refused_with_the_suspicion() {
 #[test]
 fn what_cannot_be_asked_is_refused() {
     let folder = tempfile::tempdir().unwrap();
+    write_case(folder.path(), "case", &drive("real_heldout.csv"));
+    let case = folder.path().to_str().unwrap();
     let cases: [(&[&str], &str); 6] = [
         (&["diagnose"], "CASE"),
         (&["diagnose", "nowhere"], "nowhere: expected a readable text file"),
-        (&["diagnose", &open(CASE), "--real", "a.csv"], "cannot be used with"),
+        (&["diagnose", case, "--real", "a.csv"], "cannot be used with"),
         (
             &["apply", "none.json", "--model", "rc_car", "--out", "m.toml"],
             "none.json: expected a readable file",
@@ -244,19 +304,19 @@ fn what_cannot_be_asked_is_refused() {
                 "--vehicle",
                 "sedan",
                 "--sim",
-                &open(&format!("{CASE}/real_heldout.csv")),
+                &drive("real_heldout.csv"),
                 "--real",
-                &open(&format!("{VEHICLE}/sim_1.csv")),
+                &drive("sim_1.csv"),
             ],
             "found them swapped?",
         ),
-        (&["diagnose", &open(CASE), "--json", "."], "--json: expected a file, found the folder"),
+        (&["diagnose", case, "--json", "."], "--json: expected a file, found the folder"),
     ];
     for (words, expected) in cases {
         let told = refuse(folder.path(), words);
         assert!(told.contains(expected), "{told}");
     }
-    assert!(names(folder.path()).iter().all(|name| name == "surefoot-out"));
+    assert!(names(folder.path()).iter().all(|name| name == "surefoot-out" || name == "case.toml"));
 }
 
 /// Whether a file is as its writer meant it to end.
@@ -276,7 +336,7 @@ fn is_whole(path: &Path) -> bool {
 #[test]
 fn an_interrupted_run_leaves_nothing_half_written() {
     let folder = tempfile::tempdir().unwrap();
-    let case = write_case(folder.path(), "late", &open(&format!("{CASE}/real_heldout.csv")));
+    let case = write_case(folder.path(), "late", &drive("real_heldout.csv"));
     let kept = cache();
     let words = |cache: &'static str| {
         let cache = if cache.is_empty() { kept.clone() } else { cache.to_owned() };

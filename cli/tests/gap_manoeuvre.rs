@@ -66,7 +66,7 @@ fn dull(phase: f64) -> impl Fn(f64) -> [f64; 2] {
 /// Drives commands on the plant and gives the recording.
 fn drive(folder: &Path, commands: &str, out: &str, deviation: &[&str]) -> String {
     let words = ["drive", "--world", "flat.npz", "--vehicle", "car.toml", "--start", "80,80,0"];
-    let files = ["--commands", commands, "--out", out, "--threads", "1"];
+    let files = ["--commands", commands, "--out", out];
     surefoot(folder, &[&words[..], &files, deviation].concat());
     format!("{out}/drive.mcap")
 }

@@ -25,6 +25,7 @@ fn read(path: &Path) -> DriveLog {
 }
 
 #[test]
+#[ignore = "needs the shared data"]
 fn five_real_vehicles_are_not_refused() {
     let vehicles = [
         ("drive_warthog", 1.08),
@@ -62,6 +63,7 @@ fn case_machine(path: &Path) -> Machine {
 }
 
 #[test]
+#[ignore = "needs the shared data"]
 fn labelled_drives_are_not_suspected() {
     let mut folders: Vec<PathBuf> = Path::new(SHARED)
         .join("gap/open/cases")

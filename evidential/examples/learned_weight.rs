@@ -6,6 +6,7 @@
 use std::error::Error;
 use std::sync::Arc;
 
+use bicycle::lanes::Instructions;
 use evidential::{BeliefMap, Learned, Method, PARAMETER_NAMES, Unfamiliar, shipped};
 use terrain::{GridGeometry, GridMap, SurfaceCell, TerrainClass};
 use traversability::CvarLevel;
@@ -28,7 +29,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     });
     let surface =
         GridMap::from_values(geometry, cells.collect()).ok_or("expected one value for every cell")?;
-    let mut map = BeliefMap::new(&vehicle, &learned, 0.2, geometry, 4)?;
+    let mut map = BeliefMap::new(&vehicle, &learned, 0.2, geometry, 4, Instructions::widest())?;
     map.update_all(&surface)?;
 
     let share = |name: &str, x_m: f64| {

@@ -74,6 +74,6 @@ impl Architecture {
 
     /// Logarithm of the certainty budget N of equation 10, that of a normal distribution: H log(4 pi) / 2.
     pub fn log_budget(&self) -> f64 {
-        0.5 * self.n_latent as f64 * (4.0 * std::f64::consts::PI).ln()
+        0.5 * self.n_latent as f64 * libm::log(4.0 * std::f64::consts::PI)
     }
 }

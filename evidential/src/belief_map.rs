@@ -10,6 +10,7 @@ mod row_task;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use bicycle::Geometry;
+use bicycle::lanes::Instructions;
 use physics_prior::{Assumption, PriorConfig, PriorField, PriorMapError};
 use rayon::prelude::*;
 use terrain::{CellRegion, GridGeometry, GridMap, SurfaceCell};
@@ -105,6 +106,7 @@ struct BeliefLayers {
     layout: FeatureLayout,
     predictor: Predictor,
     fusion: Fusion,
+    instructions: Instructions,
 }
 
 /// How prediction and prior become a risk.
@@ -144,7 +146,8 @@ const TASK_LANES: usize = 1024;
 impl BeliefMap {
     /// A map in the window `risk` for surfaces of the given resolution; [`Risk::OUTSIDE`] until it is updated.
     ///
-    /// `geometry` comes from a vehicle that passed [`bicycle::Vehicle::validate`].
+    /// `geometry` comes from a vehicle that passed [`bicycle::Vehicle::validate`]. Instruction sets differ in the
+    /// rounding of the networks' sums.
     ///
     /// # Errors
     /// The checkpoint is broken or of another vehicle, cannot do what is asked of it, or the grids do not line up.
@@ -154,18 +157,19 @@ impl BeliefMap {
         surface_resolution_m: f64,
         risk: GridGeometry,
         n_yaws: usize,
+        instructions: Instructions,
     ) -> Result<Self, BeliefMapError> {
         let sidecar = &learned.checkpoint.sidecar;
         let method = sidecar.method.name();
         let fits = learned.checkpoint.check_vehicle(geometry);
         fits.map_err(|mismatch| BeliefMapError::Vehicle { method, mismatch })?;
-        let predictor = Predictor::new(&learned.checkpoint)?;
+        let predictor = Predictor::new(&learned.checkpoint, instructions)?;
         if learned.unfamiliar == Unfamiliar::Avoid && sidecar.density.is_none() {
             return Err(BeliefMapError::NoDensity { method });
         }
         let prior = PriorConfig { obstacle_margin_m: learned.obstacle_margin_m, ..sidecar.prior };
         let assumption = Assumption::Physics { prior, level: learned.level };
-        let field = PriorField::new(geometry, &assumption, surface_resolution_m, risk, n_yaws)?;
+        let field = PriorField::new(geometry, &assumption, surface_resolution_m, risk, n_yaws, instructions)?;
         let fusion = Fusion {
             prior: sidecar.method.prior(),
             prior_evidence: prior.evidence as f32,
@@ -174,7 +178,13 @@ impl BeliefMap {
             per_level: learned.level.reciprocal(),
             uniform: PartialMoments::uniform(),
         };
-        let layers = BeliefLayers::new(field, predictor, fusion, (learned, surface_resolution_m, n_yaws));
+        let layers = BeliefLayers::new(
+            field,
+            predictor,
+            fusion,
+            (learned, surface_resolution_m, n_yaws),
+            instructions,
+        );
         Ok(Self { layers, map: RiskMap::constant(risk, n_yaws, Risk::OUTSIDE), scratches: Vec::new() })
     }
 
@@ -304,6 +314,7 @@ impl BeliefLayers {
         predictor: Predictor,
         fusion: Fusion,
         (learned, resolution_m, n_yaws): (&Learned, f64, usize),
+        instructions: Instructions,
     ) -> Self {
         let layout = learned.checkpoint.sidecar.layout;
         let ratio = field.ratio();
@@ -326,7 +337,8 @@ impl BeliefLayers {
         }
         let window = GridGeometry { resolution_m, ..*field.window() };
         let ground = PatchGround::unknown(window, ratio, layout.height_scale_m);
-        let mut layers = Self { field, ground, stencils, n_yaws, reach, layout, predictor, fusion };
+        let mut layers =
+            Self { field, ground, stencils, n_yaws, reach, layout, predictor, fusion, instructions };
         layers.place_ground();
         layers
     }

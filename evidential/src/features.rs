@@ -22,6 +22,8 @@ pub struct FeatureLayout {
     pub height_scale_m: f64,
 }
 
+/// Patches with more rows or columns than this are no patches of a footprint.
+const PATCH_SIDE_MAX: usize = 1024;
 /// Features per sample of the cover patch.
 const N_COVER: usize = 4;
 /// Samples across the vehicle of the fine and of the cover patch.
@@ -46,6 +48,15 @@ impl FeatureLayout {
             cover_patch: patch(ROWS[1], COLS[1]),
             height_scale_m: geometry.wheel_radius_m,
         }
+    }
+
+    /// The first patch that is none of a footprint: its name, what would do, its size.
+    pub(crate) fn first_huge_patch(&self) -> Option<(&'static str, String, String)> {
+        let patches = [("height", self.height_patch), ("cover", self.cover_patch)];
+        let (name, patch) =
+            patches.into_iter().find(|(_, patch)| patch.n_rows.max(patch.n_cols) > PATCH_SIDE_MAX)?;
+        let expected = format!("at most {PATCH_SIDE_MAX} rows and columns");
+        Some((name, expected, format!("{} x {}", patch.n_rows, patch.n_cols)))
     }
 
     /// Number of features.

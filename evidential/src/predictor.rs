@@ -12,6 +12,7 @@ mod tensors;
 #[cfg(test)]
 mod tests;
 
+use bicycle::lanes::Instructions;
 use pulp::Simd;
 use traversability::{N_BINS, Pmf};
 
@@ -86,19 +87,20 @@ pub struct Evidence {
 pub struct Predictor {
     network: Network,
     n_features: usize,
+    instructions: Instructions,
 }
 
 impl Predictor {
-    /// Packs the networks of a checkpoint.
+    /// Packs the networks of a checkpoint, to be run with these instructions.
     ///
     /// # Errors
     /// What [`Checkpoint::new`] refuses, and weights so large that sums could overflow.
-    pub fn new(checkpoint: &Checkpoint) -> Result<Self, PredictorError> {
+    pub fn new(checkpoint: &Checkpoint, instructions: Instructions) -> Result<Self, PredictorError> {
         // The fields of a checkpoint are open, so it may have changed since it was made.
         Checkpoint::new(checkpoint.sidecar.clone(), checkpoint.tensors.clone())?;
         let network = Network::new(checkpoint)?;
         check_magnitude(checkpoint)?;
-        Ok(Self { network, n_features: checkpoint.sidecar.layout.n_features() })
+        Ok(Self { network, n_features: checkpoint.sidecar.layout.n_features(), instructions })
     }
 
     /// Number of features of a footprint.
@@ -134,9 +136,9 @@ impl Predictor {
         self.network.workspace(self.n_features)
     }
 
-    /// Predicts a block, with the widest instructions of the machine.
+    /// Predicts a block.
     pub(crate) fn apply(&self, workspace: &mut Workspace) {
-        pulp::Arch::new().dispatch(Apply { network: &self.network, workspace });
+        self.instructions.run(Apply { network: &self.network, workspace });
     }
 
     fn load(&self, features: &[f32], lane: usize, workspace: &mut Workspace) -> Result<(), WrongFeatures> {

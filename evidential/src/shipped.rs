@@ -123,7 +123,7 @@ mod tests {
         for files in FILES {
             let checkpoint = Checkpoint::from_bytes(files.weights, files.sidecar).unwrap();
             assert_eq!(checkpoint.sidecar.method, files.method);
-            crate::Predictor::new(&checkpoint).unwrap();
+            crate::Predictor::new(&checkpoint, bicycle::lanes::Instructions::widest()).unwrap();
         }
         let n_bytes: usize = FILES.iter().map(|files| files.weights.len() + files.sidecar.len()).sum();
         assert!(n_bytes < 1_000_000, "{n_bytes} bytes");

@@ -5,6 +5,7 @@ mod untrained;
 
 use std::sync::Arc;
 
+use bicycle::lanes::Instructions;
 use evidential::{
     AVOIDED_METRES, BeliefMap, BeliefMapError, Checkpoint, Learned, Method, Prediction, Predictor, Prior,
     Unfamiliar,
@@ -33,14 +34,18 @@ fn map_of(
     risk: GridGeometry,
 ) -> BeliefMap {
     let learned = learned(checkpoint, unfamiliar);
-    let mut map = BeliefMap::new(&CAR, &learned, surface.geometry().resolution_m, risk, 7).unwrap();
+    let mut map =
+        BeliefMap::new(&CAR, &learned, surface.geometry().resolution_m, risk, 7, Instructions::widest())
+            .unwrap();
     map.update_all(surface).unwrap();
     map
 }
 
 fn prior_of(checkpoint: &Checkpoint, surface: &GridMap<SurfaceCell>, risk: GridGeometry) -> PriorMap {
     let assumption = Assumption::Physics { prior: checkpoint.sidecar.prior, level: level() };
-    let mut map = PriorMap::new(&CAR, &assumption, surface.geometry().resolution_m, risk, 7).unwrap();
+    let mut map =
+        PriorMap::new(&CAR, &assumption, surface.geometry().resolution_m, risk, 7, Instructions::widest())
+            .unwrap();
     map.update_all(surface).unwrap();
     map
 }
@@ -99,7 +104,7 @@ fn every_pose_has_the_risk_of_its_posterior() {
     for (method, resolution_m) in Method::ALL.into_iter().zip([0.1, 0.2, 0.05, 0.15, 0.1, 0.3]) {
         let risk = GridGeometry { resolution_m, origin: [1, 9], n_rows: 12, n_cols: 14 };
         let checkpoint = checkpoint(method, 5);
-        let predictor = Predictor::new(&checkpoint).unwrap();
+        let predictor = Predictor::new(&checkpoint, Instructions::widest()).unwrap();
         let (map, prior) =
             (map_of(&checkpoint, Unfamiliar::Fuse, &surface, risk), prior_of(&checkpoint, &surface, risk));
         let view = map.risk_map().view();
@@ -193,7 +198,7 @@ fn obstacles_block_what_they_block_for_the_prior() {
 fn ground_unlike_the_training_data_is_flagged_and_avoided_on_request() {
     let surface = rough(SURFACE, 3);
     let checkpoint = checkpoint(Method::Evora, 7);
-    let predictor = Predictor::new(&checkpoint).unwrap();
+    let predictor = Predictor::new(&checkpoint, Instructions::widest()).unwrap();
     let fused = map_of(&checkpoint, Unfamiliar::Fuse, &surface, RISK);
     let avoiding = map_of(&checkpoint, Unfamiliar::Avoid, &surface, RISK);
     let (fused, avoiding) = (fused.risk_map().view(), avoiding.risk_map().view());
@@ -276,6 +281,7 @@ fn a_moved_window_or_another_level_is_a_whole_new_map() {
         0.1,
         moved,
         7,
+        Instructions::widest(),
     )
     .unwrap();
     fresh.update_all(&surface).unwrap();
@@ -309,7 +315,15 @@ fn numbers_that_are_none_never_reach_the_map() {
 fn what_does_not_fit_is_refused_with_what_was_expected_and_found() {
     let checkpoint = checkpoint(Method::Vanilla, 1);
     let new = |geometry, unfamiliar, resolution_m, n_yaws| {
-        BeliefMap::new(&geometry, &learned(&checkpoint, unfamiliar), resolution_m, RISK, n_yaws).map(drop)
+        BeliefMap::new(
+            &geometry,
+            &learned(&checkpoint, unfamiliar),
+            resolution_m,
+            RISK,
+            n_yaws,
+            Instructions::widest(),
+        )
+        .map(drop)
     };
     let other = bicycle::Geometry { track_m: 1.5, ..CAR };
     let message = new(other, Unfamiliar::Fuse, 0.1, 7).unwrap_err().to_string();

@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
 use bicycle::Geometry;
+use bicycle::lanes::Instructions;
 use evidential::{
     Dataset, DatasetError, DatasetFileError, DatasetOrigin, Example, FeatureLayout, Label, Surveyor,
 };
@@ -242,8 +243,15 @@ fn the_prior_is_that_of_the_pose_in_any_heading_and_place_of_its_cell() {
         prior: PriorConfig::for_vehicle(&GEOMETRY),
         level: traversability::CvarLevel::MEAN,
     };
-    let mut whole =
-        physics_prior::PriorMap::new(&GEOMETRY, &assumption, GROUND.resolution_m, GROUND, 16).unwrap();
+    let mut whole = physics_prior::PriorMap::new(
+        &GEOMETRY,
+        &assumption,
+        GROUND.resolution_m,
+        GROUND,
+        16,
+        Instructions::widest(),
+    )
+    .unwrap();
     whole.update_all(&surface).unwrap();
     for k in 0..40 {
         let k = f64::from(k);

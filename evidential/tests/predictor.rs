@@ -3,6 +3,7 @@
 
 mod untrained;
 
+use bicycle::lanes::Instructions;
 use evidential::{Architecture, Checkpoint, CheckpointError, Method, Prediction, Predictor, PredictorError};
 use proptest::prelude::*;
 use rand::{RngExt, SeedableRng};
@@ -87,7 +88,7 @@ fn is_close(found: f32, expected: f64) -> bool {
 fn predictions_are_those_of_the_plain_networks() {
     for (seed, method) in Method::ALL.into_iter().enumerate() {
         let checkpoint = checkpoint(method, seed as u64);
-        let predictor = Predictor::new(&checkpoint).unwrap();
+        let predictor = Predictor::new(&checkpoint, Instructions::widest()).unwrap();
         // 75 is no multiple of any number of lanes.
         let footprints = footprints(75, 3, 1.5);
         for (found, features) in predictor.predict(&footprints).unwrap().iter().zip(&footprints) {
@@ -109,7 +110,7 @@ fn predictions_are_those_of_the_plain_networks() {
 
 #[test]
 fn a_prediction_does_not_depend_on_its_neighbours() {
-    let predictor = Predictor::new(&checkpoint(Method::Pietra, 1)).unwrap();
+    let predictor = Predictor::new(&checkpoint(Method::Pietra, 1), Instructions::widest()).unwrap();
     let footprints = footprints(70, 4, 1.5);
     let together = predictor.predict(&footprints).unwrap();
     for (index, prediction) in together.iter().enumerate() {
@@ -128,7 +129,7 @@ fn all_finite(prediction: &Prediction) -> bool {
 
 #[test]
 fn nothing_that_is_a_number_breaks_the_arithmetic() {
-    let predictor = Predictor::new(&checkpoint(Method::Pietra, 2)).unwrap();
+    let predictor = Predictor::new(&checkpoint(Method::Pietra, 2), Instructions::widest()).unwrap();
     for reach in [0.0, 1e-30, 10.0, 1e3, 1e20, f32::MAX] {
         let far: Vec<Vec<f32>> = footprints(40, 5, 1.0)
             .into_iter()
@@ -145,7 +146,7 @@ fn nothing_that_is_a_number_breaks_the_arithmetic() {
 
 #[test]
 fn what_is_no_number_or_too_few_of_them_is_refused_with_its_place() {
-    let predictor = Predictor::new(&checkpoint(Method::Pietra, 2)).unwrap();
+    let predictor = Predictor::new(&checkpoint(Method::Pietra, 2), Instructions::widest()).unwrap();
     let mut broken = footprints(40, 6, 1.0);
     broken[33][7] = f32::NAN;
     let message = predictor.predict(&broken).unwrap_err().to_string();
@@ -168,7 +169,7 @@ fn checkpoints_that_do_not_hold_together_are_refused() {
     let refused = |change: &dyn Fn(&mut Checkpoint)| {
         let mut broken = whole.clone();
         change(&mut broken);
-        Predictor::new(&broken).unwrap_err()
+        Predictor::new(&broken, Instructions::widest()).unwrap_err()
     };
     let error = refused(&|broken| drop(broken.tensors.remove("heads.2.1.bias")));
     assert!(matches!(error, PredictorError::Checkpoint(CheckpointError::Mismatch { .. })), "{error}");
@@ -191,7 +192,7 @@ proptest! {
 
     #[test]
     fn distributions_sum_to_one(seed in 0..1000u64, reach in 0.0..50f32) {
-        let predictor = Predictor::new(&checkpoint(Method::Evora, seed)).unwrap();
+        let predictor = Predictor::new(&checkpoint(Method::Evora, seed), Instructions::widest()).unwrap();
         for prediction in predictor.predict(&footprints(33, seed, reach + 1e-3)).unwrap() {
             for pmf in &prediction.pmfs {
                 prop_assert!((pmf.probabilities().iter().sum::<f32>() - 1.0).abs() < 1e-5);

@@ -1,4 +1,4 @@
-/* Messages of Surefoot, layout version 2. Written from its types; do not edit. */
+/* Messages of Surefoot, layout version 3. Written from its types; do not edit. */
 #ifndef SUREFOOT_LAYOUT_H
 #define SUREFOOT_LAYOUT_H
 
@@ -6,7 +6,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#define SUREFOOT_LAYOUT_VERSION 2u
+#define SUREFOOT_LAYOUT_VERSION 3u
 
 /* First field of every header: whose message it is, and of when. Known to the channels as surefoot.Stamp. */
 typedef struct SurefootStamp {
@@ -14,7 +14,7 @@ typedef struct SurefootStamp {
     uint32_t layout_version;
     /* Zero. */
     uint32_t reserved;
-    /* When the publishing process began, which tells one life of it from the next [ns]. */
+    /* When its publisher took the channel, which tells one life of it from the next [ns]. */
     uint64_t epoch_ns;
     /* Counts the messages of one publisher on one channel from 1. */
     uint64_t sequence;
@@ -115,29 +115,38 @@ typedef struct SurefootSurfaceHeader {
     SurefootGrid grid;
     /* The scan that was fused last. */
     SurefootSource scan;
-    /* The odometry that it was fused at. */
+    /* Where the vehicle was when the scan was taken, or the odometry that showed the jump. */
     SurefootOdometryRecord odometry;
-    /* When that was measured [ns]. */
+    /* When that was [ns]. */
     uint64_t odometry_at_ns;
+    /* When the odometry was measured in whose frame the map lies: the newest that mapping had taken in [ns]. */
+    uint64_t frame_at_ns;
     /* What happened since the last message: 1 = a scan was fused, 2 = the localisation jumped. */
     uint64_t event;
-    /* The jump, if that is what happened: east, north, up [m]. */
+    /* The jump, if that is what happened: p of before lies at R(jump_yaw_rad) p + jump_m [m]. */
     double jump_m[3];
-    /* All jumps so far together [m]. */
+    /* Its turn, counter-clockwise [rad]. */
+    double jump_yaw_rad;
+    /* All jumps so far together, likewise [m]. */
     double shift_m[3];
+    /* Their turn [rad]. */
+    double shift_yaw_rad;
     /* XXH3 of the payload. */
     uint64_t content_hash;
 } SurefootSurfaceHeader;
-static_assert(sizeof(SurefootSurfaceHeader) == 256, "SurfaceHeader");
+static_assert(sizeof(SurefootSurfaceHeader) == 280, "SurfaceHeader");
 static_assert(offsetof(SurefootSurfaceHeader, stamp) == 0, "SurfaceHeader.stamp");
 static_assert(offsetof(SurefootSurfaceHeader, grid) == 40, "SurfaceHeader.grid");
 static_assert(offsetof(SurefootSurfaceHeader, scan) == 80, "SurfaceHeader.scan");
 static_assert(offsetof(SurefootSurfaceHeader, odometry) == 96, "SurfaceHeader.odometry");
 static_assert(offsetof(SurefootSurfaceHeader, odometry_at_ns) == 184, "SurfaceHeader.odometry_at_ns");
-static_assert(offsetof(SurefootSurfaceHeader, event) == 192, "SurfaceHeader.event");
-static_assert(offsetof(SurefootSurfaceHeader, jump_m) == 200, "SurfaceHeader.jump_m");
-static_assert(offsetof(SurefootSurfaceHeader, shift_m) == 224, "SurfaceHeader.shift_m");
-static_assert(offsetof(SurefootSurfaceHeader, content_hash) == 248, "SurfaceHeader.content_hash");
+static_assert(offsetof(SurefootSurfaceHeader, frame_at_ns) == 192, "SurfaceHeader.frame_at_ns");
+static_assert(offsetof(SurefootSurfaceHeader, event) == 200, "SurfaceHeader.event");
+static_assert(offsetof(SurefootSurfaceHeader, jump_m) == 208, "SurfaceHeader.jump_m");
+static_assert(offsetof(SurefootSurfaceHeader, jump_yaw_rad) == 232, "SurfaceHeader.jump_yaw_rad");
+static_assert(offsetof(SurefootSurfaceHeader, shift_m) == 240, "SurfaceHeader.shift_m");
+static_assert(offsetof(SurefootSurfaceHeader, shift_yaw_rad) == 264, "SurfaceHeader.shift_yaw_rad");
+static_assert(offsetof(SurefootSurfaceHeader, content_hash) == 272, "SurfaceHeader.content_hash");
 
 /* Header of a risk map; the payload is risks, grounds and times to the goal, see docs/runtime.md. Known to the channels as surefoot.RiskHeader. */
 typedef struct SurefootRiskHeader {
@@ -174,7 +183,7 @@ static_assert(offsetof(SurefootRiskHeader, goal_m) == 136, "RiskHeader.goal_m");
 static_assert(offsetof(SurefootRiskHeader, checkpoint) == 152, "RiskHeader.checkpoint");
 static_assert(offsetof(SurefootRiskHeader, content_hash) == 160, "RiskHeader.content_hash");
 
-/* What the vehicle shall do. Known to the channels as surefoot.Command. */
+/* What the vehicle shall do. It grows old from when what it was decided on was measured, whenever it is sent. Known to the channels as surefoot.Command. */
 typedef struct SurefootCommandRecord {
     /* Forward speed, negative in reverse [m/s]. */
     float speed_mps;
@@ -184,12 +193,18 @@ typedef struct SurefootCommandRecord {
     uint32_t decision;
     /* Why, when it is not driving; see docs/runtime.md. */
     uint32_t reason;
+    /* When the odometry was measured that it was decided on [ns]; 0 = none. */
+    uint64_t odometry_at_ns;
+    /* When the scan was measured that the map ends with that it was decided on [ns]; 0 = no map. */
+    uint64_t scan_at_ns;
 } SurefootCommandRecord;
-static_assert(sizeof(SurefootCommandRecord) == 16, "CommandRecord");
+static_assert(sizeof(SurefootCommandRecord) == 32, "CommandRecord");
 static_assert(offsetof(SurefootCommandRecord, speed_mps) == 0, "CommandRecord.speed_mps");
 static_assert(offsetof(SurefootCommandRecord, steering_rad) == 4, "CommandRecord.steering_rad");
 static_assert(offsetof(SurefootCommandRecord, decision) == 8, "CommandRecord.decision");
 static_assert(offsetof(SurefootCommandRecord, reason) == 12, "CommandRecord.reason");
+static_assert(offsetof(SurefootCommandRecord, odometry_at_ns) == 16, "CommandRecord.odometry_at_ns");
+static_assert(offsetof(SurefootCommandRecord, scan_at_ns) == 24, "CommandRecord.scan_at_ns");
 
 /* A decision with all that it was made from. Known to the channels as surefoot.DecisionRecord. */
 typedef struct SurefootDecisionRecord {
@@ -207,8 +222,12 @@ typedef struct SurefootDecisionRecord {
     SurefootSource risk;
     /* Who made that map: 0 = none, 1 = what was learned, 2 = physics alone. */
     uint64_t author;
-    /* When the scan was measured that the map ends with [ns]; 0 = no map. */
-    uint64_t scan_at_ns;
+    /* What was said last of where to go. */
+    SurefootSource mission;
+    /* The newest map of what was learned that there was to choose from. */
+    SurefootSource learned;
+    /* The newest map of physics alone that there was to choose from. */
+    SurefootSource physics;
     /* Where to go [m]. */
     double goal_m[2];
     /* How near counts as there [m]. */
@@ -224,22 +243,24 @@ typedef struct SurefootDecisionRecord {
     /* By how much the cycle began after its deadline [ns]. */
     uint64_t lateness_ns;
 } SurefootDecisionRecord;
-static_assert(sizeof(SurefootDecisionRecord) == 184, "DecisionRecord");
+static_assert(sizeof(SurefootDecisionRecord) == 240, "DecisionRecord");
 static_assert(offsetof(SurefootDecisionRecord, command) == 0, "DecisionRecord.command");
-static_assert(offsetof(SurefootDecisionRecord, cycle) == 16, "DecisionRecord.cycle");
-static_assert(offsetof(SurefootDecisionRecord, decided_at_ns) == 24, "DecisionRecord.decided_at_ns");
-static_assert(offsetof(SurefootDecisionRecord, odometry) == 32, "DecisionRecord.odometry");
-static_assert(offsetof(SurefootDecisionRecord, n_odometry) == 48, "DecisionRecord.n_odometry");
-static_assert(offsetof(SurefootDecisionRecord, risk) == 56, "DecisionRecord.risk");
-static_assert(offsetof(SurefootDecisionRecord, author) == 72, "DecisionRecord.author");
-static_assert(offsetof(SurefootDecisionRecord, scan_at_ns) == 80, "DecisionRecord.scan_at_ns");
-static_assert(offsetof(SurefootDecisionRecord, goal_m) == 88, "DecisionRecord.goal_m");
-static_assert(offsetof(SurefootDecisionRecord, tolerance_m) == 104, "DecisionRecord.tolerance_m");
-static_assert(offsetof(SurefootDecisionRecord, n_rollouts) == 112, "DecisionRecord.n_rollouts");
-static_assert(offsetof(SurefootDecisionRecord, elapsed_s) == 120, "DecisionRecord.elapsed_s");
-static_assert(offsetof(SurefootDecisionRecord, state) == 128, "DecisionRecord.state");
-static_assert(offsetof(SurefootDecisionRecord, duration_ns) == 168, "DecisionRecord.duration_ns");
-static_assert(offsetof(SurefootDecisionRecord, lateness_ns) == 176, "DecisionRecord.lateness_ns");
+static_assert(offsetof(SurefootDecisionRecord, cycle) == 32, "DecisionRecord.cycle");
+static_assert(offsetof(SurefootDecisionRecord, decided_at_ns) == 40, "DecisionRecord.decided_at_ns");
+static_assert(offsetof(SurefootDecisionRecord, odometry) == 48, "DecisionRecord.odometry");
+static_assert(offsetof(SurefootDecisionRecord, n_odometry) == 64, "DecisionRecord.n_odometry");
+static_assert(offsetof(SurefootDecisionRecord, risk) == 72, "DecisionRecord.risk");
+static_assert(offsetof(SurefootDecisionRecord, author) == 88, "DecisionRecord.author");
+static_assert(offsetof(SurefootDecisionRecord, mission) == 96, "DecisionRecord.mission");
+static_assert(offsetof(SurefootDecisionRecord, learned) == 112, "DecisionRecord.learned");
+static_assert(offsetof(SurefootDecisionRecord, physics) == 128, "DecisionRecord.physics");
+static_assert(offsetof(SurefootDecisionRecord, goal_m) == 144, "DecisionRecord.goal_m");
+static_assert(offsetof(SurefootDecisionRecord, tolerance_m) == 160, "DecisionRecord.tolerance_m");
+static_assert(offsetof(SurefootDecisionRecord, n_rollouts) == 168, "DecisionRecord.n_rollouts");
+static_assert(offsetof(SurefootDecisionRecord, elapsed_s) == 176, "DecisionRecord.elapsed_s");
+static_assert(offsetof(SurefootDecisionRecord, state) == 184, "DecisionRecord.state");
+static_assert(offsetof(SurefootDecisionRecord, duration_ns) == 224, "DecisionRecord.duration_ns");
+static_assert(offsetof(SurefootDecisionRecord, lateness_ns) == 232, "DecisionRecord.lateness_ns");
 
 /* Where the vehicle got stuck. Known to the channels as surefoot.Stuck. */
 typedef struct SurefootStuckRecord {
@@ -252,7 +273,7 @@ static_assert(sizeof(SurefootStuckRecord) == 24, "StuckRecord");
 static_assert(offsetof(SurefootStuckRecord, position_m) == 0, "StuckRecord.position_m");
 static_assert(offsetof(SurefootStuckRecord, yaw_rad) == 16, "StuckRecord.yaw_rad");
 
-/* Where to go; whoever runs the vehicle says so once a second. Known to the channels as surefoot.Mission. */
+/* Where to go; whoever runs the vehicle says so once a second, and when it is over. Unless repeated, it is lost. Known to the channels as surefoot.Mission. */
 typedef struct SurefootMissionRecord {
     /* The place in the map frame [m]. */
     double goal_m[2];
@@ -302,26 +323,29 @@ typedef struct SurefootStatusRecord {
     double rate_hz;
     /* Median and largest lateness since the last status [s]. */
     double lateness_s[2];
-    /* Age of up to three inputs when they were last used [s]; negative = none yet. */
-    double age_s[3];
+    /* Age of up to four inputs when they were last used [s]; negative = none yet. */
+    double age_s[4];
     /* Deadlines missed since the process began. */
     uint64_t n_missed;
     /* Messages lost on the way, by gaps in their numbers. */
     uint64_t n_lost;
     /* Messages refused. */
     uint64_t n_refused;
-    /* Figure of the role's own: futures sampled, points mapped, recorded bytes. */
+    /* Looks at a channel that the transport broke off. */
+    uint64_t n_failed;
+    /* Figure of the role's own: speed [m/s], jumps made out, futures sampled, recorded bytes. */
     double figure;
 } SurefootStatusRecord;
-static_assert(sizeof(SurefootStatusRecord) == 96, "StatusRecord");
+static_assert(sizeof(SurefootStatusRecord) == 112, "StatusRecord");
 static_assert(offsetof(SurefootStatusRecord, role) == 0, "StatusRecord.role");
 static_assert(offsetof(SurefootStatusRecord, process) == 8, "StatusRecord.process");
 static_assert(offsetof(SurefootStatusRecord, rate_hz) == 16, "StatusRecord.rate_hz");
 static_assert(offsetof(SurefootStatusRecord, lateness_s) == 24, "StatusRecord.lateness_s");
 static_assert(offsetof(SurefootStatusRecord, age_s) == 40, "StatusRecord.age_s");
-static_assert(offsetof(SurefootStatusRecord, n_missed) == 64, "StatusRecord.n_missed");
-static_assert(offsetof(SurefootStatusRecord, n_lost) == 72, "StatusRecord.n_lost");
-static_assert(offsetof(SurefootStatusRecord, n_refused) == 80, "StatusRecord.n_refused");
-static_assert(offsetof(SurefootStatusRecord, figure) == 88, "StatusRecord.figure");
+static_assert(offsetof(SurefootStatusRecord, n_missed) == 72, "StatusRecord.n_missed");
+static_assert(offsetof(SurefootStatusRecord, n_lost) == 80, "StatusRecord.n_lost");
+static_assert(offsetof(SurefootStatusRecord, n_refused) == 88, "StatusRecord.n_refused");
+static_assert(offsetof(SurefootStatusRecord, n_failed) == 96, "StatusRecord.n_failed");
+static_assert(offsetof(SurefootStatusRecord, figure) == 104, "StatusRecord.figure");
 
 #endif

@@ -4,30 +4,33 @@
     surefoot up --role mapping --run py --vehicle rc_car --method physics &
     surefoot up --role learning --run py --vehicle rc_car --method physics &
     surefoot up --role control --run py --vehicle rc_car --method physics &
-    python3 drive_robot.py py
+    python3 drive_robot.py --run py
 
-It tells where it is and what a ring of range rays sees, reads commands and risk maps, and stops when commands end.
+It tells where it is, what a ring of range rays sees and where to go, reads commands and risk maps, and stops when what
+the last command was decided on is too old.
 Prints one line of JSON and ends with 0 when it has come to its goal, else with 1.
 """
 
+import argparse
 import ctypes
 import json
 import math
 import sys
 
 import surefoot_layout as layout
-from channels import Bus, Inlet, Outlet, now_ns
+from channels import Bus, Inlet, Outlet, now_ns, run_name
+from watchdog import Watchdog
 
 PERIOD_NS = 20_000_000
 CYCLES_PER_SCAN = 10
-COMMAND_AGE_MAX_NS = 300_000_000
 TIME_LIMIT_S = 60.0
 WHEELBASE_M = 0.25
 WHEEL_RADIUS_M = 0.05
 SENSOR_M = (0.12, 0.0, 0.35)
 GOAL_M, TOLERANCE_M = (5.0, 0.0), 0.3
 ROCK_M, ROCK_RADIUS_M, ROCK_HEIGHT_M = (2.5, 0.1), 0.35, 0.5
-OPEN, OBSTACLE, DRIVE = 0, 3, 1
+OPEN, OBSTACLE = 0, 3
+UNDER_WAY, GOAL_REACHED, TIMED_OUT = 0, 1, 6
 
 
 class Robot:
@@ -109,7 +112,8 @@ def drive(run: str) -> dict:
     odometry, scans, missions = Outlet(bus, "odometry"), Outlet(bus, "scan", 1 << 14), Outlet(bus, "mission")
     commands, risks = Inlet(bus, "command"), Inlet(bus, "risk")
     mission = layout.MissionRecord(goal_m=GOAL_M, tolerance_m=TOLERANCE_M)
-    began_ns, command, n_commands, n_maps, nearest_m = now_ns(), None, 0, 0, math.inf
+    watchdog = Watchdog()
+    began_ns, n_commands, n_maps, nearest_m = now_ns(), 0, 0, math.inf
     for cycle in range(int(TIME_LIMIT_S * 1e9) // PERIOD_NS):
         at_ns = began_ns + cycle * PERIOD_NS
         sleep_until(at_ns)
@@ -120,17 +124,19 @@ def drive(run: str) -> dict:
             mission.time_s = cycle * PERIOD_NS * 1e-9
             missions.send(now_ns(), (layout.MissionRecord * 1)(mission))
         if (message := commands.newest()) is not None:
-            _, stamp, payload = message
-            command, n_commands = (stamp.published_at_ns, payload[0].decision, payload[0].speed_mps, payload[0].steering_rad), n_commands + 1
+            _, _, payload = message
+            watchdog.admit(payload[0])
+            n_commands += 1
         if risks.newest() is not None:
             n_maps += 1
-        is_fresh = command is not None and now_ns() - command[0] <= COMMAND_AGE_MAX_NS and command[1] == DRIVE
-        speed_mps, steering_rad = command[2:] if is_fresh else (0.0, robot.steering_rad)
+        speed_mps, steering_rad = watchdog.command(now_ns()) or (0.0, robot.steering_rad)
         robot.advance(speed_mps, steering_rad, PERIOD_NS * 1e-9)
         nearest_m = min(nearest_m, math.dist((robot.x_m, robot.y_m), ROCK_M))
         left_m = math.dist((robot.x_m, robot.y_m), GOAL_M)
         if left_m <= TOLERANCE_M:
             break
+    mission.outcome = GOAL_REACHED if left_m <= TOLERANCE_M else TIMED_OUT
+    missions.send(now_ns(), (layout.MissionRecord * 1)(mission))
     return {
         "reached": left_m <= TOLERANCE_M,
         "time_s": round((now_ns() - began_ns) * 1e-9, 2),
@@ -141,7 +147,13 @@ def drive(run: str) -> dict:
     }
 
 
-if __name__ == "__main__":
-    told = drive(sys.argv[1] if len(sys.argv) > 1 else "field")
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__.split("\n", 1)[0])
+    parser.add_argument("--run", type=run_name, default="field", help="name of the run to be the vehicle of")
+    told = drive(parser.parse_args().run)
     print(json.dumps(told))
-    sys.exit(0 if told["reached"] else 1)
+    return 0 if told["reached"] else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

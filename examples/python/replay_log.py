@@ -19,7 +19,7 @@ import sys
 import time
 
 import surefoot_layout as layout
-from channels import Bus, Outlet, now_ns
+from channels import Bus, Outlet, now_ns, run_name
 
 NEEDED = ("t", "x", "y", "yaw", "vx", "wz")
 DRIVE = 1
@@ -80,12 +80,13 @@ def odometry(row: dict):
     return record if all(map(math.isfinite, values)) else None
 
 
-def command(row: dict):
-    """What was commanded; None where that is not known."""
+def command(row: dict, at_ns: int):
+    """What was commanded, by whoever knew all of its time; None where that is not known."""
     speed_mps, steering_rad = number(row, "cmd_speed"), number(row, "cmd_steer")
     if not (math.isfinite(speed_mps) and math.isfinite(steering_rad)):
         return None
-    return layout.CommandRecord(speed_mps=speed_mps, steering_rad=steering_rad, decision=DRIVE, reason=0)
+    times = {"odometry_at_ns": at_ns, "scan_at_ns": at_ns}
+    return layout.CommandRecord(speed_mps=speed_mps, steering_rad=steering_rad, decision=DRIVE, reason=0, **times)
 
 
 def replay(path: str, run: str, speed: float, seconds_max: float) -> dict:
@@ -96,11 +97,11 @@ def replay(path: str, run: str, speed: float, seconds_max: float) -> dict:
     time.sleep(LEAD_S)
     began_ns, passed_over, since_s = now_ns(), 0, 0.0
     for since_s, row in rows:
+        due_ns = began_ns + int(since_s / speed * 1e9)
         try:
-            record, told = odometry(row), command(row)
+            record, told = odometry(row), command(row, due_ns)
         except ValueError as error:
             raise NoLog(f"{path}, {since_s:.3f} s: expected numbers, found: {error}") from None
-        due_ns = began_ns + int(since_s / speed * 1e9)
         while (left_ns := due_ns - now_ns()) > 0:
             time.sleep(left_ns * 1e-9)
         if record is None:
@@ -121,7 +122,7 @@ def replay(path: str, run: str, speed: float, seconds_max: float) -> dict:
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.split("\n", 1)[0])
     parser.add_argument("log", help="drive log, CSV")
-    parser.add_argument("--run", default="field", help="name of the run whose channels to use")
+    parser.add_argument("--run", type=run_name, default="field", help="name of the run whose channels to use")
     parser.add_argument("--speed", type=float, default=1.0, help="how many times as fast as it happened")
     parser.add_argument("--seconds", type=float, default=math.inf, help="end after so much of the log [s]")
     asked = parser.parse_args()

@@ -1,8 +1,8 @@
-"""Messages of Surefoot, layout version 2. Written from its types; do not edit."""
+"""Messages of Surefoot, layout version 3. Written from its types; do not edit."""
 
 import ctypes
 
-LAYOUT_VERSION = 2
+LAYOUT_VERSION = 3
 
 
 class Stamp(ctypes.Structure):
@@ -13,7 +13,7 @@ class Stamp(ctypes.Structure):
         ("layout_version", ctypes.c_uint32),
         # Zero.
         ("reserved", ctypes.c_uint32),
-        # When the publishing process began, which tells one life of it from the next [ns].
+        # When its publisher took the channel, which tells one life of it from the next [ns].
         ("epoch_ns", ctypes.c_uint64),
         # Counts the messages of one publisher on one channel from 1.
         ("sequence", ctypes.c_uint64),
@@ -168,16 +168,22 @@ class SurfaceHeader(ctypes.Structure):
         ("grid", Grid),
         # The scan that was fused last.
         ("scan", Source),
-        # The odometry that it was fused at.
+        # Where the vehicle was when the scan was taken, or the odometry that showed the jump.
         ("odometry", OdometryRecord),
-        # When that was measured [ns].
+        # When that was [ns].
         ("odometry_at_ns", ctypes.c_uint64),
+        # When the odometry was measured in whose frame the map lies: the newest that mapping had taken in [ns].
+        ("frame_at_ns", ctypes.c_uint64),
         # What happened since the last message: 1 = a scan was fused, 2 = the localisation jumped.
         ("event", ctypes.c_uint64),
-        # The jump, if that is what happened: east, north, up [m].
+        # The jump, if that is what happened: p of before lies at R(jump_yaw_rad) p + jump_m [m].
         ("jump_m", ctypes.c_double * 3),
-        # All jumps so far together [m].
+        # Its turn, counter-clockwise [rad].
+        ("jump_yaw_rad", ctypes.c_double),
+        # All jumps so far together, likewise [m].
         ("shift_m", ctypes.c_double * 3),
+        # Their turn [rad].
+        ("shift_yaw_rad", ctypes.c_double),
         # XXH3 of the payload.
         ("content_hash", ctypes.c_uint64),
     ]
@@ -187,16 +193,19 @@ class SurfaceHeader(ctypes.Structure):
         return "surefoot.SurfaceHeader"
 
 
-assert ctypes.sizeof(SurfaceHeader) == 256
+assert ctypes.sizeof(SurfaceHeader) == 280
 assert SurfaceHeader.stamp.offset == 0
 assert SurfaceHeader.grid.offset == 40
 assert SurfaceHeader.scan.offset == 80
 assert SurfaceHeader.odometry.offset == 96
 assert SurfaceHeader.odometry_at_ns.offset == 184
-assert SurfaceHeader.event.offset == 192
-assert SurfaceHeader.jump_m.offset == 200
-assert SurfaceHeader.shift_m.offset == 224
-assert SurfaceHeader.content_hash.offset == 248
+assert SurfaceHeader.frame_at_ns.offset == 192
+assert SurfaceHeader.event.offset == 200
+assert SurfaceHeader.jump_m.offset == 208
+assert SurfaceHeader.jump_yaw_rad.offset == 232
+assert SurfaceHeader.shift_m.offset == 240
+assert SurfaceHeader.shift_yaw_rad.offset == 264
+assert SurfaceHeader.content_hash.offset == 272
 
 
 class RiskHeader(ctypes.Structure):
@@ -244,7 +253,7 @@ assert RiskHeader.content_hash.offset == 160
 
 
 class CommandRecord(ctypes.Structure):
-    """What the vehicle shall do."""
+    """What the vehicle shall do. It grows old from when what it was decided on was measured, whenever it is sent."""
 
     _fields_ = [
         # Forward speed, negative in reverse [m/s].
@@ -255,6 +264,10 @@ class CommandRecord(ctypes.Structure):
         ("decision", ctypes.c_uint32),
         # Why, when it is not driving; see docs/runtime.md.
         ("reason", ctypes.c_uint32),
+        # When the odometry was measured that it was decided on [ns]; 0 = none.
+        ("odometry_at_ns", ctypes.c_uint64),
+        # When the scan was measured that the map ends with that it was decided on [ns]; 0 = no map.
+        ("scan_at_ns", ctypes.c_uint64),
     ]
 
     @staticmethod
@@ -262,11 +275,13 @@ class CommandRecord(ctypes.Structure):
         return "surefoot.Command"
 
 
-assert ctypes.sizeof(CommandRecord) == 16
+assert ctypes.sizeof(CommandRecord) == 32
 assert CommandRecord.speed_mps.offset == 0
 assert CommandRecord.steering_rad.offset == 4
 assert CommandRecord.decision.offset == 8
 assert CommandRecord.reason.offset == 12
+assert CommandRecord.odometry_at_ns.offset == 16
+assert CommandRecord.scan_at_ns.offset == 24
 
 
 class DecisionRecord(ctypes.Structure):
@@ -287,8 +302,12 @@ class DecisionRecord(ctypes.Structure):
         ("risk", Source),
         # Who made that map: 0 = none, 1 = what was learned, 2 = physics alone.
         ("author", ctypes.c_uint64),
-        # When the scan was measured that the map ends with [ns]; 0 = no map.
-        ("scan_at_ns", ctypes.c_uint64),
+        # What was said last of where to go.
+        ("mission", Source),
+        # The newest map of what was learned that there was to choose from.
+        ("learned", Source),
+        # The newest map of physics alone that there was to choose from.
+        ("physics", Source),
         # Where to go [m].
         ("goal_m", ctypes.c_double * 2),
         # How near counts as there [m].
@@ -310,22 +329,24 @@ class DecisionRecord(ctypes.Structure):
         return "surefoot.DecisionRecord"
 
 
-assert ctypes.sizeof(DecisionRecord) == 184
+assert ctypes.sizeof(DecisionRecord) == 240
 assert DecisionRecord.command.offset == 0
-assert DecisionRecord.cycle.offset == 16
-assert DecisionRecord.decided_at_ns.offset == 24
-assert DecisionRecord.odometry.offset == 32
-assert DecisionRecord.n_odometry.offset == 48
-assert DecisionRecord.risk.offset == 56
-assert DecisionRecord.author.offset == 72
-assert DecisionRecord.scan_at_ns.offset == 80
-assert DecisionRecord.goal_m.offset == 88
-assert DecisionRecord.tolerance_m.offset == 104
-assert DecisionRecord.n_rollouts.offset == 112
-assert DecisionRecord.elapsed_s.offset == 120
-assert DecisionRecord.state.offset == 128
-assert DecisionRecord.duration_ns.offset == 168
-assert DecisionRecord.lateness_ns.offset == 176
+assert DecisionRecord.cycle.offset == 32
+assert DecisionRecord.decided_at_ns.offset == 40
+assert DecisionRecord.odometry.offset == 48
+assert DecisionRecord.n_odometry.offset == 64
+assert DecisionRecord.risk.offset == 72
+assert DecisionRecord.author.offset == 88
+assert DecisionRecord.mission.offset == 96
+assert DecisionRecord.learned.offset == 112
+assert DecisionRecord.physics.offset == 128
+assert DecisionRecord.goal_m.offset == 144
+assert DecisionRecord.tolerance_m.offset == 160
+assert DecisionRecord.n_rollouts.offset == 168
+assert DecisionRecord.elapsed_s.offset == 176
+assert DecisionRecord.state.offset == 184
+assert DecisionRecord.duration_ns.offset == 224
+assert DecisionRecord.lateness_ns.offset == 232
 
 
 class StuckRecord(ctypes.Structure):
@@ -349,7 +370,7 @@ assert StuckRecord.yaw_rad.offset == 16
 
 
 class MissionRecord(ctypes.Structure):
-    """Where to go; whoever runs the vehicle says so once a second."""
+    """Where to go; whoever runs the vehicle says so once a second, and when it is over. Unless repeated, it is lost."""
 
     _fields_ = [
         # The place in the map frame [m].
@@ -418,15 +439,17 @@ class StatusRecord(ctypes.Structure):
         ("rate_hz", ctypes.c_double),
         # Median and largest lateness since the last status [s].
         ("lateness_s", ctypes.c_double * 2),
-        # Age of up to three inputs when they were last used [s]; negative = none yet.
-        ("age_s", ctypes.c_double * 3),
+        # Age of up to four inputs when they were last used [s]; negative = none yet.
+        ("age_s", ctypes.c_double * 4),
         # Deadlines missed since the process began.
         ("n_missed", ctypes.c_uint64),
         # Messages lost on the way, by gaps in their numbers.
         ("n_lost", ctypes.c_uint64),
         # Messages refused.
         ("n_refused", ctypes.c_uint64),
-        # Figure of the role's own: futures sampled, points mapped, recorded bytes.
+        # Looks at a channel that the transport broke off.
+        ("n_failed", ctypes.c_uint64),
+        # Figure of the role's own: speed [m/s], jumps made out, futures sampled, recorded bytes.
         ("figure", ctypes.c_double),
     ]
 
@@ -435,13 +458,14 @@ class StatusRecord(ctypes.Structure):
         return "surefoot.Status"
 
 
-assert ctypes.sizeof(StatusRecord) == 96
+assert ctypes.sizeof(StatusRecord) == 112
 assert StatusRecord.role.offset == 0
 assert StatusRecord.process.offset == 8
 assert StatusRecord.rate_hz.offset == 16
 assert StatusRecord.lateness_s.offset == 24
 assert StatusRecord.age_s.offset == 40
-assert StatusRecord.n_missed.offset == 64
-assert StatusRecord.n_lost.offset == 72
-assert StatusRecord.n_refused.offset == 80
-assert StatusRecord.figure.offset == 88
+assert StatusRecord.n_missed.offset == 72
+assert StatusRecord.n_lost.offset == 80
+assert StatusRecord.n_refused.offset == 88
+assert StatusRecord.n_failed.offset == 96
+assert StatusRecord.figure.offset == 104

@@ -50,7 +50,8 @@ pub use gap_case_write::{
 pub use model_text::model_text;
 pub use overlay::overlay;
 pub use recording::{
-    DriveRecorder, DriveTopics, McapDriveLog, McapReadError, RecordError, open_recording, read_drive_log_mcap,
+    DriveRecorder, DriveTopics, McapDriveLog, McapReadError, RecordError, RecordedChannel, RecordedMessage,
+    RecordingError, RecordingMessages, open_recording, read_drive_log_mcap,
 };
 pub use refusal::ArrayFileError;
 pub use results::{OutputError, config_hash, prepare_out_dir, write_bytes_atomic, write_json_atomic};

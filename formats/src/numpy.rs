@@ -47,7 +47,8 @@ pub(crate) fn check_cell(field: &str, cell_m: f64) -> Result<(), Refusal> {
 pub(crate) fn required<R: Read + Seek>(archive: &mut Archive<R>, name: &str) -> Result<Array, Refusal> {
     let array = optional(archive, name)?;
     array.ok_or_else(|| {
-        let mut names: Vec<_> = archive.zip.file_names().map(|name| name.trim_end_matches(".npy")).collect();
+        let names = archive.zip.file_names().filter_map(Result::ok);
+        let mut names: Vec<_> = names.map(|name| name.trim_end_matches(".npy").to_owned()).collect();
         names.sort_unstable();
         Refusal::new(name, "an array of this name", format!("only: {}", names.join(", ")))
     })

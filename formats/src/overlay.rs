@@ -6,12 +6,26 @@ use toml::{Table, Value};
 
 use crate::{ConfigError, ConfigText};
 
-/// The defaults with what the file says in place of theirs. A key that the defaults do not have is refused, and so is
+/// Version of the settings that this program reads. A file says of which it is by `format`; one that does not say is of
+/// the first.
+const FORMAT: i64 = 1;
+const FORMAT_KEY: &str = "format";
+const FIRST_FORMAT: i64 = 1;
+
+/// The defaults with what the file says in place of theirs. A file of another version is refused. A key that the defaults do not have is refused, and so is
 /// a value of another kind than theirs.
 ///
 /// Errors: those of [`ConfigText::parse`].
 pub fn overlay<T: Serialize + DeserializeOwned>(text: &ConfigText, defaults: &T) -> Result<T, ConfigError> {
-    let given: Table = text.parse()?;
+    let mut given: Table = text.parse()?;
+    let found = given.remove(FORMAT_KEY).unwrap_or(Value::Integer(FIRST_FORMAT));
+    if found != Value::Integer(FORMAT) {
+        return Err(text.refuse(
+            FORMAT_KEY,
+            format!("settings of version {FORMAT}"),
+            format!("version {found}"),
+        ));
+    }
     let refuse = |problem: String| text.refuse("", "settings that can be written as TOML", problem);
     let mut merged = Table::try_from(defaults).map_err(|error| refuse(error.to_string()))?;
     merge(text, &mut merged, given, "")?;
@@ -100,6 +114,17 @@ mod tests {
     fn another_choice_replaces_the_first_with_its_parameters() {
         let changed = read("[inner.choice.share]\nfraction = 0.1\n").unwrap();
         assert_eq!(changed.inner.choice, Choice::Share { fraction: 0.1 });
+    }
+
+    #[test]
+    fn settings_of_another_version_are_refused_with_both_versions() {
+        assert_eq!(read("format = 1\nname = \"x\"\n").unwrap().name, "x");
+        for found in ["0", "2", "\"1\""] {
+            let told = read(&format!("name = \"x\"\nformat = {found}\nlength = 1\n")).unwrap_err();
+            let expected =
+                format!("settings.toml:2: format: expected settings of version 1, found version {found}");
+            assert_eq!(told, expected, "before any key that another version may have");
+        }
     }
 
     #[test]

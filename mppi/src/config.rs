@@ -1,9 +1,10 @@
 //! What a user can set, with its ranges. Costs are in seconds: of everything that is weighed, one second more on the
 //! way is the unit.
 
-use crate::kernel::{CHUNK, Isa, Machine};
+use crate::kernel::CHUNK;
 use crate::rollout::MAX_SLOTS;
 use bicycle::ModelError;
+use bicycle::lanes::{Instructions, Isa, IsaAbsent};
 use serde::{Deserialize, Serialize};
 
 /// Controls of all rollouts together: half a gigabyte.
@@ -23,7 +24,8 @@ pub struct Config {
     pub n_iterations: usize,
     /// Threads that share the rollouts, the calling one among them. The result does not depend on it.
     pub n_threads: usize,
-    /// Instruction set; a forced one that the machine lacks is refused.
+    /// Instruction set, of the controller and of the maps that a pipeline makes for it; a forced one that the machine
+    /// lacks is refused.
     pub isa: Isa,
     /// How controls are perturbed.
     pub sampling: Sampling,
@@ -227,9 +229,7 @@ impl Config {
         let n_controls = self.n_rollouts * self.n_steps;
         check(n_controls <= MOST_CONTROLS, "n_rollouts x n_steps", "at most 67108864", n_controls as f64)?;
         self.validate_numbers()?;
-        if Machine::find(self.isa).is_none() {
-            return Err(ConfigError::IsaAbsent { isa: self.isa });
-        }
+        Instructions::find(self.isa)?;
         Ok(())
     }
 
@@ -297,11 +297,8 @@ pub enum ConfigError {
         found: f64,
     },
     /// The forced instruction set is not there.
-    #[error("isa: this machine has no {isa:?}; use auto or portable")]
-    IsaAbsent {
-        /// What was asked for.
-        isa: Isa,
-    },
+    #[error(transparent)]
+    Isa(#[from] IsaAbsent),
     /// The model of the vehicle cannot be.
     #[error("model: {0}")]
     Model(#[from] ModelError),

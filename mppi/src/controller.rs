@@ -9,7 +9,7 @@ use crate::config::{Actuation, Config, ConfigError};
 use crate::diagnostics::Diagnostics;
 use crate::judgement::Judge;
 use crate::kernel::workers::Workers;
-use crate::kernel::{CHUNK, Machine, functions};
+use crate::kernel::{CHUNK, functions};
 use crate::lag;
 use crate::ledger::Ledger;
 use crate::objective::{Input, ReferenceStep};
@@ -20,7 +20,7 @@ use crate::rollout::MAX_SLOTS;
 use crate::sampling::Control;
 use crate::summary::Totals;
 use crate::weights::WeightSummary;
-use bicycle::lanes::STEERING_DOMAIN_RAD;
+use bicycle::lanes::{Instructions, STEERING_DOMAIN_RAD};
 use bicycle::{Command, Decision, Effect, HoldReason, Model, State, Stepper, StopReason};
 use traversability::RiskMapView;
 
@@ -53,7 +53,7 @@ pub struct Controller {
     pub(crate) config: Config,
     pub(crate) model: Model,
     seed: u64,
-    machine: Machine,
+    instructions: Instructions,
     workers: Workers,
     pub(crate) chunks: Vec<Chunk>,
     /// Chunks that are sampled, from the first on.
@@ -93,7 +93,7 @@ impl Controller {
     pub fn new(config: Config, model: Model, seed: u64) -> Result<Self, ConfigError> {
         config.validate()?;
         model.validate()?;
-        let machine = Machine::find(config.isa).ok_or(ConfigError::IsaAbsent { isa: config.isa })?;
+        let instructions = Instructions::find(config.isa)?;
         let stepper = Stepper::new(&model, config.step_s, 1.0);
         let stepper = match config.actuation {
             Actuation::Instant => stepper.with_instant_actuators(),
@@ -126,11 +126,11 @@ impl Controller {
             slots: [0.0; MAX_SLOTS],
             start: State::default(),
             temperature_s: 1.0,
-            diagnostics: Diagnostics::new(machine.isa()),
+            diagnostics: Diagnostics::new(instructions.isa()),
             config,
             model,
             seed,
-            machine,
+            instructions,
         })
     }
 
@@ -225,7 +225,7 @@ impl Controller {
         if !is_usable(&input.map) {
             return Some(Decision::Hold(HoldReason::NoMap));
         }
-        if (end_m[0] - x_m).hypot(end_m[1] - y_m) <= tolerance_m {
+        if libm::hypot(end_m[0] - x_m, end_m[1] - y_m) <= tolerance_m {
             return Some(Decision::Hold(HoldReason::AtGoal));
         }
         let outside = input.map.geometry.cell_at(x_m, y_m).is_none();
@@ -273,7 +273,7 @@ impl Controller {
             .fold(Totals::default(), |totals, chunk| totals.plus(&chunk.totals));
         let (chunk, lane) = summary.best;
         self.diagnostics = Diagnostics {
-            isa: self.machine.isa(),
+            isa: self.instructions.isa(),
             best_terms_s: self.chunks[chunk].terms.each_ref().map(|row| row.0[lane]),
             mean_terms_s: totals.mean_terms_s(),
             baseline_s: summary.baseline_s,

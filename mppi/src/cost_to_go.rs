@@ -157,7 +157,7 @@ impl CostToGo {
         let n_padded = (n_rows + 2 * PADDING) * (n_cols + 2 * PADDING);
         // The queue spans the longest edge and the spread of the seeds, both counted in shortest edges.
         let longest_edge = stencil::LONGEST_CELLS * config.forbidden_slowdown;
-        let seed_spread = (n_rows as f64).hypot(n_cols as f64) / config.outside_speed_share;
+        let seed_spread = libm::hypot(n_rows as f64, n_cols as f64) / config.outside_speed_share;
         let n_buckets = longest_edge.max(seed_spread) as usize + 3;
         Ok(Self {
             config,
@@ -291,7 +291,7 @@ impl CostToGo {
                 // From the goal's own cell the line is too short to say where it passes.
                 if inside.is_none() && (goal == Some(cell) || !self.crosses_inside(cell, goal_m)) {
                     let [x_m, y_m] = self.geometry.centre_m(cell);
-                    let distance_m = (goal_m[0] - x_m).hypot(goal_m[1] - y_m);
+                    let distance_m = libm::hypot(goal_m[0] - x_m, goal_m[1] - y_m);
                     self.improve(place, distance_m as f32 * outside_slowness);
                 }
             }

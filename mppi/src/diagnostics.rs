@@ -1,6 +1,6 @@
 //! What a cycle tells about itself.
 
-use crate::kernel::Isa;
+use bicycle::lanes::Isa;
 use serde::Serialize;
 
 /// The parts of a rollout's cost.

@@ -1,5 +1,5 @@
-//! What the inner loops need of a machine beyond [`Lanes`]: bits, loads, stores and table lookups, and the choice of
-//! the instruction set at run time.
+//! What the inner loops need of a machine beyond [`Lanes`]: bits, loads, stores and table lookups, and how work
+//! is run on the instruction set that was chosen.
 //!
 //! Two modules below hold the crate's `unsafe`: [`lookup`] reads tables at indices that it has clamped itself, and
 //! [`workers`] lends a borrowed job to threads that outlive it.
@@ -14,8 +14,7 @@ mod primitives;
 #[allow(unsafe_code)]
 pub(crate) mod workers;
 
-use bicycle::lanes::{Lanes, Portable, Real};
-use serde::{Deserialize, Serialize};
+use bicycle::lanes::{Instructions, Lanes, Portable, Real};
 use traversability::{Ground, Risk};
 
 /// Rollouts that are stored side by side and handed to a thread together.
@@ -103,35 +102,10 @@ pub(crate) trait Kernel: Lanes {
     }
 }
 
-/// Which instructions the controller uses.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Isa {
-    /// The best that the machine has.
-    #[default]
-    Auto,
-    /// AVX-512 (F, BW, CD, DQ, VL).
-    Avx512,
-    /// AVX2 with FMA.
-    Avx2,
-    /// What every machine of this architecture has.
-    Portable,
-}
-
 /// A piece of work written for any instruction set.
 pub(crate) trait Work {
     type Output;
     fn run<K: Kernel>(self, kernel: K) -> Self::Output;
-}
-
-/// An instruction set that is known to be there.
-#[derive(Clone, Copy, Debug)]
-pub(crate) enum Machine {
-    #[cfg(target_arch = "x86_64")]
-    Avx512(pulp::x86::V4),
-    #[cfg(target_arch = "x86_64")]
-    Avx2(pulp::x86::V3),
-    Portable,
 }
 
 #[cfg(target_arch = "x86_64")]
@@ -146,40 +120,14 @@ impl<K: Kernel, W: Work> pulp::NullaryFnOnce for Vectorized<K, W> {
     }
 }
 
-impl Machine {
-    /// The machine's form of the wish; `None` when it lacks the instructions.
-    pub(crate) fn find(isa: Isa) -> Option<Self> {
-        match isa {
-            Isa::Auto => Self::find(Isa::Avx512).or_else(|| Self::find(Isa::Avx2)).or(Some(Self::Portable)),
-            #[cfg(target_arch = "x86_64")]
-            Isa::Avx512 => pulp::x86::V4::try_new().map(Self::Avx512),
-            #[cfg(target_arch = "x86_64")]
-            Isa::Avx2 => pulp::x86::V3::try_new().map(Self::Avx2),
-            Isa::Portable => Some(Self::Portable),
-            #[cfg(not(target_arch = "x86_64"))]
-            _ => None,
-        }
-    }
-
-    pub(crate) fn isa(self) -> Isa {
-        match self {
-            #[cfg(target_arch = "x86_64")]
-            Self::Avx512(_) => Isa::Avx512,
-            #[cfg(target_arch = "x86_64")]
-            Self::Avx2(_) => Isa::Avx2,
-            Self::Portable => Isa::Portable,
-        }
-    }
-
-    /// Runs the work with these instructions.
-    #[inline]
-    pub(crate) fn run<W: Work>(self, work: W) -> W::Output {
-        match self {
-            #[cfg(target_arch = "x86_64")]
-            Self::Avx512(kernel) => kernel.vectorize(Vectorized(kernel, work)),
-            #[cfg(target_arch = "x86_64")]
-            Self::Avx2(kernel) => kernel.vectorize(Vectorized(kernel, work)),
-            Self::Portable => work.run(Portable),
-        }
+/// Runs the work with these instructions.
+#[inline]
+pub(crate) fn run<W: Work>(instructions: Instructions, work: W) -> W::Output {
+    match instructions {
+        #[cfg(target_arch = "x86_64")]
+        Instructions::Avx512(kernel) => kernel.vectorize(Vectorized(kernel, work)),
+        #[cfg(target_arch = "x86_64")]
+        Instructions::Avx2(kernel) => kernel.vectorize(Vectorized(kernel, work)),
+        Instructions::Portable => work.run(Portable),
     }
 }

@@ -57,10 +57,10 @@ mod sampling;
 mod summary;
 mod weights;
 
+pub use bicycle::lanes::Isa;
 pub use config::{Actuation, Config, ConfigError, Costs, Recovery, SampleSpace, Sampling, Temperature};
 pub use controller::{Controller, Phase};
 pub use cost_to_go::{CostToGo, CostToGoConfig, CostToGoError, CostToGoView, Neighbourhood};
 pub use diagnostics::{CostTerm, Diagnostics};
-pub use kernel::Isa;
 pub use objective::{Input, Objective, ReferencePath, Terminal};
 pub use replay::Rollout;

@@ -91,7 +91,7 @@ impl ReferencePath<'_> {
             let (along, length_m) = direction(ends[0], ends[1]);
             let from = [at_m[0] - ends[0][0], at_m[1] - ends[0][1]];
             let foot_m = (from[0] * along[0] + from[1] * along[1]).clamp(0.0, length_m);
-            let distance_m = (from[0] - foot_m * along[0]).hypot(from[1] - foot_m * along[1]);
+            let distance_m = libm::hypot(from[0] - foot_m * along[0], from[1] - foot_m * along[1]);
             if distance_m < best.0 {
                 best = (distance_m, passed_m + foot_m);
             }
@@ -125,7 +125,7 @@ impl ReferencePath<'_> {
 /// Unit vector and length from one point to another.
 fn direction(from_m: [f64; 2], to_m: [f64; 2]) -> ([f64; 2], f64) {
     let (dx, dy) = (to_m[0] - from_m[0], to_m[1] - from_m[1]);
-    let length_m = dx.hypot(dy);
+    let length_m = libm::hypot(dx, dy);
     if length_m > 0.0 { ([dx / length_m, dy / length_m], length_m) } else { ([1.0, 0.0], 0.0) }
 }
 

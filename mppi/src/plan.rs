@@ -33,8 +33,11 @@ impl Plan {
             SampleSpace::Controls => 1.0,
             SampleSpace::Rates => config.step_s,
         };
-        let correlation =
-            if sampling.correlation_s > 0.0 { (-config.step_s / sampling.correlation_s).exp() } else { 0.0 };
+        let correlation = if sampling.correlation_s > 0.0 {
+            libm::exp(-config.step_s / sampling.correlation_s)
+        } else {
+            0.0
+        };
         Self {
             nominal: vec![[0.0; 2]; config.n_steps],
             steps: vec![SampleStep::default(); config.n_steps],

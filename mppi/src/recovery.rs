@@ -39,14 +39,14 @@ impl Watch {
     pub(crate) fn observe(&mut self, state: &State, elapsed_s: f64) -> Mode {
         let here_m = [state.x_m, state.y_m];
         let anchor_m = *self.anchor_m.get_or_insert(here_m);
-        let moved_m = (here_m[0] - anchor_m[0]).hypot(here_m[1] - anchor_m[1]);
+        let moved_m = libm::hypot(here_m[0] - anchor_m[0], here_m[1] - anchor_m[1]);
         self.waited_s += elapsed_s;
         match self.mode {
             Mode::Onward if moved_m >= self.config.progress_m => self.begin(Mode::Onward, here_m),
             Mode::Onward if self.waited_s >= self.config.patience_s => {
                 let back_m = self.config.distance_m;
-                let target_m =
-                    [here_m[0] - back_m * state.yaw_rad.cos(), here_m[1] - back_m * state.yaw_rad.sin()];
+                let (sine, cosine) = libm::sincos(state.yaw_rad);
+                let target_m = [here_m[0] - back_m * cosine, here_m[1] - back_m * sine];
                 self.begin(Mode::BackUp { target_m }, here_m);
             }
             Mode::BackUp { .. }

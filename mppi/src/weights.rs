@@ -33,7 +33,7 @@ pub(crate) struct WeightSummary {
 impl WeightSummary {
     /// -T ln(mean exp(-cost / T)) over `n` rollouts [s].
     pub(crate) fn free_energy_s(&self, n: usize) -> f32 {
-        self.baseline_s - self.temperature_s * (self.normalizer / n as f32).ln()
+        self.baseline_s - self.temperature_s * libm::logf(self.normalizer / n as f32)
     }
 }
 

@@ -1,12 +1,13 @@
 //! The second part of the pipeline: the map of the ground becomes risk and time to the goal.
 
+use bicycle::lanes::Instructions;
 use bicycle::{Limits, Vehicle};
 use mppi::{CostToGo, CostToGoView};
-use terrain::{CellRegion, GridMap, SurfaceCell};
+use terrain::{CellRegion, DistantPosition, GridMap, SurfaceCell};
 use traversability::{CvarLevel, Risk, RiskMapView};
 
 use crate::risk::{Belief, RiskLayer, StuckPose};
-use crate::{Config, NavigatorError};
+use crate::{Config, Jump, NavigatorError};
 
 /// Judges the ground and finds the least time over it to the goal.
 pub struct Assessor {
@@ -15,7 +16,8 @@ pub struct Assessor {
 }
 
 impl Assessor {
-    /// An assessor of a surface with the settings of `config`; the cost to go keeps to `limits`.
+    /// An assessor of a surface with the settings of `config`, on the instruction set of its controller; the cost to go
+    /// keeps to `limits`.
     pub fn new(
         vehicle: &Vehicle,
         limits: &Limits,
@@ -25,8 +27,9 @@ impl Assessor {
     ) -> Result<Self, NavigatorError> {
         config.validate()?;
         let window = config.risk_map;
+        let instructions = Instructions::find(config.controller.isa).map_err(mppi::ConfigError::from)?;
         Ok(Self {
-            layer: RiskLayer::new(belief, &config.prior, level, &vehicle.geometry, config)?,
+            layer: RiskLayer::new(belief, level, &vehicle.geometry, config, instructions)?,
             cost_to_go: CostToGo::new(
                 config.cost_to_go,
                 &config.allowed(limits),
@@ -43,6 +46,7 @@ impl Assessor {
         surface: &GridMap<SurfaceCell>,
         changed: &CellRegion,
     ) -> Result<(), NavigatorError> {
+        DistantPosition::check(position_m, self.layer.resolution_m())?;
         Ok(self.layer.update(position_m, surface, changed)?)
     }
 
@@ -82,8 +86,8 @@ impl Assessor {
         self.layer.stuck()
     }
 
-    /// The localisation moved by a step, and what is remembered in its frame moves along.
-    pub fn shift_stuck(&mut self, step_m: [f64; 2]) {
-        self.layer.shift_stuck(step_m);
+    /// The localisation jumped, and what is remembered in its frame moves along.
+    pub fn follow_jump(&mut self, jump: &Jump) {
+        self.layer.follow_jump(jump);
     }
 }

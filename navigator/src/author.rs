@@ -1,6 +1,7 @@
 //! Who judges the ground: physics, or what was learned.
 
 use bicycle::Geometry;
+use bicycle::lanes::Instructions;
 use evidential::{BeliefMap, BeliefMapError, Learned};
 use physics_prior::{Assumption, PriorMap};
 use terrain::{CellRegion, GridGeometry, GridMap, SurfaceCell};
@@ -22,8 +23,10 @@ impl Author {
         surface_resolution_m: f64,
         risk: GridGeometry,
         n_yaws: usize,
+        instructions: Instructions,
     ) -> Result<Self, BeliefMapError> {
-        Ok(Self::Prior(Box::new(PriorMap::new(geometry, assumption, surface_resolution_m, risk, n_yaws)?)))
+        let map = PriorMap::new(geometry, assumption, surface_resolution_m, risk, n_yaws, instructions)?;
+        Ok(Self::Prior(Box::new(map)))
     }
 
     /// See [`BeliefMap::new`].
@@ -33,8 +36,10 @@ impl Author {
         surface_resolution_m: f64,
         risk: GridGeometry,
         n_yaws: usize,
+        instructions: Instructions,
     ) -> Result<Self, BeliefMapError> {
-        Ok(Self::Networks(Box::new(BeliefMap::new(geometry, learned, surface_resolution_m, risk, n_yaws)?)))
+        let map = BeliefMap::new(geometry, learned, surface_resolution_m, risk, n_yaws, instructions)?;
+        Ok(Self::Networks(Box::new(map)))
     }
 
     pub fn risk_map(&self) -> &RiskMap {

@@ -4,7 +4,7 @@ use bicycle::{Limits, Vehicle};
 use mppi::CostToGoConfig;
 use physics_prior::PriorConfig;
 use serde::{Deserialize, Serialize};
-use terrain::ElevationConfig;
+use terrain::{BodyBox, ElevationConfig};
 
 use crate::{GuardConfig, NavigatorError};
 
@@ -70,6 +70,7 @@ impl Config {
         let fitting = ElevationConfig::scaled_to(length_m);
         Self {
             elevation: ElevationConfig {
+                own_body: own_body(vehicle),
                 resolution_m: risk_m,
                 n_rows: elevation_n,
                 n_cols: elevation_n,
@@ -142,6 +143,26 @@ impl Config {
     }
 }
 
+/// Margin around the vehicle, over its length: for the sensor's noise and for what is mounted on the body.
+const BODY_MARGIN: f64 = 0.03;
+/// Height of the vehicle over its length, which no description gives: about that of a car.
+const BODY_HEIGHT: f64 = 0.5;
+
+/// The room that a vehicle takes up, from half its clearance above the ground to the roof. What lies lower is the
+/// ground itself as far as it can be driven over.
+fn own_body(vehicle: &Vehicle) -> BodyBox {
+    let geometry = &vehicle.geometry;
+    let (length_m, radius_m) = (geometry.length_m, geometry.wheel_radius_m);
+    let (half_width_m, margin_m) = (0.5 * geometry.width_m, BODY_MARGIN * length_m);
+    let bounds = BodyBox {
+        min_m: [-geometry.rear_overhang_m, -half_width_m, 0.0],
+        max_m: [length_m - geometry.rear_overhang_m, half_width_m, BODY_HEIGHT * length_m - radius_m],
+    };
+    let mut body = bounds.grown(margin_m);
+    body.min_m[2] = 0.5 * geometry.ground_clearance_m - radius_m;
+    body
+}
+
 /// Cells over which gaps of the elevation map are filled at the least: some lie between the rays whatever the size of
 /// the machine. A small one sees only the tops of plants as tall as itself, and the ground below them far before them.
 fn gap_cells(length_m: f64) -> f64 {
@@ -174,6 +195,6 @@ fn controller(length_m: f64) -> mppi::Config {
 
 /// Limits that keep a cell size readable: 0.1944 becomes 0.19.
 fn round_to_two_digits(length_m: f64) -> f64 {
-    let scale = 10f64.powi(1 - length_m.log10().floor() as i32);
+    let scale = libm::pow(10.0, 1.0 - libm::log10(length_m).floor());
     (length_m * scale).round() / scale
 }

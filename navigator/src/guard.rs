@@ -1,6 +1,18 @@
-//! What may enter the pipeline: fresh, finite, moving measurements. Everything else has a stop reason.
+//! What may enter the pipeline: fresh, finite, moving measurements in order. Everything else has a stop reason.
+
+use std::collections::BTreeMap;
 
 use bicycle::{Odometry, StopReason};
+
+use crate::jump::{Jump, turned_rad};
+
+/// How far ahead of a decision, or of the odometry, a measurement may claim to be: clocks of two machines differ [s].
+const FUTURE_S: f64 = 0.02;
+/// Beyond these no vehicle is, moves, or turns: [m], [rad], [m/s], [rad/s].
+const POSITION_MAX_M: f64 = 1e8;
+const ANGLE_MAX_RAD: f64 = 1e6;
+const SPEED_MAX_MPS: f64 = 1e3;
+const RATE_MAX_RADPS: f64 = 1e3;
 
 /// Age limits and plausibility limits of the inputs.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -15,11 +27,25 @@ pub struct GuardConfig {
     pub frozen_max_s: f64,
     /// Shortest horizontal step beyond dead reckoning that counts as a correction of the localisation [m].
     pub jump_min_m: f64,
+    /// Smallest turn beyond dead reckoning that counts as one [rad].
+    pub jump_min_rad: f64,
+    /// Farthest that a scan may be ahead of the last odometry to be placed by reckoning on from it [s].
+    pub extrapolation_max_s: f64,
+    /// How long a scan waits for the odometry after it before it is placed without [s].
+    pub odometry_wait_max_s: f64,
 }
 
 impl Default for GuardConfig {
     fn default() -> Self {
-        Self { odometry_age_max_s: 0.3, scan_age_max_s: 1.0, frozen_max_s: 0.5, jump_min_m: 0.4 }
+        Self {
+            odometry_age_max_s: 0.3,
+            scan_age_max_s: 1.0,
+            frozen_max_s: 0.5,
+            jump_min_m: 0.4,
+            jump_min_rad: 0.1,
+            extrapolation_max_s: 0.1,
+            odometry_wait_max_s: 0.1,
+        }
     }
 }
 
@@ -31,16 +57,25 @@ impl GuardConfig {
             ("guard.scan_age_max_s", self.scan_age_max_s),
             ("guard.frozen_max_s", self.frozen_max_s),
             ("guard.jump_min_m", self.jump_min_m),
+            ("guard.jump_min_rad", self.jump_min_rad),
+            ("guard.extrapolation_max_s", self.extrapolation_max_s),
+            ("guard.odometry_wait_max_s", self.odometry_wait_max_s),
         ];
         fields.into_iter().find(|(_, value)| !(value.is_finite() && *value > 0.0))
     }
 }
 
-/// A correction of the localisation: the map frame moved under the vehicle, the vehicle did not.
+/// What an odometry sample that was admitted says of the time and the map before it.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Jump {
-    /// Step beyond dead reckoning, east, north, up [m].
-    pub step_m: [f64; 3],
+pub enum Admitted {
+    /// The vehicle drove on.
+    Onward,
+    /// The last sample once more: no news, and no fault.
+    Again,
+    /// The localisation corrected itself.
+    Jumped(Jump),
+    /// The clock was set back: nothing of before can be told in its time.
+    ClockSetBack,
 }
 
 /// Watches the inputs over time.
@@ -49,38 +84,60 @@ pub struct Guard {
     config: GuardConfig,
     last: Option<Odometry>,
     changed_at_ns: u64,
-    /// Of the last usable scan; of the first odometry as long as none has come.
+    /// Of the last usable scan.
     scan_at_ns: Option<u64>,
+    /// Since when the first scan is waited for; none in a time that began anew.
+    awaits_since_ns: Option<u64>,
+    /// First and last stamp of samples refused in a row for their order, if each is later than the one before.
+    behind_ns: Option<[u64; 2]>,
     commanded_mps: f32,
+    refused: BTreeMap<StopReason, u64>,
 }
 
 impl Guard {
     /// A guard that has seen nothing.
     pub fn new(config: GuardConfig) -> Self {
-        Self { config, last: None, changed_at_ns: 0, scan_at_ns: None, commanded_mps: 0.0 }
+        Self {
+            config,
+            last: None,
+            changed_at_ns: 0,
+            scan_at_ns: None,
+            awaits_since_ns: None,
+            behind_ns: None,
+            commanded_mps: 0.0,
+            // An entry for every reason that there is here, so that counting takes no memory.
+            refused: REFUSALS.into_iter().map(|reason| (reason, 0)).collect(),
+        }
     }
 
-    /// Takes in one odometry sample and says whether the localisation jumped.
-    pub fn admit_odometry(&mut self, odometry: &Odometry) -> Result<Option<Jump>, StopReason> {
-        if !odometry.is_finite() {
-            return Err(StopReason::NonFiniteInput);
+    /// Takes in one odometry sample and says whether the localisation jumped. One that is not finite, cannot be, or
+    /// is older than the last is refused and counted.
+    ///
+    /// Samples that are behind the last one and go on for longer than the age limit are a clock that was set back, or
+    /// a last one that was ahead of its time: the guard begins anew with them.
+    pub fn admit_odometry(&mut self, odometry: &Odometry) -> Result<Admitted, StopReason> {
+        let admitted = self.judge(odometry);
+        if let Err(reason) = admitted {
+            self.count(reason);
         }
-        let last = self.last.replace(*odometry);
-        let repeats = last.is_some_and(|last| is_same_place(&last, odometry));
-        self.scan_at_ns.get_or_insert(odometry.valid_at_ns);
-        let gap_s = age_s(odometry.valid_at_ns, self.changed_at_ns);
-        if !repeats || self.commanded_mps == 0.0 && !self.is_frozen(odometry.valid_at_ns) {
-            self.changed_at_ns = odometry.valid_at_ns;
-        }
-        // After a gap nobody knows how far it drove: a step then is motion.
-        Ok(last
-            .filter(|_| gap_s <= self.config.odometry_age_max_s)
-            .and_then(|last| self.jump(&last, odometry)))
+        admitted
     }
 
-    /// Notes a scan that held usable points.
+    /// Whether a scan of this time is news: neither older than the last that was noted, nor ahead of the odometry.
+    /// One that is not is counted.
+    pub fn admit_scan(&mut self, valid_at_ns: u64) -> Result<(), StopReason> {
+        let judged = self.judge_scan(valid_at_ns);
+        if let Err(reason) = judged {
+            self.count(reason);
+        }
+        judged
+    }
+
+    /// Notes a scan that held usable points. One that [`Guard::admit_scan`] would refuse changes nothing.
     pub fn note_scan(&mut self, valid_at_ns: u64) {
-        self.scan_at_ns = Some(valid_at_ns);
+        if self.judge_scan(valid_at_ns).is_ok() {
+            self.scan_at_ns = Some(valid_at_ns);
+        }
     }
 
     /// Notes what the vehicle was told, so that standing still on purpose is not taken for frozen odometry.
@@ -88,36 +145,142 @@ impl Guard {
         self.commanded_mps = speed_mps;
     }
 
+    /// How many measurements were refused, by reason.
+    pub fn refused(&self) -> &BTreeMap<StopReason, u64> {
+        &self.refused
+    }
+
     /// Whether the vehicle may drive at this time on what was admitted.
     pub fn check(&self, now_ns: u64) -> Result<(), StopReason> {
-        let odometry_at_ns = self.last.map_or(0, |last| last.valid_at_ns);
-        if self.last.is_none()
-            || age_s(now_ns, odometry_at_ns) > self.config.odometry_age_max_s
-            || self.is_frozen(odometry_at_ns)
-        {
+        let Some(odometry_at_ns) = self.last.map(|last| last.valid_at_ns) else {
+            return Err(StopReason::StaleOdometry);
+        };
+        let newest_ns = self.scan_at_ns.map_or(odometry_at_ns, |scan_at_ns| scan_at_ns.max(odometry_at_ns));
+        if age_s(newest_ns, now_ns) > FUTURE_S {
+            return Err(StopReason::InputFromFuture);
+        }
+        if age_s(now_ns, odometry_at_ns) > self.config.odometry_age_max_s || self.is_frozen(odometry_at_ns) {
             return Err(StopReason::StaleOdometry);
         }
-        match self.scan_at_ns {
-            Some(at_ns) if age_s(now_ns, at_ns) > self.config.scan_age_max_s => Err(StopReason::StaleScan),
-            _ => Ok(()),
+        match self.scan_at_ns.or(self.awaits_since_ns) {
+            Some(at_ns) if age_s(now_ns, at_ns) <= self.config.scan_age_max_s => Ok(()),
+            _ => Err(StopReason::StaleScan),
         }
+    }
+
+    fn judge(&mut self, odometry: &Odometry) -> Result<Admitted, StopReason> {
+        check_numbers(odometry)?;
+        let at_ns = odometry.valid_at_ns;
+        if self.last.is_some_and(|last| last == *odometry) {
+            return Ok(Admitted::Again);
+        }
+        let is_behind = self.last.is_some_and(|last| at_ns <= last.valid_at_ns);
+        if is_behind && !self.is_set_back(at_ns) {
+            return Err(StopReason::InputOutOfOrder);
+        }
+        self.behind_ns = None;
+        if is_behind {
+            self.begin_anew(odometry);
+            return Ok(Admitted::ClockSetBack);
+        }
+        let last = self.last.replace(*odometry);
+        if last.is_none() {
+            self.awaits_since_ns = Some(at_ns);
+        }
+        let gap_s = age_s(at_ns, self.changed_at_ns);
+        let repeats = last.is_some_and(|last| is_same_place(&last, odometry));
+        if !repeats || self.commanded_mps == 0.0 && !self.is_frozen(at_ns) {
+            self.changed_at_ns = at_ns;
+        }
+        // After a gap nobody knows how far it drove: a step then is motion.
+        let jump = last
+            .filter(|_| !repeats && gap_s <= self.config.odometry_age_max_s)
+            .and_then(|last| self.jump(&last, odometry, gap_s));
+        Ok(jump.map_or(Admitted::Onward, Admitted::Jumped))
+    }
+
+    /// Whether a sample behind the last one ends a row of such that has gone on for longer than the age limit.
+    fn is_set_back(&mut self, at_ns: u64) -> bool {
+        let first_ns =
+            self.behind_ns.filter(|[_, last_ns]| at_ns > *last_ns).map_or(at_ns, |[first_ns, _]| first_ns);
+        self.behind_ns = Some([first_ns, at_ns]);
+        age_s(at_ns, first_ns) > self.config.odometry_age_max_s
+    }
+
+    /// Of the scans nothing is known in the new time but that none has come: they count as too old.
+    fn begin_anew(&mut self, odometry: &Odometry) {
+        let at_ns = odometry.valid_at_ns;
+        (self.last, self.changed_at_ns) = (Some(*odometry), at_ns);
+        (self.scan_at_ns, self.awaits_since_ns) = (None, None);
+    }
+
+    fn judge_scan(&self, valid_at_ns: u64) -> Result<(), StopReason> {
+        // Without odometry nobody knows what time it is.
+        let last = self.last.ok_or(StopReason::StaleOdometry)?;
+        if age_s(valid_at_ns, last.valid_at_ns) > self.config.odometry_age_max_s {
+            return Err(StopReason::InputFromFuture);
+        }
+        let is_older = self.scan_at_ns.is_some_and(|scan_at_ns| valid_at_ns < scan_at_ns);
+        if is_older { Err(StopReason::InputOutOfOrder) } else { Ok(()) }
+    }
+
+    fn count(&mut self, reason: StopReason) {
+        *self.refused.entry(reason).or_default() += 1;
     }
 
     fn is_frozen(&self, now_ns: u64) -> bool {
         age_s(now_ns, self.changed_at_ns) > self.config.frozen_max_s
     }
 
-    fn jump(&self, last: &Odometry, next: &Odometry) -> Option<Jump> {
-        let dt_s = age_s(next.valid_at_ns, last.valid_at_ns);
-        let [forward_m, left_m] = [0, 1].map(|i| 0.5 * (last.velocity_mps[i] + next.velocity_mps[i]) * dt_s);
-        let (sin, cos) = (0.5 * (last.attitude_rad[2] + next.attitude_rad[2])).sin_cos();
-        let step_m = [
-            next.position_m[0] - last.position_m[0] - (forward_m * cos - left_m * sin),
-            next.position_m[1] - last.position_m[1] - (forward_m * sin + left_m * cos),
-            next.position_m[2] - last.position_m[2],
-        ];
-        (step_m[0].hypot(step_m[1]) > self.config.jump_min_m).then_some(Jump { step_m })
+    /// The correction, if the pose is too far from where the last one leads in this time.
+    fn jump(&self, last: &Odometry, next: &Odometry, elapsed_s: f64) -> Option<Jump> {
+        let mean = |a: f64, b: f64| 0.5 * (a + b);
+        let velocity_mps = [0, 1].map(|i| mean(last.velocity_mps[i], next.velocity_mps[i]));
+        let yaw_rate_radps = mean(last.yaw_rate_radps, next.yaw_rate_radps);
+        let reckoned = reckoned(&Odometry { velocity_mps, yaw_rate_radps, ..*last }, elapsed_s);
+        let ([x_m, y_m, _], yaw_rad) = (reckoned.position_m, reckoned.attitude_rad[2]);
+        let away_m = libm::hypot(next.position_m[0] - x_m, next.position_m[1] - y_m);
+        let turned_rad = turned_rad(yaw_rad, next.attitude_rad[2]).abs();
+        (away_m > self.config.jump_min_m || turned_rad > self.config.jump_min_rad)
+            .then(|| Jump::between((reckoned.position_m, yaw_rad), (next.position_m, next.attitude_rad[2])))
     }
+}
+
+/// Reasons for which measurements are refused.
+const REFUSALS: [StopReason; 5] = [
+    StopReason::StaleOdometry,
+    StopReason::NonFiniteInput,
+    StopReason::InputOutOfRange,
+    StopReason::InputOutOfOrder,
+    StopReason::InputFromFuture,
+];
+
+/// Where a vehicle is after a while at its velocity and yaw rate, on level ground.
+pub(crate) fn reckoned(from: &Odometry, elapsed_s: f64) -> Odometry {
+    let [forward_m, left_m] = from.velocity_mps.map(|value| value * elapsed_s);
+    let turned_rad = from.yaw_rate_radps * elapsed_s;
+    let ([x_m, y_m, z_m], [roll_rad, pitch_rad, yaw_rad]) = (from.position_m, from.attitude_rad);
+    let (sin, cos) = libm::sincos(yaw_rad + 0.5 * turned_rad);
+    Odometry {
+        position_m: [x_m + forward_m * cos - left_m * sin, y_m + forward_m * sin + left_m * cos, z_m],
+        attitude_rad: [roll_rad, pitch_rad, yaw_rad + turned_rad],
+        ..*from
+    }
+}
+
+fn check_numbers(odometry: &Odometry) -> Result<(), StopReason> {
+    if !odometry.is_finite() {
+        return Err(StopReason::NonFiniteInput);
+    }
+    let Odometry { position_m, attitude_rad, velocity_mps, yaw_rate_radps, .. } = odometry;
+    let within = |values: &[f64], limit: f64| values.iter().all(|value| value.abs() <= limit);
+    let can_be = within(position_m, POSITION_MAX_M)
+        && within(attitude_rad, ANGLE_MAX_RAD)
+        && within(velocity_mps, SPEED_MAX_MPS)
+        && within(&[*yaw_rate_radps], RATE_MAX_RADPS)
+        && within(&[odometry.wheel_speed_mps], SPEED_MAX_MPS)
+        && within(&[odometry.steering_rad], ANGLE_MAX_RAD);
+    if can_be { Ok(()) } else { Err(StopReason::InputOutOfRange) }
 }
 
 /// Whether pose and velocity are the same to the last bit. Wheels and steering are measured by others: they go on
@@ -135,130 +298,4 @@ fn age_s(now_ns: u64, then_ns: u64) -> f64 {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    const CYCLE_NS: u64 = 100_000_000;
-
-    fn driving(cycle: u64) -> Odometry {
-        // 1 m/s along x: 0.1 m per cycle.
-        Odometry {
-            valid_at_ns: cycle * CYCLE_NS,
-            position_m: [0.1 * cycle as f64, 0.0, 0.0],
-            velocity_mps: [1.0, 0.0],
-            ..Odometry::default()
-        }
-    }
-
-    fn guard_after(n_cycles: u64) -> Guard {
-        let mut guard = Guard::new(GuardConfig::default());
-        for cycle in 0..n_cycles {
-            assert_eq!(guard.admit_odometry(&driving(cycle)), Ok(None));
-            guard.note_scan(cycle * CYCLE_NS);
-            guard.note_command(1.0);
-        }
-        guard
-    }
-
-    #[test]
-    fn steady_driving_passes() {
-        assert_eq!(guard_after(20).check(19 * CYCLE_NS), Ok(()));
-    }
-
-    #[test]
-    fn non_finite_odometry_is_refused_and_not_remembered() {
-        let mut guard = guard_after(5);
-        let broken = Odometry { yaw_rate_radps: f64::NAN, ..driving(5) };
-        assert_eq!(guard.admit_odometry(&broken), Err(StopReason::NonFiniteInput));
-        assert_eq!(guard.admit_odometry(&driving(6)), Ok(None));
-    }
-
-    #[test]
-    fn old_odometry_and_old_scans_stop_the_vehicle() {
-        let mut guard = guard_after(5);
-        assert_eq!(guard.check(4 * CYCLE_NS + 310_000_000), Err(StopReason::StaleOdometry));
-        for cycle in 5..15 {
-            guard.admit_odometry(&driving(cycle)).unwrap();
-        }
-        // The last scan came at 0.4 s, it is now 1.4 s: exactly at the limit; a cycle later it is too old.
-        assert_eq!(guard.check(14 * CYCLE_NS), Ok(()));
-        guard.admit_odometry(&driving(15)).unwrap();
-        assert_eq!(guard.check(15 * CYCLE_NS), Err(StopReason::StaleScan));
-    }
-
-    #[test]
-    fn first_scan_must_come_within_its_age_limit() {
-        let mut guard = Guard::new(GuardConfig::default());
-        for cycle in 3..14 {
-            guard.admit_odometry(&driving(cycle)).unwrap();
-            // The first odometry came at 0.3 s, at 1.3 s it is exactly the limit of 1 s ago.
-            assert_eq!(guard.check(cycle * CYCLE_NS), Ok(()));
-        }
-        guard.admit_odometry(&driving(14)).unwrap();
-        assert_eq!(guard.check(14 * CYCLE_NS), Err(StopReason::StaleScan));
-        guard.note_scan(14 * CYCLE_NS);
-        assert_eq!(guard.check(14 * CYCLE_NS), Ok(()));
-    }
-
-    #[test]
-    fn odometry_that_repeats_while_moving_is_frozen_until_it_changes() {
-        let mut guard = guard_after(5);
-        for cycle in 5..11 {
-            // The wheels' own sensor still counts.
-            let wheel_speed_mps = 1.0 + 0.01 * cycle as f64;
-            let frozen = Odometry { valid_at_ns: cycle * CYCLE_NS, wheel_speed_mps, ..driving(4) };
-            guard.admit_odometry(&frozen).unwrap();
-            guard.note_scan(cycle * CYCLE_NS);
-        }
-        // Last change at 0.4 s, now 1.0 s: 0.6 s > 0.5 s.
-        assert_eq!(guard.check(10 * CYCLE_NS), Err(StopReason::StaleOdometry));
-        guard.note_command(0.0);
-        guard.admit_odometry(&Odometry { valid_at_ns: 11 * CYCLE_NS, ..driving(4) }).unwrap();
-        assert_eq!(
-            guard.check(11 * CYCLE_NS),
-            Err(StopReason::StaleOdometry),
-            "standing still does not thaw it"
-        );
-        guard.admit_odometry(&Odometry { valid_at_ns: 12 * CYCLE_NS, ..driving(5) }).unwrap();
-        guard.note_scan(12 * CYCLE_NS);
-        assert_eq!(guard.check(12 * CYCLE_NS), Ok(()));
-    }
-
-    #[test]
-    fn repeating_odometry_at_rest_is_no_fault() {
-        let mut guard = Guard::new(GuardConfig::default());
-        for cycle in 0..30 {
-            guard.admit_odometry(&Odometry { valid_at_ns: cycle * CYCLE_NS, ..Odometry::default() }).unwrap();
-            guard.note_scan(cycle * CYCLE_NS);
-        }
-        assert_eq!(guard.check(29 * CYCLE_NS), Ok(()));
-    }
-
-    #[test]
-    fn a_correction_of_the_localisation_is_told_from_motion() {
-        let mut guard = guard_after(5);
-        let mut jumped = driving(5);
-        jumped.position_m[0] += 0.6;
-        jumped.position_m[1] -= 0.8;
-        let Ok(Some(jump)) = guard.admit_odometry(&jumped) else { panic!("a step of 1 m must be a jump") };
-        assert!((jump.step_m[0] - 0.6).abs() < 1e-9 && (jump.step_m[1] + 0.8).abs() < 1e-9);
-    }
-
-    #[test]
-    fn step_after_a_gap_is_motion() {
-        // Told at 0.4 s that it drives with 1 m/s, then nothing; braked meanwhile, it stands 0.4 m further on.
-        let mut guard = guard_after(5);
-        let standing = |cycle| Odometry {
-            valid_at_ns: cycle * CYCLE_NS,
-            position_m: [0.8, 0.0, 0.0],
-            ..Odometry::default()
-        };
-        assert_eq!(guard.admit_odometry(&standing(30)), Ok(None));
-        // The same after a freeze.
-        let mut guard = guard_after(5);
-        for cycle in 5..30 {
-            guard.admit_odometry(&Odometry { valid_at_ns: cycle * CYCLE_NS, ..driving(4) }).unwrap();
-        }
-        assert_eq!(guard.admit_odometry(&standing(30)), Ok(None));
-    }
-}
+mod tests;

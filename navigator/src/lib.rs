@@ -12,16 +12,21 @@
 mod assessor;
 mod author;
 mod config;
+mod frame;
 mod guard;
+mod jump;
 mod navigator;
 mod pilot;
 mod risk;
 mod surveyor;
+mod track;
 
 pub use assessor::Assessor;
 pub use config::{Config, RiskMapConfig};
-pub use guard::{Guard, GuardConfig, Jump};
+pub use guard::{Admitted, Guard, GuardConfig};
+pub use jump::Jump;
 pub use navigator::{Navigator, NavigatorError, Setup, Surface};
 pub use pilot::{Chart, Destination, Pilot};
 pub use risk::{Belief, RiskOracle, StuckPose};
-pub use surveyor::Surveyor;
+pub use surveyor::{ScanTally, Surveyor};
+pub use track::Whereabouts;

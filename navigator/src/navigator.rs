@@ -1,11 +1,13 @@
 //! One cycle of the pipeline.
 
-use bicycle::{Command, Decision, Model, Odometry, SensorModel, Vehicle};
+use std::collections::BTreeMap;
+
+use bicycle::{Command, Decision, Model, Odometry, SensorModel, StopReason, Vehicle};
 use mppi::Controller;
 use terrain::{GridGeometry, GridMap, Scan, SurfaceCell};
 use traversability::{CvarLevel, Risk, RiskMap, RiskMapView};
 
-use crate::{Assessor, Belief, Chart, Config, Destination, Pilot, Surveyor};
+use crate::{Assessor, Belief, Chart, Config, Destination, Pilot, ScanTally, Surveyor, Whereabouts};
 
 /// Where the map of the ground comes from.
 #[derive(Clone)]
@@ -54,6 +56,9 @@ pub enum NavigatorError {
     /// The elevation map refused its settings.
     #[error(transparent)]
     Elevation(#[from] terrain::ElevationConfigError),
+    /// The window of the risk map cannot be placed there.
+    #[error(transparent)]
+    Distant(#[from] terrain::DistantPosition),
     /// The elevation map refused a pose.
     #[error(transparent)]
     Fuse(#[from] terrain::FuseError),
@@ -75,6 +80,10 @@ pub struct Navigator {
     pilot: Pilot,
     /// What is believed, less the poses that proved stuck; `None` before the first scan.
     map: Option<RiskMap>,
+    /// Time of the odometry in whose frame the map lies [ns].
+    map_at_ns: u64,
+    /// Whether the localisation has jumped since.
+    is_map_behind: bool,
     destination: Destination,
 }
 
@@ -88,29 +97,30 @@ impl Navigator {
             assessor: Assessor::new(vehicle, &model.limits, &config, &belief, level)?,
             pilot: Pilot::new(model, &config, seed)?,
             map: None,
+            map_at_ns: 0,
+            is_map_behind: false,
             destination: Destination { goal_m, tolerance_m },
         })
     }
 
-    /// Takes in what was measured; returns whether the risk map was renewed.
+    /// Takes in what was measured; returns whether the risk map was renewed. A scan is placed by its own time, which
+    /// may be a little before or after that of the odometry.
     ///
     /// Input that cannot be used is remembered as the reason for the next decision and changes no map.
     pub fn observe(&mut self, odometry: &Odometry, scan: Option<&Scan>) -> Result<bool, NavigatorError> {
         self.pilot.admit(odometry);
-        match self.surveyor.admit(odometry) {
-            Err(_) => return Ok(false),
-            Ok(Some(jump)) => {
-                self.assessor.shift_stuck([jump.step_m[0], jump.step_m[1]]);
-                self.surveyor.follow_jump(odometry, &jump)?;
-            }
-            Ok(None) => {}
+        let Ok(jump) = self.surveyor.admit(odometry) else { return Ok(false) };
+        if let Some(jump) = jump {
+            self.assessor.follow_jump(&jump);
+            self.surveyor.follow_jump(odometry, &jump)?;
+            self.is_map_behind = true;
         }
         if self.surveyor.is_given() {
             // What was given whole never gets old.
             self.pilot.note_scan(odometry.valid_at_ns);
         }
         match scan {
-            Some(scan) if self.surveyor.fuse(odometry, scan)? => {
+            Some(scan) if self.survey(odometry, scan)? => {
                 self.pilot.note_scan(scan.valid_at_ns);
                 self.renew(odometry)?;
                 Ok(true)
@@ -123,12 +133,15 @@ impl Navigator {
     /// The command for now, or the reason for none. `now_ns` is on the clock of the measurements.
     pub fn decide(&mut self, now_ns: u64) -> Decision {
         let time_to_goal = self.assessor.last_time_to_goal();
-        let chart = self.map.as_ref().map(|map| Chart { map: map.view(), time_to_goal });
+        // What was given lies in the frame of the map, whatever the localisation says.
+        let odometry_at_ns = if self.surveyor.is_given() { u64::MAX } else { self.map_at_ns };
+        let chart = self.map.as_ref().map(|map| Chart { map: map.view(), time_to_goal, odometry_at_ns });
         let decision = self.pilot.decide(now_ns, chart, &self.destination);
         self.surveyor.note_command(decision.command(Command::default()).speed_mps);
         if let Some(pose) = self.pilot.take_stuck() {
             self.assessor.note_stuck(pose);
-            if let Some(map) = &mut self.map {
+            // The pose is of now; a map of before a jump takes it in when it is renewed.
+            if let Some(map) = self.map.as_mut().filter(|_| !self.is_map_behind) {
                 self.assessor.amend(map.arrays_mut().0);
             }
         }
@@ -140,7 +153,8 @@ impl Navigator {
         self.surveyor.surface()
     }
 
-    /// The risk map as the controller reads it, once there is one.
+    /// The risk map as the controller reads it, once there is one. After a jump of the localisation it lies where it
+    /// lay, until the next scan, and the controller drives on it as if there had been none.
     pub fn risk_map(&self) -> Option<RiskMapView<'_>> {
         self.map.as_ref().map(RiskMap::view)
     }
@@ -155,9 +169,37 @@ impl Navigator {
         self.surveyor.n_jumps()
     }
 
+    /// What became of the scans so far.
+    pub fn scans(&self) -> &ScanTally {
+        self.surveyor.tally()
+    }
+
+    /// How many measurements were refused, by reason.
+    pub fn refused(&self) -> &BTreeMap<StopReason, u64> {
+        self.surveyor.refused()
+    }
+
+    /// Fuses a scan where the vehicle was at its time; false when nobody knows where, or nothing in it is usable.
+    fn survey(&mut self, odometry: &Odometry, scan: &Scan) -> Result<bool, NavigatorError> {
+        if self.surveyor.is_given() {
+            return self.surveyor.fuse(odometry, scan);
+        }
+        match self.surveyor.place(scan.valid_at_ns) {
+            Ok(Whereabouts::Between(there) | Whereabouts::Ahead(Some(there))) => {
+                self.surveyor.fuse(&there, scan)
+            }
+            Ok(Whereabouts::Ahead(None) | Whereabouts::Unknown) => {
+                self.surveyor.note_unplaced();
+                Ok(false)
+            }
+            Err(_) => Ok(false),
+        }
+    }
+
     /// Brings risk map and cost-to-go up to date with the surface.
     fn renew(&mut self, odometry: &Odometry) -> Result<(), NavigatorError> {
         self.surveyor.assume_ground(odometry)?;
+        (self.map_at_ns, self.is_map_behind) = (odometry.valid_at_ns, false);
         let changed = self.surveyor.take_changed();
         let position_m = [odometry.position_m[0], odometry.position_m[1]];
         self.assessor.update(position_m, self.surveyor.surface(), &changed)?;

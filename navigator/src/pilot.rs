@@ -1,12 +1,15 @@
 //! The third part of the pipeline: the state of the vehicle and a risk map become a decision.
 
-use bicycle::{Command, Decision, HoldReason, Model, Odometry, SensorModel, StopReason};
+use std::collections::BTreeMap;
+
+use bicycle::{Command, Decision, HoldReason, Model, Odometry, SensorModel, State, StopReason};
 use mppi::{Controller, CostToGoView, Input, Objective, Terminal};
 use traversability::RiskMapView;
 
-use crate::guard::{Guard, Jump};
+use crate::frame::Frame;
+use crate::guard::{Admitted, Guard};
 use crate::risk::StuckPose;
-use crate::{Config, NavigatorError};
+use crate::{Config, Jump, NavigatorError};
 
 /// What the pilot drives on.
 #[derive(Clone, Copy, Debug)]
@@ -15,6 +18,8 @@ pub struct Chart<'a> {
     pub map: RiskMapView<'a>,
     /// Least time to the goal over it.
     pub time_to_goal: CostToGoView<'a>,
+    /// Time of the odometry in whose frame both lie [ns]; later jumps of the localisation have left them behind.
+    pub odometry_at_ns: u64,
 }
 
 /// Where to go.
@@ -29,6 +34,7 @@ pub struct Destination {
 /// Watches what comes in and asks the controller.
 pub struct Pilot {
     guard: Guard,
+    frame: Frame,
     sensors: SensorModel,
     controller: Controller,
     odometry: Option<Odometry>,
@@ -47,6 +53,7 @@ impl Pilot {
         model.limits = config.allowed(&model.limits);
         Ok(Self {
             guard: Guard::new(config.guard),
+            frame: Frame::default(),
             sensors: SensorModel::of(&model.effects),
             controller: Controller::new(config.controller.clone(), model, seed)?,
             odometry: None,
@@ -59,15 +66,15 @@ impl Pilot {
     }
 
     /// Takes in where the vehicle says it is, and corrects it by what the model believes of the sensors. What cannot be
-    /// used is remembered as the reason for the next decision. Returns the jump of the localisation that it made out:
-    /// maps of before lie elsewhere then.
+    /// used is remembered as the reason for the next decision. Returns the jump of the localisation that it made out;
+    /// on maps of before the vehicle is carried to where it stands from then on.
     pub fn admit(&mut self, measured: &Odometry) -> Option<Jump> {
         let odometry = self.sensors.corrected(measured);
         match self.guard.admit_odometry(&odometry) {
-            Ok(jump) => {
+            Ok(admitted) => {
                 self.fault = None;
                 self.odometry = Some(odometry);
-                jump
+                self.follow(odometry.valid_at_ns, admitted)
             }
             Err(reason) => {
                 self.fault = Some(reason);
@@ -118,6 +125,11 @@ impl Pilot {
         self.odometry.as_ref()
     }
 
+    /// How many measurements were refused, by reason.
+    pub fn refused(&self) -> &BTreeMap<StopReason, u64> {
+        self.guard.refused()
+    }
+
     /// Decisions so far.
     pub fn cycle(&self) -> u64 {
         self.cycle
@@ -126,6 +138,20 @@ impl Pilot {
     /// Time from the decision before the last one to the last one [s].
     pub fn elapsed_s(&self) -> f64 {
         self.elapsed_s
+    }
+
+    fn follow(&mut self, at_ns: u64, admitted: Admitted) -> Option<Jump> {
+        match admitted {
+            Admitted::Jumped(jump) => {
+                self.frame.note(at_ns, &jump);
+                Some(jump)
+            }
+            Admitted::ClockSetBack => {
+                self.frame.forget();
+                None
+            }
+            Admitted::Onward | Admitted::Again => None,
+        }
     }
 
     /// What the vehicle was really told after the last decision, where that is not what the decision says; see
@@ -142,13 +168,14 @@ impl Pilot {
     }
 
     fn ask(&mut self, chart: &Chart<'_>, odometry: &Odometry, destination: &Destination) -> Decision {
+        let (state, goal_m) = self.on_chart(odometry, chart.odometry_at_ns, destination.goal_m);
         let was_recovering = self.controller.diagnostics().is_recovering;
         let decision = self.controller.decide(&Input {
-            state: odometry.state(),
+            state,
             elapsed_s: self.elapsed_s,
             map: chart.map,
             objective: Objective::Goal {
-                goal_m: destination.goal_m,
+                goal_m,
                 tolerance_m: destination.tolerance_m,
                 terminal: Terminal::CostToGo(chart.time_to_goal),
             },
@@ -159,6 +186,17 @@ impl Pilot {
             self.stuck = Some(StuckPose { position_m: [x_m, y_m], yaw_rad: odometry.attitude_rad[2] });
         }
         decision
+    }
+
+    /// State and goal in the frame of a chart. What it tells of the time to the goal leads to where the goal was until
+    /// the next chart comes.
+    fn on_chart(&self, odometry: &Odometry, of_ns: u64, goal_m: [f64; 2]) -> (State, [f64; 2]) {
+        let state = odometry.state();
+        let Some(jump) = self.frame.since(of_ns) else { return (state, goal_m) };
+        let back = jump.inverse();
+        let [x_m, y_m, yaw_rad] = back.pose([state.x_m, state.y_m, state.yaw_rad]);
+        let [goal_x_m, goal_y_m, _] = back.pose([goal_m[0], goal_m[1], 0.0]);
+        (State { x_m, y_m, yaw_rad, ..state }, [goal_x_m, goal_y_m])
     }
 }
 

@@ -4,12 +4,14 @@ use std::f64::consts::TAU;
 use std::sync::Arc;
 
 use bicycle::Geometry;
+use bicycle::lanes::Instructions;
 use evidential::{BeliefMapError, Checkpoint, Learned, Unfamiliar};
-use physics_prior::{Assumption, PriorConfig};
+use physics_prior::Assumption;
 use rayon::prelude::*;
 use terrain::{CellRegion, GridGeometry, GridMap, SurfaceCell};
 use traversability::{CvarLevel, Risk, RiskMapView};
 
+use crate::Jump;
 use crate::author::Author;
 
 /// Fills a window, shape [row, col, yaw], with the risk of the poses of the body frame that a [`RiskMap`] of this
@@ -65,17 +67,19 @@ pub(crate) struct RiskLayer {
 impl RiskLayer {
     pub fn new(
         belief: &Belief,
-        prior: &PriorConfig,
         level: CvarLevel,
         geometry: &Geometry,
         config: &crate::Config,
+        instructions: Instructions,
     ) -> Result<Self, BeliefMapError> {
+        let prior = &config.prior;
         let window = &config.risk_map;
         let resolution_m = config.risk_resolution_m();
         let grid = GridGeometry::centred(resolution_m, window.n_rows, window.n_cols, 0.0, 0.0);
         let surface_m = config.elevation.resolution_m;
-        let by_prior =
-            |assumption: Assumption| Author::prior(geometry, &assumption, surface_m, grid, window.n_yaws);
+        let by_prior = |assumption: Assumption| {
+            Author::prior(geometry, &assumption, surface_m, grid, window.n_yaws, instructions)
+        };
         let author = match belief {
             Belief::Physics => by_prior(Assumption::Physics { prior: *prior, level })?,
             Belief::Learned { checkpoint, unfamiliar } => {
@@ -85,7 +89,7 @@ impl RiskLayer {
                     obstacle_margin_m: prior.obstacle_margin_m,
                     level,
                 };
-                Author::networks(geometry, &learned, surface_m, grid, window.n_yaws)?
+                Author::networks(geometry, &learned, surface_m, grid, window.n_yaws, instructions)?
             }
             Belief::Nominal | Belief::Given(_) => {
                 by_prior(Assumption::Nominal { obstacle_margin_m: prior.obstacle_margin_m })?
@@ -105,6 +109,11 @@ impl RiskLayer {
             recentre_cells: (window.recentre_m / resolution_m).ceil() as i64,
             is_filled: false,
         })
+    }
+
+    /// Edge of a cell [m].
+    pub fn resolution_m(&self) -> f64 {
+        self.author.risk_map().geometry().resolution_m
     }
 
     /// What the author says, once there was an update.
@@ -136,10 +145,12 @@ impl RiskLayer {
         &self.stuck
     }
 
-    /// The localisation moved by a step, and what was remembered in its frame moves along.
-    pub fn shift_stuck(&mut self, step_m: [f64; 2]) {
+    /// The localisation jumped, and what was remembered in its frame moves along.
+    pub fn follow_jump(&mut self, jump: &Jump) {
         for pose in &mut self.stuck {
-            pose.position_m = [0, 1].map(|axis| pose.position_m[axis] + step_m[axis]);
+            let [x_m, y_m] = pose.position_m;
+            let [x_m, y_m, yaw_rad] = jump.pose([x_m, y_m, pose.yaw_rad]);
+            *pose = StuckPose { position_m: [x_m, y_m], yaw_rad };
         }
     }
 
@@ -188,13 +199,13 @@ fn block(risks: &mut [Risk], view: &RiskMapView<'_>, stuck: &StuckPose, length_m
     };
     let bins: Vec<usize> = (0..n_yaws).filter(|&bin| turned(bin) <= STUCK_YAW_RAD).collect();
     let ahead_m = STUCK_AHEAD * length_m;
-    let centre_m = [
-        stuck.position_m[0] + ahead_m * stuck.yaw_rad.cos(),
-        stuck.position_m[1] + ahead_m * stuck.yaw_rad.sin(),
-    ];
+    let (sine, cosine) = libm::sincos(stuck.yaw_rad);
+    let centre_m = [stuck.position_m[0] + ahead_m * cosine, stuck.position_m[1] + ahead_m * sine];
+    let radius_m = STUCK_RADIUS * length_m;
     for index in 0..geometry.n_cells() {
         let [x_m, y_m] = geometry.centre_m(geometry.cell(index));
-        if (x_m - centre_m[0]).hypot(y_m - centre_m[1]) <= STUCK_RADIUS * length_m {
+        let (dx_m, dy_m) = (x_m - centre_m[0], y_m - centre_m[1]);
+        if dx_m * dx_m + dy_m * dy_m <= radius_m * radius_m {
             for bin in &bins {
                 let risk = &mut risks[index * n_yaws + bin];
                 *risk = risk.blocked();

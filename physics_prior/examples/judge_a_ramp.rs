@@ -5,6 +5,7 @@
 use std::error::Error;
 
 use bicycle::Geometry;
+use bicycle::lanes::Instructions;
 use physics_prior::{Assumption, PriorConfig, PriorMap};
 use terrain::{GridGeometry, GridMap, SurfaceCell, TerrainClass};
 use traversability::{Bins, CvarLevel};
@@ -33,7 +34,14 @@ fn main() -> Result<(), Box<dyn Error>> {
 
     let prior = PriorConfig::for_vehicle(&BUGGY);
     let level = CvarLevel::new(0.4)?;
-    let mut map = PriorMap::new(&BUGGY, &Assumption::Physics { prior, level }, 0.1, geometry, 8)?;
+    let mut map = PriorMap::new(
+        &BUGGY,
+        &Assumption::Physics { prior, level },
+        0.1,
+        geometry,
+        8,
+        Instructions::widest(),
+    )?;
     map.update_all(&surface)?;
 
     let mean_traction = |x_m: f64| {

@@ -20,7 +20,7 @@ impl Ball {
         let mut rises = Vec::new();
         for row in -reach..=reach {
             for col in -reach..=reach {
-                let off_m = (col as f64).hypot(row as f64) * resolution_m;
+                let off_m = libm::hypot(col as f64, row as f64) * resolution_m;
                 if off_m <= radius_m {
                     let rise_m = radius_m - (radius_m * radius_m - off_m * off_m).sqrt();
                     rises.push(([col, row], rise_m as f32));

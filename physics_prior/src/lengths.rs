@@ -42,8 +42,15 @@ impl Lengths {
         }
     }
 
+    /// From the rear axle's centre to the farthest point that it asks about [m].
+    pub fn reach_m(&self) -> f64 {
+        let Footprint { front_m, rear_m, half_width_m } = self.footprint;
+        let of_body_m = libm::hypot(front_m.max(rear_m), half_width_m);
+        of_body_m.max(libm::hypot(self.belly.front_m, self.wheels.track_m)) + self.envelope_radius_m
+    }
+
     /// Longest straight line under the belly [m].
     pub fn belly_diagonal_m(&self) -> f64 {
-        (self.belly.front_m + self.belly.rear_m).hypot(2.0 * self.belly.half_width_m)
+        libm::hypot(self.belly.front_m + self.belly.rear_m, 2.0 * self.belly.half_width_m)
     }
 }

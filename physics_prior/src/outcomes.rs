@@ -82,7 +82,7 @@ impl Equations {
         Self {
             uniform_weight: config.uniform_weight as f32,
             unknown_attitude: Triangles::new([0.0; 4], [unknown_bins; 4], [0.25; 4]),
-            per_slope: slopes_rad.map(|slope_rad| (1.0 / slope_rad.tan()) as f32),
+            per_slope: slopes_rad.map(|slope_rad| (1.0 / libm::tan(slope_rad)) as f32),
             per_vegetation_m: (1.0 / config.vegetation_height_max_m) as f32,
             spread_bins: config.attitude_spread_rad as f32 / Bins::ATTITUDE_WIDTH_RAD,
             unknown_share_max: config.unknown_share_max as f32,

@@ -1,5 +1,6 @@
 //! All poses of a risk map over the ground below.
 
+use bicycle::lanes::Instructions;
 use terrain::{GridGeometry, GridMap, SurfaceCell, TerrainClass};
 use traversability::{Ground, GroundFlags, Risk};
 
@@ -39,16 +40,17 @@ pub(crate) struct Poses {
     /// Shape [row phase, column phase, yaw].
     stencils: Vec<Stencil>,
     reach: Reach,
+    instructions: Instructions,
 }
 
 impl Poses {
     pub fn new(
         judgement: Judgement,
         lengths: Lengths,
-        ratio: Ratio,
-        surface_resolution_m: f64,
+        (ratio, surface_resolution_m): (Ratio, f64),
         risk: &GridGeometry,
         n_yaws: usize,
+        instructions: Instructions,
     ) -> Self {
         let stencils = stencils(&lengths, ratio, surface_resolution_m, n_yaws);
         let own_cell = ratio.covered(0).end + 1;
@@ -57,7 +59,7 @@ impl Poses {
         let reach = reach.grown(ContactGround::reach_of(&lengths, surface_resolution_m));
         let window = window(risk, ratio, reach, surface_resolution_m);
         let ground = ContactGround::unknown(window, &lengths);
-        Self { judgement, ground, lengths, ratio, n_yaws, stencils, reach }
+        Self { judgement, ground, lengths, ratio, n_yaws, stencils, reach, instructions }
     }
 
     /// Makes room for another window of the risk map; the ground must be read anew.
@@ -80,14 +82,14 @@ impl Poses {
     /// Risks of one risk cell for every yaw bin.
     pub fn risks(&self, cell: [i64; 2], risks: &mut [Risk]) {
         let (stencils, base) = self.stencils_of(cell);
-        pulp::Arch::new().dispatch(Yaws { poses: self, stencils, base, risks });
+        self.instructions.run(Yaws { poses: self, stencils, base, risks });
     }
 
     /// What the prior says of one risk cell for every yaw bin; nothing for the nominal judgement.
     pub fn pose_priors(&self, cell: [i64; 2], priors: &mut [PosePrior]) {
         if let Judgement::Physics(physics) = &self.judgement {
             let (stencils, base) = self.stencils_of(cell);
-            pulp::Arch::new().dispatch(YawPriors { poses: self, physics, stencils, base, priors });
+            self.instructions.run(YawPriors { poses: self, physics, stencils, base, priors });
         }
     }
 
@@ -161,8 +163,8 @@ impl Poses {
     }
 }
 
-/// The poses of one risk cell, for the widest instructions of the machine. Every one of them gives the same
-/// bits, since multiplications and additions stay apart.
+/// The poses of one risk cell, in the registers of any instruction set. Every one of them gives the same bits, since
+/// multiplications and additions stay apart.
 struct Yaws<'a> {
     poses: &'a Poses,
     stencils: &'a [Stencil],
@@ -272,7 +274,6 @@ fn window(risk: &GridGeometry, ratio: Ratio, reach: Reach, resolution_m: f64) ->
 #[cfg(test)]
 mod tests {
     use bicycle::Geometry;
-    use pulp::WithSimd;
     use terrain::Cell;
 
     use super::*;
@@ -311,14 +312,18 @@ mod tests {
         let tails = Tails::new(&equations, traversability::CvarLevel::new(0.4).unwrap());
         let judgement = Judgement::Physics(Box::new(Physics { equations, tails, evidence: 12.0 }));
         let ratio = Ratio::new(0.1, 0.1).unwrap();
-        let mut poses = Poses::new(judgement, lengths, ratio, 0.1, &window, 13);
+        let mut poses = Poses::new(judgement, lengths, (ratio, 0.1), &window, 13, Instructions::Portable);
         poses.ground.read(&bumpy(window), [-100; 2], [100; 2]);
         for cell in [[5, 5], [12, 11], [12, 12], [17, 4]] {
-            let (mut widest, mut plain) = ([Risk::NONE; 13], [Risk::NONE; 13]);
-            poses.risks(cell, &mut widest);
-            Yaws { poses: &poses, stencils: &poses.stencils, base: cell, risks: &mut plain }
-                .with_simd(pulp::Scalar);
-            assert_eq!(widest, plain);
+            let mut portable = [Risk::NONE; 13];
+            poses.instructions = Instructions::Portable;
+            poses.risks(cell, &mut portable);
+            for instructions in Instructions::all() {
+                let mut found = [Risk::NONE; 13];
+                poses.instructions = instructions;
+                poses.risks(cell, &mut found);
+                assert_eq!(found, portable, "{instructions:?}");
+            }
         }
     }
 }

@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use bicycle::Geometry;
+use bicycle::lanes::Instructions;
 use terrain::{CellRegion, GridGeometry, GridMap, SurfaceCell};
 use traversability::{CvarLevel, Ground, PartialMoments, Risk};
 
@@ -12,6 +13,9 @@ use crate::outcomes::Equations;
 use crate::poses::{Judgement, Physics, Poses};
 use crate::tails::Tails;
 use crate::{Assumption, PriorBelief, PriorConfig, PriorConfigError, PriorMapError};
+
+/// Cells across a footprint beyond which nothing is judged in time.
+const FOOTPRINT_CELLS_MAX: f64 = 500.0;
 
 /// What the prior says of one pose, for whoever mixes it with something else.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -37,7 +41,7 @@ pub struct PriorField {
 impl PriorField {
     /// A field over the window `risk` for surfaces of the given resolution, all unknown until one is read.
     ///
-    /// `geometry` comes from a vehicle that passed [`bicycle::Vehicle::validate`].
+    /// `geometry` comes from a vehicle that passed [`bicycle::Vehicle::validate`]. Every instruction set gives the same bits.
     ///
     /// # Errors
     /// A parameter of the prior makes no sense, the cells of the two grids never line up, or there is no yaw.
@@ -47,6 +51,7 @@ impl PriorField {
         surface_resolution_m: f64,
         risk: GridGeometry,
         n_yaws: usize,
+        instructions: Instructions,
     ) -> Result<Self, PriorMapError> {
         if n_yaws == 0 {
             return Err(PriorMapError::NoYaws);
@@ -56,7 +61,13 @@ impl PriorField {
             risk_m: risk.resolution_m,
         })?;
         let (lengths, judgement) = judged(geometry, assumption)?;
-        let poses = Poses::new(judgement, lengths, ratio, surface_resolution_m, &risk, n_yaws);
+        let found = 2.0 * lengths.reach_m() / surface_resolution_m;
+        if found.is_nan() || found > FOOTPRINT_CELLS_MAX {
+            let (most, surface_m) = (FOOTPRINT_CELLS_MAX, surface_resolution_m);
+            return Err(PriorMapError::Footprint { most, surface_m, found });
+        }
+        let poses =
+            Poses::new(judgement, lengths, (ratio, surface_resolution_m), &risk, n_yaws, instructions);
         Ok(Self { poses, window: risk, read_from: None })
     }
 

@@ -1,6 +1,7 @@
 //! From the known surface to a risk map, whole or where something changed.
 
 use bicycle::Geometry;
+use bicycle::lanes::Instructions;
 use rayon::prelude::*;
 use terrain::{CellRegion, GridGeometry, GridMap, SurfaceCell};
 use traversability::{CvarLevel, Risk, RiskMap};
@@ -49,6 +50,16 @@ pub enum PriorMapError {
         /// What came [m].
         found_m: f64,
     },
+    /// A vehicle that covers more cells than are judged in any time, or cells that are none for it.
+    #[error("footprint: expected at most {most} cells of {surface_m} m across, found {found:.0}")]
+    Footprint {
+        /// What would do.
+        most: f64,
+        /// Resolution of the surface [m].
+        surface_m: f64,
+        /// What it is.
+        found: f64,
+    },
     /// A map without yaws.
     #[error("number of yaw bins: expected at least 1, found 0")]
     NoYaws,
@@ -68,16 +79,17 @@ pub struct PriorMap {
 impl PriorMap {
     /// A map in the window `risk` for surfaces of the given resolution; [`Risk::OUTSIDE`] until it is updated.
     ///
-    /// `geometry` comes from a vehicle that passed [`bicycle::Vehicle::validate`].
+    /// `geometry` comes from a vehicle that passed [`bicycle::Vehicle::validate`]. Every instruction set gives the same bits.
     pub fn new(
         geometry: &Geometry,
         assumption: &Assumption,
         surface_resolution_m: f64,
         risk: GridGeometry,
         n_yaws: usize,
+        instructions: Instructions,
     ) -> Result<Self, PriorMapError> {
         Ok(Self {
-            field: PriorField::new(geometry, assumption, surface_resolution_m, risk, n_yaws)?,
+            field: PriorField::new(geometry, assumption, surface_resolution_m, risk, n_yaws, instructions)?,
             map: RiskMap::constant(risk, n_yaws, Risk::OUTSIDE),
         })
     }

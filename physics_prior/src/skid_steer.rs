@@ -145,7 +145,7 @@ fn linear(steepness: f64) -> Pmf {
     let mut pmf = [0.0; N_BINS];
     let weight = 1.0 / (N_HEADINGS * WHEEL_NUMERICS.len()) as f64;
     for heading in 0..N_HEADINGS {
-        let grade = steepness * (std::f64::consts::TAU * heading as f64 / N_HEADINGS as f64).cos();
+        let grade = steepness * libm::cos(std::f64::consts::TAU * heading as f64 / N_HEADINGS as f64);
         for wheel_numeric in WHEEL_NUMERICS {
             let factor = (1.0 - slip(grade, wheel_numeric)) / (1.0 - slip(0.0, wheel_numeric));
             LINEAR.add_scaled(factor, weight, &mut pmf);
@@ -156,7 +156,7 @@ fn linear(steepness: f64) -> Pmf {
 
 /// Angular traction on open ground of a steepness.
 fn angular(steepness: f64) -> Pmf {
-    let left_for_scrubbing = (1.0 - (steepness / GRIP).powi(2)).max(0.0).sqrt();
+    let left_for_scrubbing = (1.0 - (steepness / GRIP) * (steepness / GRIP)).max(0.0).sqrt();
     let mut pmf = [0.0; N_BINS];
     ANGULAR.add_scaled(left_for_scrubbing, 0.5, &mut pmf);
     ANGULAR.add_scaled(COMPENSATION * left_for_scrubbing, 0.5, &mut pmf);
@@ -170,7 +170,7 @@ fn slip(grade: f64, wheel_numeric: f64) -> f64 {
     if share >= 1.0 {
         return pull.signum();
     }
-    ((-(1.0 - share).ln() / (0.3 * wheel_numeric)).min(1.0)).copysign(pull)
+    (-libm::log(1.0 - share) / (0.3 * wheel_numeric)).min(1.0).copysign(pull)
 }
 
 /// Probabilities that sum to one up to rounding.

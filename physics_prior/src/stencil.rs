@@ -81,8 +81,9 @@ impl Stencil {
         let centre_m = phase.map(|share| share * resolution_m);
         let footprint = touched_spans(&lengths.footprint, centre_m, yaw_rad, resolution_m);
         let n_footprint_cells = footprint.iter().map(|span| span.n_cells as u32).sum();
+        let (sine, cosine) = libm::sincos(yaw_rad);
         Self {
-            heading: [yaw_rad.cos() as f32, yaw_rad.sin() as f32],
+            heading: [cosine as f32, sine as f32],
             wheels: wheel_taps(&lengths.wheels, centre_m, yaw_rad, resolution_m),
             footprint,
             n_footprint_cells,
@@ -155,7 +156,7 @@ fn strip_extent(corners: &[[f64; 2]; 4], south: f64, north: f64) -> Option<[f64;
 }
 
 fn belly_spans(belly: &Footprint, centre_m: [f64; 2], yaw_rad: f64, resolution_m: f64) -> Vec<BellySpan> {
-    let (sin, cos) = yaw_rad.sin_cos();
+    let (sin, cos) = libm::sincos(yaw_rad);
     let body_m = |col: i64, row: i64| {
         let east_m = (col as f64 + 0.5) * resolution_m - centre_m[0];
         let north_m = (row as f64 + 0.5) * resolution_m - centre_m[1];

@@ -2,6 +2,7 @@
 
 mod surfaces;
 
+use bicycle::lanes::Instructions;
 use std::f64::consts::PI;
 
 use physics_prior::{
@@ -20,7 +21,7 @@ fn the_map_is_the_belief_of_every_pose() {
     let ground = rough(window(0.1, 40, 44), 3);
     for (resolution_m, at) in [(0.1, 0.3), (0.2, 1.0), (0.05, 0.05), (0.25, 0.6)] {
         let risk = GridGeometry { resolution_m, origin: [3, 5], n_rows: 12, n_cols: 10 };
-        let mut map = PriorMap::new(&CAR, &physics(at), 0.1, risk, 7).unwrap();
+        let mut map = PriorMap::new(&CAR, &physics(at), 0.1, risk, 7, Instructions::widest()).unwrap();
         map.update_all(&ground).unwrap();
         let view = map.risk_map().view();
         for (row, col) in (1..11).flat_map(|row| (1..9).map(move |col| (row, col))) {
@@ -250,7 +251,7 @@ fn the_ground_carries_gradient_class_and_flags() {
         ground[Cell { row, col }] = SurfaceCell::UNKNOWN;
     }
     let coarse = GridGeometry { resolution_m: 0.2, origin: [0, 0], n_rows: 20, n_cols: 20 };
-    let mut map = PriorMap::new(&CAR, &physics(0.4), 0.1, coarse, 4).unwrap();
+    let mut map = PriorMap::new(&CAR, &physics(0.4), 0.1, coarse, 4, Instructions::widest()).unwrap();
     map.update_all(&ground).unwrap();
     let at = |row, col| map.risk_map().view().ground[coarse.index(Cell { row, col })];
     assert!((at(4, 13).gradient[0] - 0.25).abs() < 1e-5 && (at(4, 13).gradient[1] + 0.125).abs() < 1e-5);
@@ -278,12 +279,12 @@ fn the_map_does_not_depend_on_the_number_of_threads() {
 fn a_moved_window_and_a_new_level_are_taken_over_whole() {
     let ground = rough(window(0.1, 60, 60), 2);
     let risk = GridGeometry { resolution_m: 0.1, origin: [0, 0], n_rows: 20, n_cols: 20 };
-    let mut map = PriorMap::new(&CAR, &physics(0.4), 0.1, risk, 5).unwrap();
+    let mut map = PriorMap::new(&CAR, &physics(0.4), 0.1, risk, 5, Instructions::widest()).unwrap();
     map.update_all(&ground).unwrap();
     let nothing = CellRegion { rows: 0..0, cols: 0..0 };
     let fresh = |at: f64, origin: [i64; 2]| {
         let risk = GridGeometry { origin, ..risk };
-        let mut map = PriorMap::new(&CAR, &physics(at), 0.1, risk, 5).unwrap();
+        let mut map = PriorMap::new(&CAR, &physics(at), 0.1, risk, 5, Instructions::widest()).unwrap();
         map.update_all(&ground).unwrap();
         map
     };
@@ -303,7 +304,7 @@ fn a_moved_window_and_a_new_level_are_taken_over_whole() {
 fn what_cannot_be_mapped_is_refused() {
     let geometry = window(0.1, 10, 10);
     let new = |assumption: &Assumption, surface_m: f64, n_yaws: usize| {
-        PriorMap::new(&CAR, assumption, surface_m, geometry, n_yaws).map(|_| ())
+        PriorMap::new(&CAR, assumption, surface_m, geometry, n_yaws, Instructions::widest()).map(|_| ())
     };
     assert_eq!(new(&physics(0.4), 0.1, 0), Err(PriorMapError::NoYaws));
     assert_eq!(new(&physics(0.4), 0.0, 4), Err(PriorMapError::Resolution { surface_m: 0.0, risk_m: 0.1 }));
@@ -311,7 +312,7 @@ fn what_cannot_be_mapped_is_refused() {
     let prior = PriorConfig { evidence: -1.0, ..PriorConfig::default() };
     let found = new(&Assumption::Physics { prior, level: level(0.4) }, 0.1, 4);
     assert!(matches!(found, Err(PriorMapError::Config(PriorConfigError { field: "evidence", .. }))));
-    let mut map = PriorMap::new(&CAR, &physics(0.4), 0.1, geometry, 4).unwrap();
+    let mut map = PriorMap::new(&CAR, &physics(0.4), 0.1, geometry, 4, Instructions::widest()).unwrap();
     let error = map.update_all(&level_ground(window(0.2, 10, 10))).unwrap_err();
     assert_eq!(error.to_string(), "resolution of the surface: expected 0.1 m, found 0.2 m");
 }
@@ -337,10 +338,10 @@ proptest! {
             }
         }
         let risk = GridGeometry { resolution_m, origin: [2, 4], n_rows: 30, n_cols: 24 };
-        let mut partial = PriorMap::new(&CAR, &physics(0.4), 0.1, risk, 5).unwrap();
+        let mut partial = PriorMap::new(&CAR, &physics(0.4), 0.1, risk, 5, Instructions::widest()).unwrap();
         partial.update_all(&before).unwrap();
         partial.update_dirty(&after, &changed).unwrap();
-        let mut full = PriorMap::new(&CAR, &physics(0.4), 0.1, risk, 5).unwrap();
+        let mut full = PriorMap::new(&CAR, &physics(0.4), 0.1, risk, 5, Instructions::widest()).unwrap();
         full.update_all(&after).unwrap();
         prop_assert_eq!(partial.risk_map(), full.risk_map());
         // Later partial updates build on what the first one left.
@@ -357,7 +358,7 @@ fn a_pose_prior_has_the_risk_of_the_map() {
     let ground = rough(geometry, 21);
     let assumption = physics(0.3);
     let map = prior_map(&CAR, &assumption, &ground, 5);
-    let mut field = PriorField::new(&CAR, &assumption, 0.1, geometry, 5).unwrap();
+    let mut field = PriorField::new(&CAR, &assumption, 0.1, geometry, 5, Instructions::widest()).unwrap();
     assert_eq!(field.read_all(&ground).unwrap(), CellRegion::whole(&geometry));
     let nothing = PosePrior { moments: PartialMoments::uniform(), is_blocked: false, is_unknown: false };
     let mut n_unknown = 0;

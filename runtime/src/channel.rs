@@ -1,6 +1,7 @@
 //! Channels between the processes: publish and subscribe over shared memory, without a copy on the way.
 
 mod bus;
+mod failures;
 mod inlet;
 mod outlet;
 
@@ -14,6 +15,7 @@ use crate::message::{
 };
 use crate::payload;
 pub use bus::{Bus, RunName, RunNameError};
+pub(crate) use inlet::FUTURE_NS;
 pub use inlet::{Counts, Inlet, Message, Refusal};
 pub use outlet::{Loan, Outlet};
 
@@ -58,103 +60,50 @@ pub struct Channel<H, T> {
     pub name: &'static str,
     /// Messages that wait for a subscriber; of more, the oldest is dropped.
     pub depth: usize,
-    /// Subscribers at once.
+    /// Processes of a run that read it, all of them and the live view. A [`Bus`] adds room for third parties.
     pub n_readers: usize,
-    /// A publisher that is silent for this long has lost its place to the next one [ns].
-    pub silence_ns: u64,
     /// Refuses what no reader could use.
     pub check: fn(&H, &[T]) -> Result<(), Refusal>,
 }
 
-const MILLISECOND_NS: u64 = 1_000_000;
-/// Publishers at once on a channel: one that counts, and room for those that do not.
-pub(crate) const PUBLISHERS_MAX: usize = 4;
+/// Readers of every channel beside the run's own, unless somebody asks for another number.
+pub const THIRD_PARTIES: usize = 2;
 
 /// Where the vehicle is: whoever runs the vehicle.
-pub const ODOMETRY: Channel<Stamp, OdometryRecord> = Channel {
-    name: "odometry",
-    depth: 32,
-    n_readers: 6,
-    silence_ns: 300 * MILLISECOND_NS,
-    check: payload::check_odometry,
-};
+pub const ODOMETRY: Channel<Stamp, OdometryRecord> =
+    Channel { name: "odometry", depth: 32, n_readers: 5, check: payload::check_odometry };
 /// What the range sensor sees: whoever runs the vehicle.
-pub const SCAN: Channel<ScanHeader, PointRecord> = Channel {
-    name: "scan",
-    depth: 2,
-    n_readers: 4,
-    silence_ns: 1000 * MILLISECOND_NS,
-    check: payload::check_scan,
-};
+pub const SCAN: Channel<ScanHeader, PointRecord> =
+    Channel { name: "scan", depth: 2, n_readers: 2, check: payload::check_scan };
 /// The map of the ground: mapping.
-pub const SURFACE: Channel<SurfaceHeader, [f32; 8]> = Channel {
-    name: "surface",
-    depth: 2,
-    n_readers: 3,
-    silence_ns: 1000 * MILLISECOND_NS,
-    check: payload::check_surface,
-};
+pub const SURFACE: Channel<SurfaceHeader, [f32; 8]> =
+    Channel { name: "surface", depth: 2, n_readers: 3, check: payload::check_surface };
 /// The risk map of what was learned: learning.
-pub const RISK: Channel<RiskHeader, [f32; 4]> = Channel {
-    name: "risk",
-    depth: 1,
-    n_readers: 4,
-    silence_ns: 600 * MILLISECOND_NS,
-    check: payload::check_risk,
-};
+pub const RISK: Channel<RiskHeader, [f32; 4]> =
+    Channel { name: "risk", depth: 1, n_readers: 4, check: payload::check_risk };
 /// The risk map of physics alone: mapping, while learning is silent.
-pub const RISK_PHYSICS: Channel<RiskHeader, [f32; 4]> = Channel { name: "risk_physics", ..RISK };
+pub const RISK_PHYSICS: Channel<RiskHeader, [f32; 4]> =
+    Channel { name: "risk_physics", n_readers: 3, ..RISK };
 /// What the vehicle shall do: control.
-pub const COMMAND: Channel<Stamp, CommandRecord> = Channel {
-    name: "command",
-    depth: 4,
-    n_readers: 6,
-    silence_ns: 400 * MILLISECOND_NS,
-    check: payload::check_command,
-};
+pub const COMMAND: Channel<Stamp, CommandRecord> =
+    Channel { name: "command", depth: 4, n_readers: 5, check: payload::check_command };
 /// What each decision was made from: control.
-pub const DECISION: Channel<Stamp, DecisionRecord> = Channel {
-    name: "decision",
-    depth: 16,
-    n_readers: 6,
-    silence_ns: 400 * MILLISECOND_NS,
-    check: payload::check_anything,
-};
+pub const DECISION: Channel<Stamp, DecisionRecord> =
+    Channel { name: "decision", depth: 16, n_readers: 2, check: payload::check_anything };
 /// Where the vehicle got stuck: control.
-pub const STUCK: Channel<Stamp, StuckRecord> = Channel {
-    name: "stuck",
-    depth: 8,
-    n_readers: 3,
-    silence_ns: 400 * MILLISECOND_NS,
-    check: payload::check_stuck,
-};
+pub const STUCK: Channel<Stamp, StuckRecord> =
+    Channel { name: "stuck", depth: 8, n_readers: 3, check: payload::check_stuck };
 /// Where to go: whoever runs the vehicle.
-pub const MISSION: Channel<Stamp, MissionRecord> = Channel {
-    name: "mission",
-    depth: 2,
-    n_readers: 6,
-    silence_ns: 2500 * MILLISECOND_NS,
-    check: payload::check_mission,
-};
+pub const MISSION: Channel<Stamp, MissionRecord> =
+    Channel { name: "mission", depth: 2, n_readers: 6, check: payload::check_mission };
 
 /// Networks that were learned while driving: learning.
-pub const CHECKPOINT: Channel<CheckpointHeader, u8> = Channel {
-    name: "checkpoint",
-    depth: 2,
-    n_readers: 3,
-    silence_ns: 12_000 * MILLISECOND_NS,
-    check: payload::check_checkpoint,
-};
+pub const CHECKPOINT: Channel<CheckpointHeader, u8> =
+    Channel { name: "checkpoint", depth: 2, n_readers: 1, check: payload::check_checkpoint };
 
 /// How a process is doing. Several publish at once: one channel for each role.
 pub const fn status_channel(name: &'static str) -> Channel<Stamp, StatusRecord> {
-    Channel {
-        name,
-        depth: 2,
-        n_readers: 3,
-        silence_ns: 1500 * MILLISECOND_NS,
-        check: payload::check_anything,
-    }
+    Channel { name, depth: 2, n_readers: 3, check: payload::check_anything }
 }
 
 /// Why a channel cannot be used.
@@ -168,6 +117,16 @@ pub enum ChannelError {
         /// What the system said.
         problem: String,
     },
+    /// The folder by which a user's processes find one another is not his alone.
+    #[error("{folder}: expected a folder of user {user} and nobody else (mode 700), found {found}")]
+    Folder {
+        /// Its path.
+        folder: String,
+        /// Number of the user.
+        user: u32,
+        /// What is there.
+        found: String,
+    },
     /// A channel could not be opened, e.g. because another program made one of other types under its name.
     #[error("channel {channel}: expected to open it, found: {problem}")]
     Open {
@@ -175,6 +134,26 @@ pub enum ChannelError {
         channel: &'static str,
         /// What the system said.
         problem: String,
+    },
+    /// Somebody else has the channel.
+    #[error(
+        "channel {channel}: expected to be its only publisher, found another process that publishes on it; end that \
+         one first"
+    )]
+    Taken {
+        /// Its name.
+        channel: &'static str,
+    },
+    /// Every place of a reader is taken.
+    #[error(
+        "channel {channel}: expected at most {n_readers} readers, found as many there before this one; start the run \
+         with a higher --third-parties"
+    )]
+    Full {
+        /// Its name.
+        channel: &'static str,
+        /// Places that it has.
+        n_readers: usize,
     },
     /// A message could not be sent.
     #[error("channel {channel}: expected to send, found: {problem}")]

@@ -13,6 +13,13 @@ pub fn now_ns() -> u64 {
     tv_sec.unsigned_abs() * SECOND_NS + tv_nsec.unsigned_abs()
 }
 
+/// The time of day now, nanoseconds of UTC since 1970. It may be set at will: nothing is decided by it.
+pub fn utc_ns() -> u64 {
+    let Timespec { tv_sec, tv_nsec } = clock_gettime(ClockId::Realtime);
+    // A clock that was never set may stand before 1970.
+    u64::try_from(tv_sec).unwrap_or(0) * SECOND_NS + tv_nsec.unsigned_abs()
+}
+
 /// Sleeps to a time on that clock, which may have passed; returns the time then [ns].
 pub fn sleep_until(deadline_ns: u64) -> u64 {
     let tv_sec = i64::try_from(deadline_ns / SECOND_NS).unwrap_or(i64::MAX);

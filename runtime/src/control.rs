@@ -1,23 +1,22 @@
 //! The controller as a process: a decision at every deadline, on what there is, and never a wait for the map.
 
 use bicycle::{Decision, Model};
-use navigator::{Chart, Config, Destination, Pilot};
+use navigator::{Chart, Config, Pilot};
 
 use crate::RuntimeError;
+use crate::ages::AgeLimits;
 use crate::budget::Budget;
 use crate::channel::{
     Bus, COMMAND, DECISION, Inlet, MISSION, Message, ODOMETRY, Outlet, RISK, RISK_PHYSICS, STUCK,
 };
+use crate::choice::is_learned;
 use crate::clock::{self, Cycle};
-use crate::frame::Frame;
 use crate::message::{
     CommandRecord, DecisionRecord, MissionRecord, OdometryRecord, RiskHeader, Source, Stamp, StuckRecord,
 };
+use crate::mission::{Mission, NOWHERE, with_reason};
 use crate::payload::risk_views;
 use crate::status::{Health, Meter, Role};
-
-/// Age of a scan from which on physics' younger map is preferred to a learned one [s].
-const LEARNED_AGE_MAX_S: f64 = 0.6;
 
 /// Share of the period that a decision may take; the rest is for what else the processor does.
 const BUDGET_SHARE: f64 = 0.5;
@@ -32,6 +31,8 @@ pub struct ControlSetup {
     pub seed: u64,
     /// Time between two decisions [s].
     pub period_s: f64,
+    /// How old maps and missions may be.
+    pub ages: AgeLimits,
 }
 
 /// Decides at every deadline until `is_over` says to end.
@@ -53,6 +54,7 @@ struct Control {
     pilot: Pilot,
     budget: Budget,
     inputs: Inputs,
+    ages: AgeLimits,
     commands: Outlet<Stamp, CommandRecord>,
     decisions: Outlet<Stamp, DecisionRecord>,
     stuck: Outlet<Stamp, StuckRecord>,
@@ -67,8 +69,7 @@ struct Inputs {
     physics: MapInput,
     last_odometry: Option<Stamp>,
     n_odometry: u64,
-    frame: Frame,
-    destination: Option<Destination>,
+    mission: Mission,
 }
 
 /// The newest map of an author.
@@ -84,9 +85,17 @@ impl MapInput {
         }
     }
 
+    fn source(&self) -> Source {
+        self.held.as_ref().map_or(Source::default(), |map| map.header().stamp.source())
+    }
+
+    fn scan_at_ns(&self) -> Option<u64> {
+        self.held.as_ref().map(|map| map.header().stamp.valid_at_ns)
+    }
+
     fn age_s(&self, now_ns: u64) -> f64 {
         let age_s =
-            |map: &Message<RiskHeader, [f32; 4]>| clock::age_s(now_ns, map.user_header().stamp.valid_at_ns);
+            |map: &Message<RiskHeader, [f32; 4]>| clock::age_s(now_ns, map.header().stamp.valid_at_ns);
         self.held.as_ref().map_or(f64::INFINITY, age_s)
     }
 }
@@ -101,51 +110,46 @@ impl Inputs {
             physics: map(&RISK_PHYSICS)?,
             last_odometry: None,
             n_odometry: 0,
-            frame: Frame::default(),
-            destination: None,
+            mission: Mission::default(),
         })
     }
 
     /// Takes in what has come since the last decision.
     fn take(&mut self, pilot: &mut Pilot) {
-        let (last, n_taken, frame) = (&mut self.last_odometry, &mut self.n_odometry, &mut self.frame);
+        let (last, n_taken) = (&mut self.last_odometry, &mut self.n_odometry);
         *n_taken = 0;
         self.odometry.poll(|stamp, records| {
             let Some(record) = records.first() else { return };
-            if let Some(jump) = pilot.admit(&record.odometry(stamp.valid_at_ns)) {
-                frame.note(stamp.valid_at_ns, &jump);
-            }
+            pilot.admit(&record.odometry(stamp.valid_at_ns));
             *last = Some(*stamp);
             *n_taken += 1;
         });
-        let destination = &mut self.destination;
-        self.missions.poll(|_, missions| {
-            let said = |mission: &MissionRecord| Destination {
-                goal_m: mission.goal_m,
-                tolerance_m: mission.tolerance_m,
-            };
-            *destination = missions.first().map(said).or(*destination);
-        });
+        let mission = &mut self.mission;
+        self.missions.poll(|stamp, records| records.iter().for_each(|record| mission.note(stamp, record)));
         self.learned.take();
         self.physics.take();
     }
 
     /// The map to drive on: what was learned while it is fresh, else whatever knows of the younger scan.
-    fn map(&self, now_ns: u64) -> Option<&Message<RiskHeader, [f32; 4]>> {
-        let [learned_s, physics_s] = [&self.learned, &self.physics].map(|input| input.age_s(now_ns));
-        let is_learned = learned_s <= LEARNED_AGE_MAX_S || learned_s <= physics_s;
-        if is_learned { self.learned.held.as_ref() } else { self.physics.held.as_ref() }
+    fn map(&self, now_ns: u64, learned_age_max_ns: u64) -> Option<&Message<RiskHeader, [f32; 4]>> {
+        let [learned_at_ns, physics_at_ns] = [&self.learned, &self.physics].map(MapInput::scan_at_ns);
+        if is_learned(learned_at_ns, physics_at_ns, now_ns, learned_age_max_ns) {
+            self.learned.held.as_ref()
+        } else {
+            self.physics.held.as_ref()
+        }
     }
 }
 
 impl Control {
     fn new(bus: &Bus, setup: ControlSetup) -> Result<Self, RuntimeError> {
-        let ControlSetup { model, config, seed, period_s } = setup;
+        let ControlSetup { model, config, seed, period_s, ages } = setup;
         let n_max = config.controller.n_rollouts;
         Ok(Self {
             budget: Budget::new(n_max, clock::nanoseconds(BUDGET_SHARE * period_s)),
             pilot: Pilot::new(model, &config, seed)?,
             inputs: Inputs::new(bus)?,
+            ages,
             commands: bus.outlet(&COMMAND, 1)?,
             decisions: bus.outlet(&DECISION, 1)?,
             stuck: bus.outlet(&STUCK, 1)?,
@@ -155,29 +159,31 @@ impl Control {
 
     fn cycle(&mut self, began_ns: u64, lateness_ns: u64) -> Result<(), RuntimeError> {
         self.inputs.take(&mut self.pilot);
-        let map = self.inputs.map(began_ns).map(|message| (*message.user_header(), message.payload()));
+        let newest = self.inputs.map(began_ns, self.ages.learned_ns);
+        let map = newest.map(|message| (*message.header(), message.payload()));
         let chart = map.as_ref().and_then(|(header, payload)| {
             let (map, time_to_goal) = risk_views(header, payload)?;
-            Some(self.inputs.frame.place(Chart { map, time_to_goal }, header.odometry_at_ns))
+            Some(Chart { map, time_to_goal, odometry_at_ns: header.odometry_at_ns })
         });
         let cycle = self.pilot.cycle();
-        // Nobody has said where to: the same as knowing nothing of the ground.
-        let destination = self.inputs.destination;
-        let nowhere = Destination { goal_m: [0.0; 2], tolerance_m: 0.0 };
-        let chart = chart.filter(|_| destination.is_some());
         let used = map.as_ref().map(|(header, _)| header).filter(|_| chart.is_some());
         if let Some(header) = used {
             self.pilot.note_scan(header.stamp.valid_at_ns);
         }
-        let destination = destination.unwrap_or(nowhere);
+        // Nowhere to go: the same as knowing nothing of the ground, but for the reason that is given.
+        let said = self.inputs.mission.destination(began_ns, self.ages.mission_ns);
+        let chart = chart.filter(|_| said.is_ok());
+        let destination = said.unwrap_or(NOWHERE);
         let n_rollouts = self.budget.n_rollouts();
         self.pilot.use_rollouts(n_rollouts);
         let thinking_ns = clock::now_ns();
-        let decision = self.pilot.decide(began_ns, chart, &destination);
+        let decision = with_reason(self.pilot.decide(began_ns, chart, &destination), said);
         if matches!(decision, Decision::Drive(_)) {
             self.budget.learn(n_rollouts, clock::now_ns() - thinking_ns);
         }
-        let command = CommandRecord::from(&decision);
+        let odometry_at_ns = self.pilot.odometry().map_or(0, |odometry| odometry.valid_at_ns);
+        let scan_at_ns = used.map_or(0, |header| header.stamp.valid_at_ns);
+        let command = CommandRecord::from(&decision).decided_on(odometry_at_ns, scan_at_ns);
         self.commands.send_one(Stamp::default(), command, began_ns)?;
         let state = self.pilot.odometry().map(|odometry| odometry.state()).unwrap_or_default();
         let record = DecisionRecord {
@@ -188,7 +194,9 @@ impl Control {
             n_odometry: self.inputs.n_odometry,
             risk: used.map_or(Source::default(), |header| header.stamp.source()),
             author: used.map_or(0, |header| header.author),
-            scan_at_ns: used.map_or(0, |header| header.stamp.valid_at_ns),
+            mission: self.inputs.mission.source(),
+            learned: self.inputs.learned.source(),
+            physics: self.inputs.physics.source(),
             goal_m: destination.goal_m,
             tolerance_m: destination.tolerance_m,
             n_rollouts: self.pilot.controller().n_rollouts() as u64,
@@ -212,10 +220,11 @@ impl Control {
         Ok(self.meter.report(now_ns, || {
             let odometry_s =
                 inputs.last_odometry.map_or(-1.0, |stamp| clock::age_s(now_ns, stamp.valid_at_ns));
+            let mission_s = inputs.mission.said_at_ns().map_or(-1.0, |at_ns| clock::age_s(now_ns, at_ns));
             let [learned_s, physics_s] = [&inputs.learned, &inputs.physics]
                 .map(|input| Some(input.age_s(now_ns)).filter(|age_s| age_s.is_finite()).unwrap_or(-1.0));
             Health {
-                age_s: [odometry_s, learned_s, physics_s],
+                age_s: [odometry_s, learned_s, physics_s, mission_s],
                 n_missed,
                 figure: pilot.controller().n_rollouts() as f64,
                 ..Health::default()

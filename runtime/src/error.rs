@@ -17,6 +17,20 @@ pub enum RuntimeError {
     /// Learning while driving.
     #[error(transparent)]
     Online(#[from] crate::online::OnlineError),
+    /// Periods and limits on ages that contradict each other.
+    #[error(transparent)]
+    Ages(#[from] crate::ages::AgeLimitError),
+    /// The simulated vehicle cannot speak so often.
+    #[error(
+        "periods: expected a whole number of odometry messages between two scans, found odometry every {odometry_s} s \
+         and scans every {scan_s} s"
+    )]
+    Periods {
+        /// Between two odometry messages [s].
+        odometry_s: f64,
+        /// Between two scans [s].
+        scan_s: f64,
+    },
     /// The live view.
     #[error("live view: expected to serve on {address}, found: {problem}")]
     Live {
@@ -31,6 +45,16 @@ pub enum RuntimeError {
     /// The system refuses a thread.
     #[error("threads: {0}")]
     Threads(#[from] rayon::ThreadPoolBuildError),
+    /// The recordings of a folder are as large as they may be.
+    #[error("{folder}: expected recordings of at most {quota_mb:.1} MB together, found {found_mb:.1} MB")]
+    Quota {
+        /// Path of the folder.
+        folder: String,
+        /// What they may be together [MB].
+        quota_mb: f64,
+        /// What they are [MB].
+        found_mb: f64,
+    },
     /// The recording.
     #[error(transparent)]
     Record(#[from] formats::RecordError),

@@ -123,7 +123,7 @@ impl Learning {
         // What is judged is sent, so that whoever has the messages knows all that was judged.
         if let Some(surface) = self.surfaces.newest().filter(|_| maker.has_goal()) {
             let began_ns = clock::now_ns();
-            let header = surface.user_header();
+            let header = surface.header();
             self.stuck.poll(|stamp, stuck| stuck.iter().for_each(|stuck| maker.note_stuck(stamp, stuck)));
             match maker.update(header, surface.payload())? {
                 Ok(()) => send_risk(maker, &mut self.outlet, header.stamp.valid_at_ns)?,
@@ -145,9 +145,10 @@ impl Learning {
         let (took_s, n_malformed) = (self.took_s, self.n_malformed);
         let counts = [self.surfaces.counts(), self.missions.counts(), self.stuck.counts()];
         Ok(self.meter.report(now_ns, || {
-            let health = Health { age_s: [surface_s, -1.0, -1.0], figure: took_s, ..Health::default() };
+            let health = Health { age_s: [surface_s, -1.0, -1.0, -1.0], figure: took_s, ..Health::default() };
             let health = counts.into_iter().fold(health, Health::with);
-            Health { messages: [health.messages[0], health.messages[1] + n_malformed], ..health }
+            let [lost, refused, failed] = health.messages;
+            Health { messages: [lost, refused + n_malformed, failed], ..health }
         })?)
     }
 }

@@ -8,17 +8,19 @@
 //! two ends of a channel, [`message`] holds every record as it lies in memory, and a [`Watchdog`](watchdog::Watchdog)
 //! has the last word before the actuators. `examples/publish_and_read.rs` shows both ends in one process.
 
+pub mod ages;
 pub mod budget;
 pub mod channel;
+mod choice;
 pub mod clock;
 pub mod control;
 mod error;
-pub mod frame;
 pub mod layout;
 pub mod learning;
 pub mod live;
 pub mod mapping;
 pub mod message;
+pub mod mission;
 pub mod online;
 pub mod payload;
 pub mod plant;

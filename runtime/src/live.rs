@@ -86,10 +86,11 @@ struct ShownStatus {
     rate_hz: f64,
     lateness_median_s: f64,
     lateness_most_s: f64,
-    age_s: [f64; 3],
+    age_s: [f64; 4],
     n_missed: u64,
     n_lost: u64,
     n_refused: u64,
+    n_failed: u64,
     figure: f64,
 }
 
@@ -179,8 +180,8 @@ impl Seen {
 
 impl From<&StatusRecord> for ShownStatus {
     fn from(status: &StatusRecord) -> Self {
-        let StatusRecord { process, rate_hz, lateness_s, age_s, n_missed, n_lost, n_refused, figure, .. } =
-            *status;
+        let StatusRecord { process, rate_hz, lateness_s, age_s, n_missed, .. } = *status;
+        let StatusRecord { n_lost, n_refused, n_failed, figure, .. } = *status;
         let [lateness_median_s, lateness_most_s] = lateness_s;
         Self {
             process,
@@ -191,6 +192,7 @@ impl From<&StatusRecord> for ShownStatus {
             n_missed,
             n_lost,
             n_refused,
+            n_failed,
             figure,
         }
     }

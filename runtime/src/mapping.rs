@@ -3,15 +3,16 @@
 use std::collections::VecDeque;
 
 use bicycle::{Decision, Model, Odometry, SensorModel, Vehicle};
-use navigator::{Assessor, Belief, Config, Jump, Surface, Surveyor};
+use navigator::{Assessor, Belief, Config, Jump, Surface, Surveyor, Whereabouts};
 use terrain::Scan;
 use traversability::CvarLevel;
 
 use crate::RuntimeError;
+use crate::ages::AgeLimits;
 use crate::channel::{
     Bus, COMMAND, Inlet, MISSION, ODOMETRY, Outlet, RISK, RISK_PHYSICS, SCAN, STUCK, SURFACE,
 };
-use crate::clock::{self, SECOND_NS};
+use crate::clock;
 use crate::message::{
     CommandRecord, Grid, MissionRecord, OdometryRecord, PointRecord, RiskHeader, ScanHeader, Source, Stamp,
     StuckRecord, SurfaceHeader,
@@ -31,12 +32,8 @@ pub const PHYSICS: u64 = 2;
 
 /// Time between two looks at the channels [ns].
 const POLL_NS: u64 = 2_000_000;
-/// Odometry that scans may still be of.
-const ODOMETRY_KEPT: usize = 64;
-/// Farthest that a scan may lie from the odometry that it is placed by [ns].
-const SCAN_APART_NS: u64 = 15_000_000;
-/// Silence of learning after which physics speaks [ns].
-const LEARNING_SILENCE_NS: u64 = SECOND_NS * 4 / 10;
+/// Scans that wait for the odometry after them; of more, the oldest is given up.
+const WAITING_MAX: usize = 4;
 
 /// What maps.
 pub struct MappingSetup<'a> {
@@ -48,6 +45,8 @@ pub struct MappingSetup<'a> {
     pub level: CvarLevel,
     /// What is believed of the vehicle: limits that plans keep to, and how its sensors misstate its motion.
     pub model: &'a Model,
+    /// How long learning may be silent.
+    pub ages: AgeLimits,
 }
 
 /// Maps until `is_over` says to end.
@@ -62,7 +61,10 @@ pub fn run(bus: &Bus, setup: &MappingSetup<'_>, is_over: &dyn Fn() -> bool) -> R
 
 struct Mapping {
     surveyor: Surveyor,
-    recent: VecDeque<Odometry>,
+    waiting: VecDeque<Waiting>,
+    wait_max_ns: u64,
+    /// Of the newest odometry that was taken in: jumps up to it are in the map.
+    frame_at_ns: u64,
     odometry: Inlet<Stamp, OdometryRecord>,
     commands: Inlet<Stamp, CommandRecord>,
     scans: Inlet<ScanHeader, PointRecord>,
@@ -71,7 +73,15 @@ struct Mapping {
     meter: Meter,
     last_scan: Option<Stamp>,
     last_odometry: Option<Stamp>,
-    n_misplaced: u64,
+    /// Scans that made no map.
+    n_unmapped: u64,
+}
+
+/// A scan that has come before the odometry of after it.
+struct Waiting {
+    since_ns: u64,
+    stamp: Stamp,
+    scan: Scan,
 }
 
 /// Physics' own risk map, made while nobody hears of learning.
@@ -81,6 +91,7 @@ struct Fallback {
     missions: Inlet<Stamp, MissionRecord>,
     stuck: Inlet<Stamp, StuckRecord>,
     outlet: Outlet<RiskHeader, [f32; 4]>,
+    silence_max_ns: u64,
     began_ns: u64,
 }
 
@@ -91,7 +102,9 @@ impl Mapping {
         Ok(Self {
             surveyor: Surveyor::new(vehicle, config.elevation, config.guard, Surface::Sensed)?
                 .with_sensors(SensorModel::of(&model.effects)),
-            recent: VecDeque::with_capacity(ODOMETRY_KEPT),
+            waiting: VecDeque::with_capacity(WAITING_MAX),
+            wait_max_ns: clock::nanoseconds(config.guard.odometry_wait_max_s),
+            frame_at_ns: 0,
             odometry: bus.inlet(&ODOMETRY)?,
             commands: bus.inlet(&COMMAND)?,
             scans: bus.inlet(&SCAN)?,
@@ -100,7 +113,7 @@ impl Mapping {
             meter: Meter::new(bus, Role::Mapping)?,
             last_scan: None,
             last_odometry: None,
-            n_misplaced: 0,
+            n_unmapped: 0,
         })
     }
 
@@ -123,47 +136,63 @@ impl Mapping {
         for odometry in odometry {
             self.follow(&odometry)?;
         }
-        let mut scans = Vec::new();
-        self.scans.poll(|header, points| scans.push((header.stamp, header.scan(points))));
-        for (stamp, scan) in scans {
-            self.fuse(&stamp, &scan)?;
-        }
+        let (waiting, n_unmapped) = (&mut self.waiting, &mut self.n_unmapped);
+        self.scans.poll(|header, points| {
+            if waiting.len() == WAITING_MAX {
+                waiting.pop_front();
+                *n_unmapped += 1;
+            }
+            let (stamp, scan) = (header.stamp, header.scan(points));
+            waiting.push_back(Waiting { since_ns: clock::now_ns(), stamp, scan });
+        });
+        self.take_waiting()?;
         self.fallback.listen();
         self.report()
     }
 
     fn follow(&mut self, odometry: &Odometry) -> Result<(), RuntimeError> {
         let Ok(jump) = self.surveyor.admit(odometry) else { return Ok(()) };
+        self.frame_at_ns = odometry.valid_at_ns;
         if let Some(jump) = jump {
             self.surveyor.follow_jump(odometry, &jump)?;
-            // Where the vehicle was before the jump is no longer a place on the map.
-            self.recent.clear();
             let scan = self.last_scan;
             self.tell(odometry, Event::Jumped(jump), scan)?;
         }
-        if self.recent.len() == ODOMETRY_KEPT {
-            self.recent.pop_front();
-        }
-        self.recent.push_back(*odometry);
         Ok(())
     }
 
-    fn fuse(&mut self, stamp: &Stamp, scan: &Scan) -> Result<(), RuntimeError> {
+    /// Fuses the scans for which it is known by now where they were taken, or for which nothing better will come.
+    fn take_waiting(&mut self) -> Result<(), RuntimeError> {
+        while let Some(Waiting { since_ns, stamp, scan }) = self.waiting.pop_front() {
+            let is_over = clock::now_ns().saturating_sub(since_ns) >= self.wait_max_ns;
+            let there = match self.surveyor.place(scan.valid_at_ns) {
+                Ok(Whereabouts::Ahead(_)) if !is_over => {
+                    self.waiting.push_front(Waiting { since_ns, stamp, scan });
+                    break;
+                }
+                Ok(Whereabouts::Between(there) | Whereabouts::Ahead(Some(there))) => Some(there),
+                Ok(Whereabouts::Ahead(None) | Whereabouts::Unknown) => {
+                    self.surveyor.note_unplaced();
+                    None
+                }
+                Err(_) => None,
+            };
+            let is_mapped = there.map_or(Ok(false), |there| self.fuse(&there, &stamp, &scan))?;
+            self.n_unmapped += u64::from(!is_mapped);
+        }
+        Ok(())
+    }
+
+    /// Returns whether there was anything to map.
+    fn fuse(&mut self, there: &Odometry, stamp: &Stamp, scan: &Scan) -> Result<bool, RuntimeError> {
         let began_ns = clock::now_ns();
-        let apart_ns = |odometry: &&Odometry| odometry.valid_at_ns.abs_diff(scan.valid_at_ns);
-        let nearest = self.recent.iter().min_by_key(apart_ns).filter(|at| apart_ns(at) <= SCAN_APART_NS);
-        let Some(odometry) = nearest.copied() else {
-            self.n_misplaced += 1;
-            return Ok(());
-        };
-        if !self.surveyor.fuse(&odometry, scan)? {
-            self.n_misplaced += 1;
-            return Ok(());
+        if !self.surveyor.fuse(there, scan)? {
+            return Ok(false);
         }
         self.last_scan = Some(*stamp);
-        self.tell(&odometry, Event::Fused, Some(*stamp))?;
+        self.tell(there, Event::Fused, Some(*stamp))?;
         self.meter.count(began_ns.saturating_sub(stamp.published_at_ns));
-        Ok(())
+        Ok(true)
     }
 
     /// Writes the map as it is now where its readers will read it.
@@ -171,19 +200,23 @@ impl Mapping {
         let surface = self.surveyor.surface();
         let cells = surface.values();
         let mut loan = self.surfaces.write(cells.len(), |place| payload::cell_numbers(&cells[place]))?;
-        let (event, jump_m) = match event {
-            Event::Fused => (FUSED, [0.0; 3]),
-            Event::Jumped(jump) => (JUMPED, jump.step_m),
+        let (event, jump) = match event {
+            Event::Fused => (FUSED, Jump::NONE),
+            Event::Jumped(jump) => (JUMPED, jump),
         };
+        let shift = self.surveyor.shift();
         let mut header = SurfaceHeader {
             stamp: Stamp::default(),
             grid: Grid::from(surface.geometry()),
             scan: scan.map_or(Source::default(), |stamp| stamp.source()),
             odometry: OdometryRecord::from(odometry),
             odometry_at_ns: odometry.valid_at_ns,
+            frame_at_ns: self.frame_at_ns,
             event,
-            jump_m,
-            shift_m: self.surveyor.shift_m(),
+            jump_m: jump.step_m,
+            jump_yaw_rad: jump.yaw_rad,
+            shift_m: shift.step_m,
+            shift_yaw_rad: shift.yaw_rad,
             content_hash: payload::content_hash(loan.payload()),
         };
         *loan.header_mut() = header;
@@ -199,8 +232,8 @@ impl Mapping {
         let now_ns = clock::now_ns();
         let age_s =
             |stamp: &Option<Stamp>| stamp.map_or(-1.0, |stamp| clock::age_s(now_ns, stamp.valid_at_ns));
-        let age_s = [age_s(&self.last_odometry), age_s(&self.last_scan), -1.0];
-        let (n_missed, figure) = (self.n_misplaced, self.surveyor.n_jumps() as f64);
+        let age_s = [age_s(&self.last_odometry), age_s(&self.last_scan), -1.0, -1.0];
+        let (n_missed, figure) = (self.n_unmapped, self.surveyor.n_jumps() as f64);
         let counts = [self.odometry.counts(), self.scans.counts(), self.commands.counts()];
         let health = Health { age_s, n_missed, figure, ..Health::default() };
         Ok(self.meter.report(now_ns, || counts.into_iter().fold(health, Health::with))?)
@@ -215,7 +248,7 @@ enum Event {
 
 impl Fallback {
     fn new(bus: &Bus, setup: &MappingSetup<'_>) -> Result<Self, RuntimeError> {
-        let MappingSetup { vehicle, config, level, model } = setup;
+        let MappingSetup { vehicle, config, level, model, ages } = setup;
         let assessor = Assessor::new(vehicle, &model.limits, config, &Belief::Physics, *level)?;
         Ok(Self {
             maker: RiskMaker::new(assessor, PHYSICS, 0),
@@ -223,6 +256,7 @@ impl Fallback {
             missions: bus.inlet(&MISSION)?,
             stuck: bus.inlet(&STUCK)?,
             outlet: bus.outlet(&RISK_PHYSICS, risk_elements(config))?,
+            silence_max_ns: ages.learning_silence_ns,
             began_ns: clock::now_ns(),
         })
     }
@@ -236,7 +270,7 @@ impl Fallback {
 
     fn is_needed(&self) -> bool {
         let heard_at_ns = self.learned.heard_at_ns().unwrap_or(self.began_ns);
-        self.maker.has_goal() && clock::now_ns().saturating_sub(heard_at_ns) > LEARNING_SILENCE_NS
+        self.maker.has_goal() && clock::now_ns().saturating_sub(heard_at_ns) > self.silence_max_ns
     }
 
     fn speak(&mut self, header: &SurfaceHeader, cells: &[[f32; 8]]) -> Result<(), RuntimeError> {

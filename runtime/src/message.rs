@@ -9,7 +9,7 @@ pub(crate) use convert::drive_row;
 pub use convert::{HOLD_REASONS, STOP_REASONS};
 
 /// Version of everything in this file; messages of another are refused.
-pub const LAYOUT_VERSION: u32 = 2;
+pub const LAYOUT_VERSION: u32 = 3;
 
 record! {
     /// First field of every header: whose message it is, and of when.
@@ -18,7 +18,7 @@ record! {
         layout_version: u32,
         /// Zero.
         reserved: u32,
-        /// When the publishing process began, which tells one life of it from the next [ns].
+        /// When its publisher took the channel, which tells one life of it from the next [ns].
         epoch_ns: u64,
         /// Counts the messages of one publisher on one channel from 1.
         sequence: u64,
@@ -102,16 +102,22 @@ record! {
         grid: Grid,
         /// The scan that was fused last.
         scan: Source,
-        /// The odometry that it was fused at.
+        /// Where the vehicle was when the scan was taken, or the odometry that showed the jump.
         odometry: OdometryRecord,
-        /// When that was measured [ns].
+        /// When that was [ns].
         odometry_at_ns: u64,
+        /// When the odometry was measured in whose frame the map lies: the newest that mapping had taken in [ns].
+        frame_at_ns: u64,
         /// What happened since the last message: 1 = a scan was fused, 2 = the localisation jumped.
         event: u64,
-        /// The jump, if that is what happened: east, north, up [m].
+        /// The jump, if that is what happened: p of before lies at R(jump_yaw_rad) p + jump_m [m].
         jump_m: [f64; 3],
-        /// All jumps so far together [m].
+        /// Its turn, counter-clockwise [rad].
+        jump_yaw_rad: f64,
+        /// All jumps so far together, likewise [m].
         shift_m: [f64; 3],
+        /// Their turn [rad].
+        shift_yaw_rad: f64,
         /// XXH3 of the payload.
         content_hash: u64,
     }
@@ -144,7 +150,7 @@ record! {
 }
 
 record! {
-    /// What the vehicle shall do.
+    /// What the vehicle shall do. It grows old from when what it was decided on was measured, whenever it is sent.
     CommandRecord = "surefoot.Command" {
         /// Forward speed, negative in reverse [m/s].
         speed_mps: f32,
@@ -154,6 +160,10 @@ record! {
         decision: u32,
         /// Why, when it is not driving; see docs/runtime.md.
         reason: u32,
+        /// When the odometry was measured that it was decided on [ns]; 0 = none.
+        odometry_at_ns: u64,
+        /// When the scan was measured that the map ends with that it was decided on [ns]; 0 = no map.
+        scan_at_ns: u64,
     }
 }
 
@@ -174,8 +184,12 @@ record! {
         risk: Source,
         /// Who made that map: 0 = none, 1 = what was learned, 2 = physics alone.
         author: u64,
-        /// When the scan was measured that the map ends with [ns]; 0 = no map.
-        scan_at_ns: u64,
+        /// What was said last of where to go.
+        mission: Source,
+        /// The newest map of what was learned that there was to choose from.
+        learned: Source,
+        /// The newest map of physics alone that there was to choose from.
+        physics: Source,
         /// Where to go [m].
         goal_m: [f64; 2],
         /// How near counts as there [m].
@@ -204,7 +218,7 @@ record! {
 }
 
 record! {
-    /// Where to go; whoever runs the vehicle says so once a second.
+    /// Where to go; whoever runs the vehicle says so once a second, and when it is over. Unless repeated, it is lost.
     MissionRecord = "surefoot.Mission" {
         /// The place in the map frame [m].
         goal_m: [f64; 2],
@@ -246,15 +260,17 @@ record! {
         rate_hz: f64,
         /// Median and largest lateness since the last status [s].
         lateness_s: [f64; 2],
-        /// Age of up to three inputs when they were last used [s]; negative = none yet.
-        age_s: [f64; 3],
+        /// Age of up to four inputs when they were last used [s]; negative = none yet.
+        age_s: [f64; 4],
         /// Deadlines missed since the process began.
         n_missed: u64,
         /// Messages lost on the way, by gaps in their numbers.
         n_lost: u64,
         /// Messages refused.
         n_refused: u64,
-        /// Figure of the role's own: futures sampled, points mapped, recorded bytes.
+        /// Looks at a channel that the transport broke off.
+        n_failed: u64,
+        /// Figure of the role's own: speed [m/s], jumps made out, futures sampled, recorded bytes.
         figure: f64,
     }
 }

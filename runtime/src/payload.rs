@@ -2,11 +2,11 @@
 
 use bicycle::Odometry;
 use mppi::CostToGoView;
-use terrain::{GridGeometry, GridMap, Knowledge, SurfaceCell, TerrainClass};
+use terrain::{DistantPosition, GridGeometry, GridMap, Knowledge, SurfaceCell, TerrainClass};
 use traversability::{Ground, Risk, RiskMapView};
 use xxhash_rust::xxh3::xxh3_64;
 
-use crate::channel::Refusal;
+use crate::channel::{FUTURE_NS, Refusal};
 use crate::message::{
     CheckpointHeader, CommandRecord, MissionRecord, OdometryRecord, PointRecord, RiskHeader, ScanHeader,
     Stamp, StuckRecord, SurfaceHeader,
@@ -95,6 +95,8 @@ pub fn risk_views<'a>(
 ) -> Option<(RiskMapView<'a>, CostToGoView<'a>)> {
     let geometry = header.grid.geometry()?;
     let n_yaws = (1..=YAWS_MAX).contains(&header.n_yaws).then_some(header.n_yaws as usize)?;
+    // Times are interpolated between cells: one row or column has nothing to interpolate between.
+    let geometry = Some(geometry).filter(|geometry| geometry.n_rows.min(geometry.n_cols) >= 2)?;
     let parts = RiskParts::new(&geometry, n_yaws);
     (parts.n_elements() == payload.len()).then(|| {
         let map =
@@ -179,8 +181,11 @@ pub(crate) fn check_surface(header: &SurfaceHeader, payload: &[[f32; 8]]) -> Res
     let geometry = header.grid.geometry().ok_or(Refusal::Malformed)?;
     require(geometry.n_cells() == payload.len(), Refusal::Malformed)?;
     let at = header.odometry.odometry(header.odometry_at_ns);
-    let shifts = header.jump_m.iter().chain(&header.shift_m);
-    require(Odometry::is_finite(&at) && shifts.clone().all(|m| m.is_finite()), Refusal::NonFinite)
+    let [x_m, y_m, _] = at.position_m;
+    let turns = [header.jump_yaw_rad, header.shift_yaw_rad];
+    let shifts = header.jump_m.iter().chain(&header.shift_m).chain(&turns);
+    require(Odometry::is_finite(&at) && shifts.clone().all(|m| m.is_finite()), Refusal::NonFinite)?;
+    require(DistantPosition::check([x_m, y_m], geometry.resolution_m).is_ok(), Refusal::Malformed)
 }
 
 pub(crate) fn check_risk(header: &RiskHeader, payload: &[[f32; 4]]) -> Result<(), Refusal> {
@@ -198,8 +203,12 @@ pub(crate) fn check_risk(header: &RiskHeader, payload: &[[f32; 4]]) -> Result<()
     require(map.ground.iter().all(known), Refusal::Malformed)
 }
 
-pub(crate) fn check_command(_: &Stamp, payload: &[CommandRecord]) -> Result<(), Refusal> {
+/// A command decided on what was measured after it was sent would never grow old.
+pub(crate) fn check_command(stamp: &Stamp, payload: &[CommandRecord]) -> Result<(), Refusal> {
     let command = check_one(payload)?;
+    let latest_ns = stamp.published_at_ns.saturating_add(FUTURE_NS);
+    let is_past = command.odometry_at_ns <= latest_ns && command.scan_at_ns <= latest_ns;
+    require(is_past, Refusal::FromFuture)?;
     require(command.speed_mps.is_finite() && command.steering_rad.is_finite(), Refusal::NonFinite)?;
     require(command.decision().is_some(), Refusal::Malformed)
 }
@@ -308,6 +317,8 @@ mod tests {
         let wild = CommandRecord { steering_rad: f32::NAN, ..drive };
         assert_eq!(check_command(&stamp, &[wild]), Err(Refusal::NonFinite));
         assert_eq!(check_command(&stamp, &[CommandRecord::default()]), Err(Refusal::Malformed));
+        let unborn = CommandRecord { scan_at_ns: FUTURE_NS + 1, ..drive };
+        assert_eq!(check_command(&stamp, &[unborn]), Err(Refusal::FromFuture));
         let lost = StuckRecord { yaw_rad: f64::INFINITY, ..StuckRecord::default() };
         assert_eq!(check_stuck(&stamp, &[lost]), Err(Refusal::NonFinite));
         let nowhere = MissionRecord { goal_m: [0.0, f64::NAN], ..MissionRecord::default() };

@@ -4,18 +4,17 @@ use bicycle::{Decision, Vehicle};
 use scenarios::{Episode, EpisodeConfig, Observation, Outcome, Task};
 
 use crate::RuntimeError;
+use crate::ages::{AgeLimits, Periods};
 use crate::channel::{Bus, COMMAND, Inlet, MISSION, ODOMETRY, Outlet, SCAN};
 use crate::clock::{self, Cycle, SECOND_NS};
-use crate::message::{CommandRecord, MissionRecord, OdometryRecord, PointRecord, ScanHeader, Stamp};
+use crate::message::{
+    CommandRecord, MissionRecord, OdometryRecord, PointRecord, ScanHeader, Stamp, StatusRecord,
+};
 use crate::status::{Health, Meter, Role};
 use crate::watchdog::Watchdog;
 
 /// Returns of a sweep at the most.
 pub const POINTS_MAX: usize = 1 << 16;
-/// Odometry and commands per second [Hz].
-const RATE_HZ: f64 = 50.0;
-/// Sweeps of the range sensor per second [Hz].
-const SCAN_HZ: f64 = 5.0;
 /// The world does not wait: a plant that is late catches up, from no further back than this [ns].
 const BEHIND_MAX_NS: u64 = SECOND_NS / 4;
 
@@ -25,12 +24,25 @@ pub struct PlantSetup<'a> {
     pub task: Task,
     /// The machine.
     pub vehicle: &'a Vehicle,
-    /// Sensors and rules; the rates are the plant's own.
+    /// Sensors and rules; the rates are those of `periods`.
     pub episode: EpisodeConfig,
     /// Decides the sensors' noise.
     pub seed: u64,
-    /// Age up to which a command counts [s].
-    pub command_age_max_s: f64,
+    /// How often it measures and says where to go.
+    pub periods: Periods,
+    /// How old what is followed may be.
+    pub ages: AgeLimits,
+}
+
+/// Scans are of whole cycles to this, so that periods may be rounded numbers.
+const ROUNDING: f64 = 1e-6;
+
+/// Odometry messages from one scan to the next, if that is a whole number.
+pub fn cycles_per_scan(periods: &Periods) -> Result<u64, RuntimeError> {
+    let Periods { odometry_s, scan_s, .. } = *periods;
+    let n = scan_s / odometry_s;
+    let is_whole = n >= 1.0 - ROUNDING && (n - n.round()).abs() < ROUNDING * n;
+    is_whole.then_some(n.round() as u64).ok_or(RuntimeError::Periods { odometry_s, scan_s })
 }
 
 /// How a drive ended, and what the watchdog saw.
@@ -46,6 +58,8 @@ pub struct PlantReport {
     pub distance_to_goal_m: f64,
     /// Cycles in which the watchdog stopped the vehicle.
     pub n_stopped_by_watchdog: u64,
+    /// Jumps of the localisation that mapping told of.
+    pub n_jumps: u64,
 }
 
 /// Drives until the episode ends or `is_over` says so.
@@ -68,19 +82,22 @@ struct Plant {
     cycle: Cycle,
     watchdog: Watchdog,
     n_stopped_by_watchdog: u64,
+    mission_ns: u64,
     told_mission_at_ns: Option<u64>,
     commands: Inlet<Stamp, CommandRecord>,
     odometry: Outlet<Stamp, OdometryRecord>,
     scans: Outlet<ScanHeader, PointRecord>,
     missions: Outlet<Stamp, MissionRecord>,
+    mapping: Inlet<Stamp, StatusRecord>,
+    jumps: Jumps,
     meter: Meter,
 }
 
 impl Plant {
     fn new(bus: &Bus, setup: PlantSetup<'_>) -> Result<Self, RuntimeError> {
-        let PlantSetup { task, vehicle, mut episode, seed, command_age_max_s } = setup;
-        episode.control_hz = RATE_HZ;
-        episode.cycles_per_scan = (RATE_HZ / SCAN_HZ) as u64;
+        let PlantSetup { task, vehicle, mut episode, seed, periods, ages } = setup;
+        episode.control_hz = 1.0 / periods.odometry_s;
+        episode.cycles_per_scan = cycles_per_scan(&periods)?;
         let episode = Episode::new(task, vehicle, episode, seed)?;
         let cycle_ns = clock::nanoseconds(episode.cycle_s());
         let (commands, meter) = (bus.inlet(&COMMAND)?, Meter::new(bus, Role::Plant)?);
@@ -91,13 +108,16 @@ impl Plant {
             episode,
             began_ns,
             cycle: Cycle::new(began_ns, cycle_ns),
-            watchdog: Watchdog::new(vehicle.limits, clock::nanoseconds(command_age_max_s)),
+            watchdog: Watchdog::new(vehicle.limits, ages),
             n_stopped_by_watchdog: 0,
+            mission_ns: clock::nanoseconds(periods.mission_s),
             told_mission_at_ns: None,
             commands,
             odometry,
             scans,
             missions,
+            mapping: bus.inlet(&Role::Mapping.status())?,
+            jumps: Jumps::default(),
             meter,
         })
     }
@@ -108,24 +128,27 @@ impl Plant {
         let now_ns = clock::sleep_until(due_ns);
         self.meter.count(now_ns - due_ns);
         self.measure()?;
-        self.commands.poll(|header, commands| {
-            if let Some(decision) = commands.first().and_then(CommandRecord::decision) {
-                self.watchdog.admit(decision, header.published_at_ns);
-            }
+        let watchdog = &mut self.watchdog;
+        self.commands.poll(|stamp, commands| {
+            commands.iter().for_each(|command| watchdog.admit(command, stamp.published_at_ns));
         });
+        let jumps = &mut self.jumps;
+        self.mapping.poll(|stamp, told| told.iter().for_each(|status| jumps.note(stamp, status)));
         let decision = self.watchdog.decision(clock::now_ns());
         if decision == Decision::Stop(bicycle::StopReason::StaleCommand) {
             self.n_stopped_by_watchdog += 1;
         }
         self.episode.apply(&decision)?;
-        if self.told_mission_at_ns.is_none_or(|at_ns| now_ns.saturating_sub(at_ns) >= SECOND_NS) {
+        if self.told_mission_at_ns.is_none_or(|at_ns| now_ns.saturating_sub(at_ns) >= self.mission_ns) {
             self.told_mission_at_ns = Some(now_ns);
             self.tell_mission()?;
         }
         self.keep_pace();
         let age_s = self.watchdog.age_ns(now_ns).map_or(-1.0, |age_ns| age_ns as f64 * 1e-9);
         let n_missed = self.cycle.n_missed();
-        let health = Health { age_s: [age_s, -1.0, -1.0], n_missed, ..Health::default() };
+        let unable = [0, self.watchdog.n_refused(), 0];
+        let health =
+            Health { age_s: [age_s, -1.0, -1.0, -1.0], n_missed, messages: unable, ..Health::default() };
         let speed_mps = self.episode.motion().velocity_mps[0];
         let counts = self.commands.counts();
         Ok(self.meter.report(now_ns, || Health { figure: speed_mps, ..health }.with(counts))?)
@@ -180,6 +203,58 @@ impl Plant {
             path_length_m: self.episode.path_length_m(),
             distance_to_goal_m: self.episode.task().distance_to_goal_m(pose.x_m, pose.y_m),
             n_stopped_by_watchdog: self.n_stopped_by_watchdog,
+            n_jumps: self.jumps.n(),
+        }
+    }
+}
+
+/// Jumps of the localisation over the lives of mapping, each of which counts its own.
+#[derive(Clone, Copy, Debug, Default)]
+struct Jumps {
+    n_before: u64,
+    life: (u64, u64),
+}
+
+impl Jumps {
+    fn note(&mut self, stamp: &Stamp, status: &StatusRecord) {
+        let (epoch_ns, n) = self.life;
+        if epoch_ns != stamp.epoch_ns {
+            self.n_before += n;
+        }
+        self.life = (stamp.epoch_ns, status.figure as u64);
+    }
+
+    fn n(&self) -> u64 {
+        self.n_before + self.life.1
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn jumps_add_up_over_the_lives_of_mapping() {
+        let mut jumps = Jumps::default();
+        for (epoch_ns, figure, n) in [(5, 0.0, 0), (5, 2.0, 2), (5, 2.0, 2), (9, 0.0, 2), (9, 1.0, 3)] {
+            let stamp = Stamp { epoch_ns, ..Stamp::default() };
+            jumps.note(&stamp, &StatusRecord { figure, ..StatusRecord::default() });
+            assert_eq!(jumps.n(), n, "{epoch_ns} {figure}");
+        }
+    }
+
+    #[test]
+    fn scans_come_with_every_so_many_odometry_messages_or_are_refused() {
+        let of = |odometry_hz: f64, scan_hz: f64| {
+            let (odometry_s, scan_s) = (odometry_hz.recip(), scan_hz.recip());
+            cycles_per_scan(&Periods { odometry_s, scan_s, ..Periods::default() })
+        };
+        assert_eq!(of(50.0, 5.0).unwrap(), 10);
+        assert_eq!(of(30.0, 10.0).unwrap(), 3);
+        assert_eq!(of(20.0, 20.0).unwrap(), 1);
+        for (odometry_hz, scan_hz) in [(50.0, 4.0), (5.0, 10.0), (10.0, 20.0)] {
+            let told = of(odometry_hz, scan_hz).unwrap_err().to_string();
+            assert!(told.contains("expected a whole number") && told.contains("found odometry"), "{told}");
         }
     }
 }

@@ -9,8 +9,8 @@ use bytemuck::NoUninit;
 
 use crate::RuntimeError;
 use crate::channel::{
-    Bus, CHECKPOINT, COMMAND, DECISION, Header, Inlet, MISSION, ODOMETRY, RISK, RISK_PHYSICS, SCAN, STUCK,
-    SURFACE,
+    Bus, CHECKPOINT, COMMAND, DECISION, Element, Header, Inlet, MISSION, ODOMETRY, RISK, RISK_PHYSICS, SCAN,
+    STUCK, SURFACE,
 };
 use crate::clock::{self, SECOND_NS};
 use crate::message::{
@@ -27,6 +27,8 @@ const POLL_NS: u64 = SECOND_NS / 200;
 
 /// Topics of the messages as they went over the channels, by channel.
 pub mod topic {
+    /// What all of them begin with.
+    pub const CHANNELS: &str = "/channel/";
     /// [`crate::channel::ODOMETRY`].
     pub const ODOMETRY: &str = "/channel/odometry";
     /// [`crate::channel::SCAN`].
@@ -61,27 +63,40 @@ pub struct RecorderSetup {
     pub file_bytes_max: u64,
     /// Time after which the next file is begun [s].
     pub file_time_max_s: f64,
+    /// Size that all recordings of the folder together may reach, those of before included [bytes].
+    pub quota_bytes: u64,
+    /// Time after which what was recorded is put onto the disk, so that a failure of the power costs no more [s].
+    pub sync_interval_s: f64,
 }
 
-/// Records until `is_over` says to end. When the disk is full it ends the file where that is whole, says so, once, and
-/// goes on without a recording: the vehicle drives on.
+/// Records until `is_over` says to end. When the disk is full or the quota is reached it ends the file where that is
+/// whole, says so, once, and goes on without a recording: the vehicle drives on. What is not recorded is counted, and
+/// told as missed.
 pub fn run(
     bus: &Bus,
     setup: RecorderSetup,
     is_over: &dyn Fn() -> bool,
     warn: &mut dyn FnMut(&str),
 ) -> Result<(), RuntimeError> {
-    let mut recorder = Recorder::new(bus, setup)?;
+    let mut tell = |error: RuntimeError| warn(&format!("{error}; driving on without a recording"));
+    let mut recorder = Recorder::new(bus)?;
+    recorder.file = match RotatingFile::create(setup, clock::now_ns()) {
+        Err(error @ RuntimeError::Quota { .. }) => {
+            tell(error);
+            None
+        }
+        file => Some(file?),
+    };
     while !is_over() {
         if let Err(error) = recorder.look() {
-            warn(&format!("{error}; driving on without a recording"));
+            tell(error);
             // It says again what has just been said.
             drop(recorder.file.take().map(RotatingFile::finish));
         }
         recorder.report()?;
         clock::sleep_until(clock::now_ns() + POLL_NS);
     }
-    recorder.file.map_or(Ok(()), |file| Ok(file.finish()?))
+    recorder.file.map_or(Ok(()), RotatingFile::finish)
 }
 
 struct Recorder {
@@ -89,6 +104,7 @@ struct Recorder {
     file: Option<RotatingFile>,
     views: Views,
     meter: Meter,
+    n_unrecorded: u64,
 }
 
 struct Inlets {
@@ -104,7 +120,7 @@ struct Inlets {
 }
 
 impl Recorder {
-    fn new(bus: &Bus, setup: RecorderSetup) -> Result<Self, RuntimeError> {
+    fn new(bus: &Bus) -> Result<Self, RuntimeError> {
         let inlets = Inlets {
             odometry: bus.inlet(&ODOMETRY)?,
             scans: bus.inlet(&SCAN)?,
@@ -117,13 +133,15 @@ impl Recorder {
             checkpoints: bus.inlet(&CHECKPOINT)?,
         };
         let meter = Meter::new(bus, Role::Recorder)?;
-        let file = Some(RotatingFile::create(setup, clock::now_ns())?);
-        Ok(Self { inlets, file, views: Views::default(), meter })
+        Ok(Self { inlets, file: None, views: Views::default(), meter, n_unrecorded: 0 })
     }
 
     /// Takes everything from the channels, what others are made of first, and writes it.
     fn look(&mut self) -> Result<(), RuntimeError> {
-        let Self { inlets, file: Some(file), views, meter } = self else { return Ok(()) };
+        let Self { inlets, file: Some(file), views, meter, .. } = self else {
+            self.n_unrecorded += self.inlets.pass_over();
+            return Ok(());
+        };
         let mut result = Ok(());
         let mut keep = |result: &mut Result<(), RuntimeError>, written: Result<(), formats::RecordError>| {
             meter.count(0);
@@ -166,14 +184,14 @@ impl Recorder {
             keep(&mut result, write(file, topic::DECISION, header, records, DecisionRecord::layout));
         });
         result?;
-        Ok(file.tend(clock::now_ns())?)
+        file.tend(clock::now_ns())
     }
 
     fn report(&mut self) -> Result<(), RuntimeError> {
         let bytes = self.file.as_ref().map_or(-1.0, |file| file.bytes() as f64);
         let Inlets { odometry, scans, surfaces, risks: [learned, physics], decisions, .. } = &self.inlets;
         Ok(self.meter.report(clock::now_ns(), || {
-            Health { figure: bytes, ..Health::default() }
+            Health { figure: bytes, n_missed: self.n_unrecorded, ..Health::default() }
                 .with(odometry.counts())
                 .with(scans.counts())
                 .with(surfaces.counts())
@@ -181,6 +199,28 @@ impl Recorder {
                 .with(physics.counts())
                 .with(decisions.counts())
         })?)
+    }
+}
+
+impl Inlets {
+    /// Takes everything from the channels and keeps nothing; returns how many messages that were.
+    fn pass_over(&mut self) -> u64 {
+        fn all<H: Header, T: Element>(inlet: &mut Inlet<H, T>) -> u64 {
+            let mut n = 0;
+            inlet.poll(|_, _| n += 1);
+            n
+        }
+        let [learned, physics] = &mut self.risks;
+        all(&mut self.odometry)
+            + all(&mut self.scans)
+            + all(&mut self.surfaces)
+            + all(learned)
+            + all(physics)
+            + all(&mut self.stuck)
+            + all(&mut self.missions)
+            + all(&mut self.commands)
+            + all(&mut self.decisions)
+            + all(&mut self.checkpoints)
     }
 }
 

@@ -1,19 +1,22 @@
 //! Every decision of a recording, made again from what control said it used.
 
+mod choice;
 mod maps;
 mod records;
 
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use bicycle::lanes::{Instructions, IsaAbsent};
 use evidential::Checkpoint;
-use navigator::{Belief, Chart, Destination, NavigatorError, Pilot};
+use navigator::{Belief, Chart, NavigatorError, Pilot};
 use traversability::CvarLevel;
 
-use crate::frame::Frame;
 use crate::message::{CommandRecord, DecisionRecord, Source};
+use crate::mission::{Mission, NOWHERE, with_reason};
 use crate::payload::risk_views;
 use crate::setup::{MachineSetup, SetupError};
+use choice::Choice;
 use maps::{Maps, Unmade};
 pub use records::{Key, ReadError, Records, recorded_decision, recorded_stamp};
 
@@ -32,6 +35,9 @@ pub struct ReplayReport {
     pub n_risk_maps: u64,
     /// The first difference, if there is any.
     pub first_difference: Option<String>,
+    /// Where the recording contradicts itself, whatever was decided on it: decisions on another map than there was to
+    /// decide on.
+    pub contradictions: Vec<String>,
     /// What the recording lacks, each once.
     pub missing: Vec<String>,
     /// Where the recording breaks off, if it does.
@@ -53,6 +59,9 @@ pub enum ReplayError {
     /// Its settings are none.
     #[error(transparent)]
     Setup(#[from] SetupError),
+    /// It was made with other instructions.
+    #[error("{0}; the recording was made with that one, and its decisions are those of no other")]
+    Instructions(#[from] IsaAbsent),
     /// Its level or seed is none.
     #[error("recorded {what}: expected {expected}, found {found}")]
     Field {
@@ -111,6 +120,7 @@ pub fn read(files: &[PathBuf]) -> Result<Records, ReplayError> {
 pub fn replay(records: &Records, knowledge: &Knowledge) -> Result<ReplayReport, ReplayError> {
     let Some(setup) = &records.setup else { return Err(ReplayError::NoSetup { file: String::new() }) };
     let machine = MachineSetup::read(setup)?;
+    Instructions::find(machine.config.controller.isa)?;
     let level = CvarLevel::new(setup.alpha).map_err(|_| ReplayError::Field {
         what: "alpha",
         expected: "a level in (0, 1]",
@@ -124,14 +134,15 @@ pub fn replay(records: &Records, knowledge: &Knowledge) -> Result<ReplayReport, 
     let mut maps = Maps::new(records, &machine, knowledge, level)?;
     let mut report = ReplayReport { ended_early: records.ended_early.clone(), ..ReplayReport::default() };
     report.n_decisions = records.decisions.len() as u64;
-    let mut life: Option<Life> = None;
+    let mut life: Option<Life<'_>> = None;
     for (key, record) in &records.decisions {
         let goes_on = life.as_ref().is_some_and(|life| life.epoch_ns == key.epoch_ns);
         if !goes_on {
             life = Some(Life {
                 epoch_ns: key.epoch_ns,
                 pilot: Pilot::new(machine.model.clone(), &machine.config, seed)?,
-                frame: Frame::default(),
+                mission_age_max_ns: setup.ages.mission_ns,
+                choice: Choice::new(&records.risks, setup.ages.learned_ns, key.epoch_ns),
                 is_lost: false,
             });
         }
@@ -144,15 +155,16 @@ pub fn replay(records: &Records, knowledge: &Knowledge) -> Result<ReplayReport, 
 }
 
 /// One life of the control process.
-struct Life {
+struct Life<'a> {
     epoch_ns: u64,
     pilot: Pilot,
-    frame: Frame,
+    mission_age_max_ns: u64,
+    choice: Choice<'a>,
     /// Something that a decision was made from is missing: what its memory holds from then on is not known.
     is_lost: bool,
 }
 
-impl Life {
+impl Life<'_> {
     fn decide(
         &mut self,
         record: &DecisionRecord,
@@ -160,6 +172,9 @@ impl Life {
         maps: &mut Maps<'_>,
         report: &mut ReplayReport,
     ) -> Result<(), ReplayError> {
+        if let Err(why) = self.choice.check(record) {
+            report.contradictions.push(format!("decision {}: {why}", record.cycle));
+        }
         if let Some(missing) = self.take_odometry(record, records) {
             self.lose(missing, report);
         }
@@ -178,6 +193,13 @@ impl Life {
                 }
             },
         };
+        let mission = match records.mission(record.mission) {
+            Ok(mission) => mission,
+            Err(missing) => {
+                self.lose(missing, report);
+                Mission::default()
+            }
+        };
         if self.is_lost {
             report.n_unmade += 1;
             return Ok(());
@@ -185,14 +207,18 @@ impl Life {
         let chart = made.and_then(|made| {
             self.pilot.note_scan(made.header.stamp.valid_at_ns);
             let (map, time_to_goal) = risk_views(&made.header, &made.payload)?;
-            Some(self.frame.place(Chart { map, time_to_goal }, made.header.odometry_at_ns))
+            Some(Chart { map, time_to_goal, odometry_at_ns: made.header.odometry_at_ns })
         });
-        let destination = Destination { goal_m: record.goal_m, tolerance_m: record.tolerance_m };
+        let scan_at_ns = made.map_or(0, |made| made.header.stamp.valid_at_ns);
+        let said = mission.destination(record.decided_at_ns, self.mission_age_max_ns);
+        let chart = chart.filter(|_| said.is_ok());
         self.pilot.use_rollouts(record.n_rollouts as usize);
-        let decision = self.pilot.decide(record.decided_at_ns, chart, &destination);
+        let decided = self.pilot.decide(record.decided_at_ns, chart, &said.unwrap_or(NOWHERE));
+        let decision = with_reason(decided, said);
         // Learning was told by a message of its own, which was recorded.
         self.pilot.take_stuck();
-        let made = CommandRecord::from(&decision);
+        let odometry_at_ns = self.pilot.odometry().map_or(0, |odometry| odometry.valid_at_ns);
+        let made = CommandRecord::from(&decision).decided_on(odometry_at_ns, scan_at_ns);
         if bytemuck::bytes_of(&made) == bytemuck::bytes_of(&record.command) {
             report.n_identical += 1;
         } else {
@@ -209,17 +235,15 @@ impl Life {
             return Some(format!("decisions {} to {}", self.pilot.cycle(), record.cycle));
         }
         let Source { epoch_ns, sequence } = record.odometry;
-        let first = (sequence + 1).checked_sub(record.n_odometry);
+        let first = sequence.checked_add(1).and_then(|next| next.checked_sub(record.n_odometry));
         let Some(first) = first.filter(|&first| first > 0 || record.n_odometry == 0) else {
             return Some(format!("odometry of before {sequence}, of another life of its publisher"));
         };
-        for sequence in first..first + record.n_odometry {
+        for sequence in first..=sequence {
             let Some((stamp, odometry)) = records.odometry.get(&Key { epoch_ns, sequence }) else {
                 return Some(format!("odometry {sequence}"));
             };
-            if let Some(jump) = self.pilot.admit(&odometry.odometry(stamp.valid_at_ns)) {
-                self.frame.note(stamp.valid_at_ns, &jump);
-            }
+            self.pilot.admit(&odometry.odometry(stamp.valid_at_ns));
         }
         None
     }

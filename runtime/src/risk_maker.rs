@@ -1,6 +1,6 @@
 //! A surface message becomes a risk map's: the work of learning, of mapping while learning is silent, and of replay.
 
-use navigator::{Assessor, NavigatorError, StuckPose};
+use navigator::{Assessor, Jump, NavigatorError, StuckPose};
 use terrain::{Cell, CellRegion, GridMap, SurfaceCell};
 use traversability::RiskMapView;
 
@@ -16,7 +16,7 @@ pub struct RiskMaker {
     mirror: Option<GridMap<SurfaceCell>>,
     surface: Source,
     odometry_at_ns: u64,
-    shift: (u64, [f64; 3]),
+    shift: (u64, Jump),
     stuck: Source,
     goal_m: Option<[f64; 2]>,
 }
@@ -31,7 +31,7 @@ impl RiskMaker {
             mirror: None,
             surface: Source::default(),
             odometry_at_ns: 0,
-            shift: (0, [0.0; 3]),
+            shift: (0, Jump::NONE),
             stuck: Source::default(),
             goal_m: None,
         }
@@ -83,7 +83,7 @@ impl RiskMaker {
         self.assessor.update([x_m, y_m], &next, &changed)?;
         self.mirror = Some(next);
         self.surface = header.stamp.source();
-        self.odometry_at_ns = header.odometry_at_ns;
+        self.odometry_at_ns = header.frame_at_ns;
         Ok(Ok(()))
     }
 
@@ -128,12 +128,12 @@ impl RiskMaker {
 
     /// Stuck poses move along with what was mapped. A mapping that began anew has forgotten both.
     fn follow_shift(&mut self, header: &SurfaceHeader) {
-        let (epoch_ns, last_m) = self.shift;
-        let now_m = header.shift_m;
-        if epoch_ns == header.stamp.epoch_ns {
-            self.assessor.shift_stuck([now_m[0] - last_m[0], now_m[1] - last_m[1]]);
+        let (epoch_ns, last) = self.shift;
+        let now = header.shift();
+        if epoch_ns == header.stamp.epoch_ns && now != last {
+            self.assessor.follow_jump(&last.inverse().then(&now));
         }
-        self.shift = (header.stamp.epoch_ns, now_m);
+        self.shift = (header.stamp.epoch_ns, now);
     }
 }
 

@@ -53,25 +53,26 @@ impl Role {
 #[derive(Clone, Copy, Debug)]
 pub struct Health {
     /// Ages of its inputs [s]; negative = none.
-    pub age_s: [f64; 3],
+    pub age_s: [f64; 4],
     /// Deadlines missed so far.
     pub n_missed: u64,
-    /// Messages lost and refused so far.
-    pub messages: [u64; 2],
+    /// Messages lost and refused so far, and looks that the transport broke off.
+    pub messages: [u64; 3],
     /// Figure of its own.
     pub figure: f64,
 }
 
 impl Default for Health {
     fn default() -> Self {
-        Self { age_s: [-1.0; 3], n_missed: 0, messages: [0; 2], figure: 0.0 }
+        Self { age_s: [-1.0; 4], n_missed: 0, messages: [0; 3], figure: 0.0 }
     }
 }
 
 impl Health {
     /// With what became of the messages of one more channel.
     pub fn with(mut self, counts: &Counts) -> Self {
-        self.messages = [self.messages[0] + counts.lost, self.messages[1] + counts.n_refused()];
+        let [lost, refused, failed] = self.messages;
+        self.messages = [lost + counts.lost, refused + counts.n_refused(), failed + counts.failed];
         self
     }
 }
@@ -106,7 +107,7 @@ impl Meter {
         self.lateness_s.sort_by(f64::total_cmp);
         let median_s = self.lateness_s.get(self.lateness_s.len() / 2).copied().unwrap_or_default();
         let largest_s = self.lateness_s.last().copied().unwrap_or_default();
-        let Health { age_s, n_missed, messages: [n_lost, n_refused], figure } = health();
+        let Health { age_s, n_missed, messages: [n_lost, n_refused, n_failed], figure } = health();
         let record = StatusRecord {
             role: self.role as u64 + 1,
             process: u64::from(std::process::id()),
@@ -116,6 +117,7 @@ impl Meter {
             n_missed,
             n_lost,
             n_refused,
+            n_failed,
             figure,
         };
         self.lateness_s.clear();

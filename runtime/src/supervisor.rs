@@ -290,7 +290,7 @@ impl std::fmt::Display for StatusLine {
             Role::Plant => &["command"],
             Role::Mapping => &["odometry", "scan"],
             Role::Learning => &["surface"],
-            Role::Control => &["odometry", "learned map", "physics map"],
+            Role::Control => &["odometry", "learned map", "physics map", "mission"],
             Role::Recorder => &[],
         };
         write!(formatter, "{:9}", self.role.name())?;
@@ -307,8 +307,8 @@ impl std::fmt::Display for StatusLine {
         }
         write!(
             formatter,
-            "  missed {}  lost {}  refused {}  restarts {}",
-            status.n_missed, status.n_lost, status.n_refused, self.n_restarts
+            "  missed {}  lost {}  refused {}  failed {}  restarts {}",
+            status.n_missed, status.n_lost, status.n_refused, status.n_failed, self.n_restarts
         )?;
         match self.role {
             Role::Control => write!(formatter, "  futures {:.0}", status.figure),

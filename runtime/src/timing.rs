@@ -1,8 +1,11 @@
 //! How control kept its times: what its decisions say of themselves, as percentiles.
 
+use std::collections::BTreeMap;
+
+use bicycle::{Decision, HoldReason, StopReason};
 use serde::Serialize;
 
-use crate::message::{CommandRecord, DecisionRecord, Stamp};
+use crate::message::{DecisionRecord, Stamp};
 
 /// How a time was distributed [ms].
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -44,6 +47,10 @@ pub struct ControlTiming {
     pub n_decisions: u64,
     /// Of these, to drive.
     pub n_drive: u64,
+    /// Of these, to stand still for now, by reason.
+    pub holds: BTreeMap<HoldReason, u64>,
+    /// Of these, to stop, by reason.
+    pub stops: BTreeMap<StopReason, u64>,
     /// Time between two deadlines [ms].
     pub period_ms: f64,
     /// Deadlines that passed without a decision.
@@ -68,6 +75,12 @@ impl std::fmt::Display for ControlTiming {
         if let Some([least, most]) = self.n_rollouts {
             write!(formatter, ", {least} to {most} futures")?;
         }
+        for (reason, n) in &self.holds {
+            write!(formatter, ", {n} to hold ({reason:?})")?;
+        }
+        for (reason, n) in &self.stops {
+            write!(formatter, ", {n} to stop ({reason:?})")?;
+        }
         write!(formatter, "\n{:26} {:>8} {:>8} {:>8} {:>8}", "", "p50", "p99", "p99.9", "max")?;
         let rows = [
             ("jitter of the period [ms]", self.jitter),
@@ -89,6 +102,8 @@ pub struct Timing {
     last: Option<(Stamp, DecisionRecord)>,
     n_decisions: u64,
     n_drive: u64,
+    holds: BTreeMap<HoldReason, u64>,
+    stops: BTreeMap<StopReason, u64>,
     n_rollouts: Option<[u64; 2]>,
     /// Between the deadlines of decisions that follow one another [ms].
     apart_ms: Vec<f32>,
@@ -104,19 +119,25 @@ impl Timing {
         self.n_decisions += 1;
         self.lateness_ms.push(milliseconds(decision.lateness_ns));
         self.decision_ms.push(milliseconds(decision.duration_ns));
-        if decision.scan_at_ns > 0 {
-            self.map_age_ms.push(milliseconds(decision.decided_at_ns.saturating_sub(decision.scan_at_ns)));
+        let scan_at_ns = decision.command.scan_at_ns;
+        if scan_at_ns > 0 {
+            self.map_age_ms.push(milliseconds(decision.decided_at_ns.saturating_sub(scan_at_ns)));
         }
-        if matches!(CommandRecord::decision(&decision.command), Some(bicycle::Decision::Drive(_))) {
-            let n = decision.n_rollouts;
-            self.n_drive += 1;
-            self.n_rollouts =
-                Some(self.n_rollouts.map_or([n, n], |[least, most]| [least.min(n), most.max(n)]));
+        match decision.command.decision() {
+            Some(Decision::Drive(_)) => {
+                let n = decision.n_rollouts;
+                self.n_drive += 1;
+                self.n_rollouts =
+                    Some(self.n_rollouts.map_or([n, n], |[least, most]| [least.min(n), most.max(n)]));
+            }
+            Some(Decision::Hold(reason)) => *self.holds.entry(reason).or_default() += 1,
+            Some(Decision::Stop(reason)) => *self.stops.entry(reason).or_default() += 1,
+            None => {}
         }
         let before = self.last.replace((*stamp, *decision));
         // Over a restart, or a decision that was lost, nothing is known.
         let follows = |(of, before): &(Stamp, DecisionRecord)| {
-            of.epoch_ns == stamp.epoch_ns && before.cycle + 1 == decision.cycle
+            of.epoch_ns == stamp.epoch_ns && before.cycle.checked_add(1) == Some(decision.cycle)
         };
         if let Some((_, before)) = before.filter(follows) {
             self.pair(&before, decision);
@@ -133,8 +154,10 @@ impl Timing {
         Some(ControlTiming {
             n_decisions: self.n_decisions,
             n_drive: self.n_drive,
+            holds: self.holds.clone(),
+            stops: self.stops.clone(),
             period_ms,
-            n_missed: self.apart_ms.iter().map(missed).sum(),
+            n_missed: self.apart_ms.iter().map(missed).fold(0, u64::saturating_add),
             jitter: Percentiles::of(&self.jitter_ms),
             lateness: Percentiles::of(&self.lateness_ms),
             decision: Percentiles::of(&self.decision_ms),
@@ -159,6 +182,7 @@ fn milliseconds(duration_ns: u64) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::message::CommandRecord;
 
     #[test]
     fn percentiles_are_samples_by_their_rank() {
@@ -179,9 +203,12 @@ mod tests {
             decided_at_ns,
             lateness_ns,
             duration_ns: 2_000_000,
-            scan_at_ns: decided_at_ns - 300_000_000,
             n_rollouts: 64 * (1 + cycle),
-            command: CommandRecord { decision: 1, ..CommandRecord::default() },
+            command: CommandRecord {
+                decision: 1,
+                scan_at_ns: decided_at_ns - 300_000_000,
+                ..CommandRecord::default()
+            },
             ..DecisionRecord::default()
         }
     }
@@ -205,5 +232,22 @@ mod tests {
         assert_eq!(report.lateness.unwrap().max_ms, 4.0);
         assert_eq!(report.decision.unwrap().p50_ms, 2.0);
         assert_eq!(report.map_age.unwrap().p50_ms, 300.0);
+    }
+
+    #[test]
+    fn decisions_to_stand_are_counted_by_their_reason() {
+        let mut timing = Timing::default();
+        let lost = Decision::Stop(StopReason::StaleMission);
+        let over = Decision::Hold(HoldReason::NoMission);
+        for (cycle, standing) in [lost, over, lost].iter().enumerate() {
+            let cycle = cycle as u64;
+            let command = CommandRecord::from(standing);
+            timing.take(&Stamp::default(), &DecisionRecord { command, ..decision(cycle, cycle, 0) });
+        }
+        let report = timing.report().unwrap();
+        assert_eq!(report.stops, BTreeMap::from([(StopReason::StaleMission, 2)]));
+        assert_eq!(report.holds, BTreeMap::from([(HoldReason::NoMission, 1)]));
+        let told = report.to_string();
+        assert!(told.contains("1 to hold (NoMission), 2 to stop (StaleMission)"), "{told}");
     }
 }

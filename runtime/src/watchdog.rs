@@ -1,45 +1,69 @@
-//! The last word before the actuators: a command counts for so long, and then the vehicle stops.
+//! The last word before the actuators: a command counts for as long as what it was decided on, and then the vehicle
+//! stops.
 
 use bicycle::{Decision, HoldReason, Limits, StopReason};
+
+use crate::ages::AgeLimits;
+use crate::message::CommandRecord;
 
 /// Keeps the last command and knows when it is too old.
 #[derive(Clone, Debug)]
 pub struct Watchdog {
     limits: Limits,
-    age_max_ns: u64,
-    last: Option<(Decision, u64)>,
+    ages: AgeLimits,
+    last: Option<Held>,
     n_refused: u64,
 }
 
+/// A command that is followed for now.
+#[derive(Clone, Copy, Debug)]
+struct Held {
+    decision: Decision,
+    /// When what it says was true [ns].
+    of_ns: u64,
+    /// Last moment at which it counts [ns].
+    until_ns: u64,
+}
+
 impl Watchdog {
-    /// A watchdog of a vehicle, for commands of up to that age.
-    pub fn new(limits: Limits, age_max_ns: u64) -> Self {
-        Self { limits, age_max_ns, last: None, n_refused: 0 }
+    /// A watchdog of a vehicle, for commands that were decided on nothing older.
+    pub fn new(limits: Limits, ages: AgeLimits) -> Self {
+        Self { limits, ages, last: None, n_refused: 0 }
     }
 
-    /// Takes over a decision that was sent at this time; one that the vehicle cannot carry out counts as none.
-    pub fn admit(&mut self, decision: Decision, sent_at_ns: u64) {
-        if self.is_possible(&decision) {
-            self.last = Some((decision, sent_at_ns));
-        } else {
+    /// Takes over a command that was sent at this time; one that the vehicle cannot carry out counts as none.
+    ///
+    /// A command to drive is as old as the odometry and the scan that it was decided on, however late it comes: whoever
+    /// paused between deciding and sending revives nothing. To stand is never wrong, and is as old as its message.
+    pub fn admit(&mut self, command: &CommandRecord, sent_at_ns: u64) {
+        let Some(decision) = command.decision().filter(|decision| self.is_possible(decision)) else {
             self.n_refused += 1;
-        }
+            return;
+        };
+        let AgeLimits { command_ns, scan_ns, .. } = self.ages;
+        let CommandRecord { odometry_at_ns, scan_at_ns, .. } = *command;
+        let held = |of_ns: u64, until_ns: u64| Held { decision, of_ns, until_ns };
+        self.last = Some(match decision {
+            Decision::Drive(_) => held(
+                odometry_at_ns,
+                odometry_at_ns.saturating_add(command_ns).min(scan_at_ns.saturating_add(scan_ns)),
+            ),
+            Decision::Hold(_) | Decision::Stop(_) => held(sent_at_ns, sent_at_ns.saturating_add(command_ns)),
+        });
     }
 
     /// What the vehicle is to do now.
     pub fn decision(&self, now_ns: u64) -> Decision {
         match self.last {
             None => Decision::Hold(HoldReason::NoMap),
-            Some((_, at_ns)) if now_ns.saturating_sub(at_ns) > self.age_max_ns => {
-                Decision::Stop(StopReason::StaleCommand)
-            }
-            Some((decision, _)) => decision,
+            Some(held) if now_ns > held.until_ns => Decision::Stop(StopReason::StaleCommand),
+            Some(held) => held.decision,
         }
     }
 
-    /// Age of the last command [ns]; `None` before the first.
+    /// Age of what the last command was decided on [ns]; `None` before the first.
     pub fn age_ns(&self, now_ns: u64) -> Option<u64> {
-        self.last.map(|(_, at_ns)| now_ns.saturating_sub(at_ns))
+        self.last.map(|held| now_ns.saturating_sub(held.of_ns))
     }
 
     /// Commands that the vehicle could not have carried out.
@@ -63,7 +87,8 @@ mod tests {
     use super::*;
     use bicycle::Command;
 
-    const AGE_MAX_NS: u64 = 300;
+    const COMMAND_NS: u64 = 300;
+    const SCAN_NS: u64 = 1000;
 
     fn watchdog() -> Watchdog {
         let limits = Limits {
@@ -76,32 +101,76 @@ mod tests {
             roll_max_rad: 0.5,
             pitch_max_rad: 0.5,
         };
-        Watchdog::new(limits, AGE_MAX_NS)
+        let ages = AgeLimits {
+            command_ns: COMMAND_NS,
+            scan_ns: SCAN_NS,
+            learned_ns: 0,
+            learning_silence_ns: 0,
+            mission_ns: 0,
+        };
+        Watchdog::new(limits, ages)
     }
 
     fn drive(speed_mps: f32, steering_rad: f32) -> Decision {
         Decision::Drive(Command { speed_mps, steering_rad })
     }
 
+    fn command(decision: Decision, [odometry_at_ns, scan_at_ns]: [u64; 2]) -> CommandRecord {
+        CommandRecord::from(&decision).decided_on(odometry_at_ns, scan_at_ns)
+    }
+
+    const STALE: Decision = Decision::Stop(StopReason::StaleCommand);
+
     #[test]
-    fn a_command_counts_for_its_time_and_then_the_vehicle_stops() {
+    fn a_command_is_as_old_as_the_odometry_that_it_was_decided_on() {
         let mut watchdog = watchdog();
         assert_eq!(watchdog.decision(9), Decision::Hold(HoldReason::NoMap));
-        watchdog.admit(drive(1.0, 0.1), 1000);
-        assert_eq!(watchdog.decision(1000 + AGE_MAX_NS), drive(1.0, 0.1));
-        assert_eq!(watchdog.decision(1001 + AGE_MAX_NS), Decision::Stop(StopReason::StaleCommand));
-        watchdog.admit(drive(0.5, 0.0), 2000);
-        assert_eq!(watchdog.decision(2001), drive(0.5, 0.0), "a new command drives on");
+        watchdog.admit(&command(drive(1.0, 0.1), [1000, 1000]), 1010);
+        assert_eq!(watchdog.decision(1000 + COMMAND_NS), drive(1.0, 0.1));
+        assert_eq!(watchdog.decision(1001 + COMMAND_NS), STALE);
+        watchdog.admit(&command(drive(0.5, 0.0), [2000, 1900]), 2010);
+        assert_eq!(watchdog.decision(2011), drive(0.5, 0.0), "a new command drives on");
+    }
+
+    #[test]
+    fn whoever_pauses_between_deciding_and_sending_revives_nothing() {
+        let mut watchdog = watchdog();
+        watchdog.admit(&command(drive(1.0, 0.0), [1000, 900]), 5000);
+        assert_eq!((watchdog.decision(5000), watchdog.age_ns(5000)), (STALE, Some(4000)));
+        // Half of its time has passed before it was sent: the other half is left.
+        watchdog.admit(&command(drive(1.0, 0.0), [6000, 5900]), 6150);
+        assert_eq!(watchdog.decision(6300), drive(1.0, 0.0));
+        assert_eq!(watchdog.decision(6301), STALE);
+    }
+
+    #[test]
+    fn a_command_is_no_younger_than_its_scan() {
+        let mut watchdog = watchdog();
+        watchdog.admit(&command(drive(1.0, 0.0), [2000, 1100]), 2010);
+        assert_eq!(watchdog.decision(1100 + SCAN_NS), drive(1.0, 0.0));
+        assert_eq!(watchdog.decision(1101 + SCAN_NS), STALE);
+        // Decided on nothing at all.
+        watchdog.admit(&command(drive(1.0, 0.0), [0, 0]), 3000);
+        assert_eq!(watchdog.decision(3000), STALE);
+    }
+
+    #[test]
+    fn to_stand_needs_nothing_to_be_decided_on() {
+        let mut watchdog = watchdog();
+        let hold = Decision::Hold(HoldReason::NoMap);
+        watchdog.admit(&command(hold, [0, 0]), 1000);
+        assert_eq!(watchdog.decision(1000 + COMMAND_NS), hold);
+        assert_eq!(watchdog.decision(1001 + COMMAND_NS), STALE, "nobody is in control any more");
     }
 
     #[test]
     fn what_the_vehicle_cannot_do_keeps_nothing_alive() {
         let mut watchdog = watchdog();
-        watchdog.admit(drive(2.0, -0.4), 1000);
+        watchdog.admit(&command(drive(2.0, -0.4), [1000, 1000]), 1000);
         for wild in [drive(2.1, 0.0), drive(-0.6, 0.0), drive(1.0, 0.5), drive(f32::NAN, 0.0)] {
-            watchdog.admit(wild, 1200);
+            watchdog.admit(&command(wild, [1200, 1200]), 1200);
         }
         assert_eq!((watchdog.n_refused(), watchdog.decision(1200)), (4, drive(2.0, -0.4)));
-        assert_eq!(watchdog.decision(1301), Decision::Stop(StopReason::StaleCommand));
+        assert_eq!(watchdog.decision(1301), STALE);
     }
 }

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use bicycle::Vehicle;
 use nalgebra::{Isometry3, Point3, Vector3};
 use rayon::prelude::*;
-use terrain::{Pose, RangePoint, Scan, TerrainClass};
+use terrain::{BodyBox, Pose, RangePoint, Scan, TerrainClass};
 
 use crate::World;
 use crate::random::RayNoise;
@@ -41,6 +41,9 @@ pub struct RangeSensorConfig {
     pub class_confusion: f64,
     /// Plants stop a ray with this rate along its way through them [1/m].
     pub plant_extinction_per_m: f64,
+    /// What of the vehicle itself stands in the rays' way, in the body frame; empty = the rays pass through it.
+    #[serde(default)]
+    pub own_body: BodyBox,
 }
 
 /// A sensor that cannot be.
@@ -75,6 +78,7 @@ impl RangeSensorConfig {
             dropout: 0.02,
             class_confusion: 0.01,
             plant_extinction_per_m: 8.0 / length_m,
+            own_body: BodyBox::EMPTY,
         }
     }
 
@@ -169,9 +173,23 @@ impl RangeSensor {
             let mut noise = RayNoise::new(self.seed, number, ray_number);
             let depth = -noise.uniform().ln();
             let hit = self.cast(&origin, &(motion.rotation * ahead), depth);
+            let hit = self.nearer(hit, &ahead);
             points.extend(hit.and_then(|hit| self.measured(&hit, &ahead, &mut noise)));
         }
         points
+    }
+
+    /// The vehicle itself where it stands before what a ray would hit. It is as hard as rigid ground, and a camera names
+    /// it so.
+    fn nearer(&self, hit: Option<Hit>, ahead: &Vector3<f64>) -> Option<Hit> {
+        let RangeSensorConfig { own_body, origin_m, .. } = self.config;
+        let body = own_body
+            .distance_along(origin_m, [ahead.x, ahead.y, ahead.z])
+            .map(|range_m| Hit { range_m, class: TerrainClass::Open });
+        match (hit, body) {
+            (Some(hit), Some(body)) => Some(if body.range_m < hit.range_m { body } else { hit }),
+            (hit, body) => hit.or(body),
+        }
     }
 
     /// What the sensor makes of a hit: noise, losses and confusions.

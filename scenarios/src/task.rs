@@ -16,8 +16,12 @@ use crate::{
 /// Between start and goal of the rock field's drive [m] (PIETRA, section V-D).
 pub const ROCK_FIELD_DISTANCE_M: f64 = 40.0;
 
-/// Parts of a map in which a pair is looked for.
-const PARTS: usize = 12;
+/// Maps up to so many cells a side are built whole.
+const WHOLE_MAP_CELLS: f64 = 3500.0;
+/// What of a larger map is built around its start and goal, beyond the distance between them [m].
+const WINDOW_MARGIN_M: f64 = 30.0;
+/// Places of a large map that are searched for a start and a goal.
+const WINDOWS_TRIED: u64 = 8;
 
 /// Why there is no drive on measured ground.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -71,8 +75,11 @@ impl Task {
         Self { bounds: world.bounds(), world, start, goal_m, goal_tolerance_m }
     }
 
-    /// A drive on measured ground, of which the part around start and goal is built. What `wish` leaves open is picked
-    /// by the seed, from several parts of the map if need be.
+    /// A drive on measured ground: all of a small map, of a large one the part around start and goal. What `wish`
+    /// leaves open is picked by the seed, from several parts of a large map if need be.
+    ///
+    /// # Errors
+    /// Layers that make no world; an end off the map, or on which the vehicle cannot stand; ends with no way between.
     pub fn in_layers(
         name: &str,
         layers: &WorldLayers,
@@ -80,29 +87,20 @@ impl Task {
         wish: &PairWish,
         seed: u64,
     ) -> Result<Self, LayersTaskError> {
-        let given_m = wish.start.map(|[x_m, y_m, _]| (End::Start, [x_m, y_m]));
-        let given_m: Vec<_> =
-            given_m.into_iter().chain(wish.goal_m.map(|goal_m| (End::Goal, goal_m))).collect();
         let map = layers.bounds();
-        if let Some(&(end, at_m)) = given_m.iter().find(|(_, at_m)| !map.contains(at_m[0], at_m[1])) {
+        if let Some((end, at_m)) = given(wish).find(|(_, at_m)| !map.contains(at_m[0], at_m[1])) {
             return Err(PairError::OutOfMap { end, at_m, map }.into());
         }
-        let mut rng = stream(seed, &[0x1A7E]);
+        let whole_m = WHOLE_MAP_CELLS * LayerConfig::for_vehicle(vehicle).resolution_m;
         let mut last = PairError::NoPair { distance_m: wish.distance_m };
-        for _ in 0..PARTS {
-            let anywhere_m = [0, 1].map(|k| rng.random_range(map.south_west_m[k]..map.north_east_m[k]));
-            let window = part(&given_m, anywhere_m, wish.distance_m, vehicle);
-            let config = LayerConfig { window: Some(window), ..LayerConfig::for_vehicle(vehicle) };
+        for window in windows(&map, wish, seed, whole_m) {
+            let config = LayerConfig { window, ..LayerConfig::for_vehicle(vehicle) };
             let world = Arc::new(world_from_layers(name, layers, &config, seed)?);
             match feasible_pair(&world, vehicle, wish, seed) {
                 Ok(Pair { start, goal_m }) => {
                     return Ok(Self::in_world(world, start, goal_m, Self::tolerance_m(vehicle)));
                 }
                 Err(error) => last = error,
-            }
-            // Another part can help only where the part is not given.
-            if !given_m.is_empty() {
-                break;
             }
         }
         Err(last.into())
@@ -119,15 +117,40 @@ impl Task {
     }
 }
 
-/// The part of a map that a drive needs: what is given, or the distance around a point, with room for detours.
-fn part(given_m: &[(End, [f64; 2])], anywhere_m: [f64; 2], distance_m: f64, vehicle: &Vehicle) -> Bounds {
-    let centre_m = given_m.first().map_or(anywhere_m, |(_, at_m)| *at_m);
-    let far_m = given_m.last().map_or(anywhere_m, |(_, at_m)| *at_m);
-    let away_m = (far_m[0] - centre_m[0]).hypot(far_m[1] - centre_m[1]);
-    let free_m = if given_m.len() < 2 { distance_m } else { 0.0 };
-    let margin_m = free_m + (0.75 * distance_m.max(away_m)).max(9.0 * vehicle.geometry.length_m);
+/// The ends that are given, with their places [m].
+fn given(wish: &PairWish) -> impl Iterator<Item = (End, [f64; 2])> {
+    let start = wish.start.map(|[x_m, y_m, _]| (End::Start, [x_m, y_m]));
+    start.into_iter().chain(wish.goal_m.map(|goal_m| (End::Goal, goal_m)))
+}
+
+/// The parts of a map to build and look for a pair in, one after the other: all of a map of up to `whole_m` a side; of
+/// a larger one what lies around the ends that are given, or places by the seed.
+fn windows(map: &Bounds, wish: &PairWish, seed: u64, whole_m: f64) -> Vec<Option<Bounds>> {
+    let side_m = [0, 1].map(|k| map.north_east_m[k] - map.south_west_m[k]);
+    if side_m[0].max(side_m[1]) <= whole_m {
+        return vec![None];
+    }
+    let given_m: Vec<[f64; 2]> = given(wish).map(|(_, at_m)| at_m).collect();
+    if !given_m.is_empty() {
+        let free_m = if given_m.len() == 2 { 0.0 } else { wish.distance_m };
+        return vec![Some(around(&given_m, WINDOW_MARGIN_M + free_m))];
+    }
+    // The fractional parts of multiples of the plastic number's powers spread evenly over a square.
+    let place = |try_: u64| {
+        let turn = (seed.wrapping_mul(WINDOWS_TRIED).wrapping_add(try_) % (1 << 32)) as f64;
+        [(0, 0.754_877_666_246_693), (1, 0.569_840_290_998_053)]
+            .map(|(k, step)| map.south_west_m[k] + side_m[k] * (turn * step).fract())
+    };
+    (0..WINDOWS_TRIED).map(|try_| Some(around(&[place(try_)], WINDOW_MARGIN_M + wish.distance_m))).collect()
+}
+
+/// What lies within a distance of places, and between them.
+fn around(places_m: &[[f64; 2]], within_m: f64) -> Bounds {
+    let bound = |k: usize, pick: fn(f64, f64) -> f64| {
+        places_m.iter().map(|place_m| place_m[k]).fold(places_m[0][k], pick)
+    };
     Bounds {
-        south_west_m: [0, 1].map(|k| centre_m[k].min(far_m[k]) - margin_m),
-        north_east_m: [0, 1].map(|k| centre_m[k].max(far_m[k]) + margin_m),
+        south_west_m: [0, 1].map(|k| bound(k, f64::min) - within_m),
+        north_east_m: [0, 1].map(|k| bound(k, f64::max) + within_m),
     }
 }

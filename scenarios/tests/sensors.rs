@@ -8,7 +8,7 @@ use scenarios::{
     IMU_PERIOD_NS, Imu, ImuConfig, Motion, OdometryConfig, OdometrySensor, Patch, RangeSensor,
     RangeSensorConfig, RockFieldConfig, RockMap, Split, Stribeck, World, rock_field,
 };
-use terrain::{GridGeometry, Pose, Scan, TerrainClass};
+use terrain::{BodyBox, GridGeometry, Pose, Scan, TerrainClass};
 
 const EXACT: RangeSensorConfig = RangeSensorConfig {
     n_azimuths: 180,
@@ -21,6 +21,7 @@ const EXACT: RangeSensorConfig = RangeSensorConfig {
     dropout: 0.0,
     class_confusion: 0.0,
     plant_extinction_per_m: 2.0,
+    own_body: BodyBox::EMPTY,
 };
 
 const GROUND: Patch = Patch::open(Stribeck::DIRT);
@@ -269,4 +270,24 @@ fn vibration_grows_with_speed_and_with_the_roughness_of_the_ground() {
     assert!(slow > 0.0 && (fast / slow - 2.0).abs() < 1e-3, "{slow} {fast}");
     assert!(vibration_mps2(&overgrown, 1.0) > 2.0 * fast);
     assert!(vibration_mps2(&bumpy, 1.0) > 4.0 * fast);
+}
+
+#[test]
+fn the_vehicles_own_body_stands_before_what_lies_behind_it() {
+    let own_body = BodyBox { min_m: [0.4, -0.6, 0.2], max_m: [1.5, 0.6, 1.1] };
+    let flat = world(|_, _| 0.0, |_, _| GROUND);
+    let pose = Pose { x_m: 3.0, yaw_rad: 0.7, ..Pose::default() };
+    let bare = scan(EXACT, &flat, &pose);
+    let covered = scan(RangeSensorConfig { own_body, ..EXACT }, &flat, &pose);
+    let place = |point: &terrain::RangePoint| point.position_m.map(f64::from);
+    let on_body = covered.points.iter().filter(|point| own_body.grown(1e-5).contains(place(point))).count();
+    assert!(on_body > 100, "{on_body} of {}", covered.points.len());
+    assert!(!bare.points.iter().any(|point| own_body.contains(place(point))), "rays pass through by default");
+    // No ray has come through the body.
+    let inner = own_body.grown(-1e-3);
+    for point in &covered.points {
+        let at =
+            |share: f64| [0, 1, 2].map(|i| EXACT.origin_m[i] + share * (place(point)[i] - EXACT.origin_m[i]));
+        assert!((0..500).all(|k| !inner.contains(at(f64::from(k) / 500.0))), "{point:?}");
+    }
 }

@@ -3,7 +3,7 @@
 use crate::drive::{Drive, HORIZONS, N_STEPS, STEP_S, VX, YAW};
 use crate::evidence::{Evidence, SpeedInput, SpeedSource};
 use bicycle::effect::Effect;
-use bicycle::lanes::{Lanes, Portable, Real, Scalar};
+use bicycle::lanes::{Instructions, Lanes, Portable, Real, Scalar};
 use bicycle::{Asked, GroundSample, LaneState, Limits, Model, Rates, SensorModel, Stepper};
 use pulp::{NullaryFnOnce, f32x8, f32x16};
 use std::f64::consts::TAU;
@@ -34,16 +34,13 @@ impl Simulator {
     pub(crate) fn predict(&self, drive: &Drive) -> Vec<f32> {
         let rows = self.rows(drive);
         let roll_out = RollOut { simulator: self, drive, given: &rows };
-        #[cfg(target_arch = "x86_64")]
-        {
-            if let Some(lanes) = pulp::x86::V4::try_new() {
-                return lanes.vectorize(On(lanes, roll_out));
-            }
-            if let Some(lanes) = pulp::x86::V3::try_new() {
-                return lanes.vectorize(On(lanes, roll_out));
-            }
+        match Instructions::widest() {
+            #[cfg(target_arch = "x86_64")]
+            Instructions::Avx512(lanes) => lanes.vectorize(On(lanes, roll_out)),
+            #[cfg(target_arch = "x86_64")]
+            Instructions::Avx2(lanes) => lanes.vectorize(On(lanes, roll_out)),
+            Instructions::Portable => On(Portable, roll_out).call(),
         }
-        On(Portable, roll_out).call()
     }
 
     /// What every row of a drive gives to a rollout that starts there.

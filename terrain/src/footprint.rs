@@ -78,7 +78,8 @@ impl YawFootprint {
         let wheel_offsets =
             layout.contact_points_m(0.0, 0.0, yaw_rad).map(|wheel| wheel.map(|v| (v / resolution_m) as f32));
         let corners = footprint.corners_m(0.0, 0.0, yaw_rad);
-        let reach_m = corners.iter().fold(0.0_f64, |reach_m, [x_m, y_m]| reach_m.max(x_m.hypot(*y_m)));
+        let reach_m =
+            corners.iter().fold(0.0_f64, |reach_m, [x_m, y_m]| reach_m.max(libm::hypot(*x_m, *y_m)));
         let reach = (reach_m / resolution_m).ceil() as i32;
         let mut cells = Vec::new();
         for row in -reach..=reach {
@@ -142,7 +143,7 @@ fn extent(cells: &[[i32; 2]], wheel_offsets: &[[f32; 2]; 4]) -> [[i32; 2]; 2] {
 
 /// Turns a vector counter-clockwise.
 pub(crate) fn rotated([x, y]: [f64; 2], angle_rad: f64) -> [f64; 2] {
-    let (sin, cos) = angle_rad.sin_cos();
+    let (sin, cos) = libm::sincos(angle_rad);
     [cos * x - sin * y, sin * x + cos * y]
 }
 

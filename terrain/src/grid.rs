@@ -25,8 +25,32 @@ pub struct GridGeometry {
     pub n_cols: usize,
 }
 
+/// Farthest lattice index from the map's origin that windows are placed at: sums and differences of such indices
+/// and their centres in metres are exact.
+pub const LATTICE_MAX: i64 = 1 << 40;
+
+/// A position farther away than cells can be counted, or none.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[error("expected a position within {limit_m:e} m of the map's origin, found {position_m:?}")]
+pub struct DistantPosition {
+    /// East, north [m].
+    pub position_m: [f64; 2],
+    /// Farthest that would do, along each axis [m].
+    pub limit_m: f64,
+}
+
+impl DistantPosition {
+    /// Refuses a position that no window of such cells can be centred at.
+    pub fn check(position_m: [f64; 2], resolution_m: f64) -> Result<(), Self> {
+        let limit_m = LATTICE_MAX as f64 * resolution_m;
+        let is_near = position_m.iter().all(|value| value.abs() <= limit_m);
+        if is_near { Ok(()) } else { Err(Self { position_m, limit_m }) }
+    }
+}
+
 impl GridGeometry {
-    /// The window of `n_rows` x `n_cols` cells whose centre lies nearest to (`x_m`, `y_m`).
+    /// The window of `n_rows` x `n_cols` cells whose centre lies nearest to (`x_m`, `y_m`), which
+    /// [`DistantPosition::check`] must allow: whoever takes in a position refuses others.
     pub fn centred(resolution_m: f64, n_rows: usize, n_cols: usize, x_m: f64, y_m: f64) -> Self {
         let start = |centre_m: f64, n: usize| (centre_m / resolution_m - n as f64 / 2.0).round() as i64;
         Self { resolution_m, origin: [start(x_m, n_cols), start(y_m, n_rows)], n_rows, n_cols }

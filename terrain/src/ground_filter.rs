@@ -81,7 +81,7 @@ impl GroundFilter {
     /// How much an opening may lower the ground, given by how much the radius has grown: at the edge of what is
     /// known, a slope along the window's diagonal loses its rise over half of that diagonal.
     fn threshold_m(&self, growth_cells: usize, cell_m: f64) -> f64 {
-        let rise_m = self.slope_max_rad.tan() * std::f64::consts::SQRT_2 * growth_cells as f64 * cell_m;
+        let rise_m = libm::tan(self.slope_max_rad) * std::f64::consts::SQRT_2 * growth_cells as f64 * cell_m;
         (rise_m + self.height_tolerance_m).min(self.step_max_m)
     }
 }
@@ -97,6 +97,7 @@ pub fn filter_ground(
 ) -> Result<FilteredGround, GroundFilterError> {
     filter.validate()?;
     let geometry = *surface_m.geometry();
+    let surface_m = &only_finite(surface_m);
     let known: Vec<bool> = surface_m.values().iter().map(|height| height.is_finite()).collect();
     let (is_ground, opened) = ground_cells(surface_m, &known, filter);
     let disc = disc(filter.plane_radius_m / geometry.resolution_m);
@@ -113,6 +114,17 @@ pub fn filter_ground(
     }
     ground.is_ground.values_mut().copy_from_slice(&is_ground);
     Ok(ground)
+}
+
+/// NaN is what no minimum and no maximum takes over; an infinity would win one of them wherever the window reaches.
+fn only_finite(surface_m: &GridMap<f32>) -> GridMap<f32> {
+    let mut finite_m = surface_m.clone();
+    finite_m
+        .values_mut()
+        .iter_mut()
+        .filter(|height| height.is_infinite())
+        .for_each(|height| *height = f32::NAN);
+    finite_m
 }
 
 /// The finest step of the known heights [m], the resolution of a map that was built of voxels; `None` when all are one
@@ -166,7 +178,7 @@ fn square(values: &[f32], geometry: &GridGeometry, radius: usize, extreme: fn(f3
 fn disc(radius: f64) -> Vec<[i64; 2]> {
     let reach = radius.floor() as i64;
     let offsets = (-reach..=reach).flat_map(|row| (-reach..=reach).map(move |col| [col, row]));
-    offsets.filter(|[col, row]| (*col as f64).hypot(*row as f64) <= radius).collect()
+    offsets.filter(|[col, row]| libm::hypot(*col as f64, *row as f64) <= radius).collect()
 }
 
 /// Height and gradient of the plane through the ground around a cell.
@@ -278,6 +290,26 @@ mod tests {
             assert_eq!(height.is_nan(), hole(row, col));
             assert_eq!(ground.is_ground.values()[index], !hole(row, col));
             assert!(hole(row, col) || (height - plane(row, col)).abs() < 1e-4);
+        }
+    }
+
+    #[test]
+    fn infinities_are_unknown_and_tell_nothing() {
+        let odd = |row: usize, col: usize| match (row + 2 * col) % 11 {
+            0 => Some(f32::INFINITY),
+            5 => Some(f32::NEG_INFINITY),
+            _ => None,
+        };
+        let ground =
+            filter_ground(&grid(|row, col| odd(row, col).unwrap_or(plane(row, col))), &FILTER).unwrap();
+        let unknown =
+            filter_ground(&grid(|row, col| odd(row, col).map_or(plane(row, col), |_| f32::NAN)), &FILTER);
+        assert_eq!(ground.is_ground, unknown.unwrap().is_ground);
+        for (index, height) in ground.height_m.values().iter().enumerate() {
+            let (row, col) = (index / 40, index % 40);
+            assert_eq!(height.is_nan(), odd(row, col).is_some(), "{row} {col}");
+            assert!(height.is_nan() || (height - plane(row, col)).abs() < 1e-4, "{row} {col}: {height}");
+            assert_eq!(ground.is_ground.values()[index], odd(row, col).is_none());
         }
     }
 

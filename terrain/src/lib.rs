@@ -49,6 +49,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod body;
 mod elevation;
 mod footprint;
 mod grid;
@@ -60,11 +61,12 @@ mod sampling;
 mod slope;
 mod surface;
 
+pub use body::BodyBox;
 pub use elevation::{
     AssumedGround, ElevationConfig, ElevationConfigError, ElevationMap, FuseError, FuseReport,
 };
 pub use footprint::{Footprint, WheelLayout, YawFootprint};
-pub use grid::{Cell, GridGeometry, GridMap};
+pub use grid::{Cell, DistantPosition, GridGeometry, GridMap, LATTICE_MAX};
 pub use ground_filter::{FilteredGround, GroundFilter, GroundFilterError, filter_ground, height_step_m};
 pub use observation::{Pose, RangePoint, Scan, TerrainClass};
 pub use region::CellRegion;

@@ -1,6 +1,6 @@
 //! What a vehicle measures of the ground: poses and range scans with semantics.
 
-use nalgebra::{Isometry3, Translation3, UnitQuaternion};
+use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
 
 /// Pose of the body frame (rear axle's centre) in the map frame.
 ///
@@ -25,10 +25,15 @@ pub struct Pose {
 impl Pose {
     /// The rigid motion that takes body coordinates to map coordinates.
     pub fn isometry(&self) -> Isometry3<f64> {
-        Isometry3::from_parts(
-            Translation3::new(self.x_m, self.y_m, self.z_m),
-            UnitQuaternion::from_euler_angles(self.roll_rad, self.pitch_rad, self.yaw_rad),
-        )
+        // By axes, since nalgebra would ask the platform for sines.
+        let about = |axis: usize, angle_rad: f64| {
+            let (sine, cosine) = libm::sincos(0.5 * angle_rad);
+            let mut imaginary = Vector3::zeros();
+            imaginary[axis] = sine;
+            UnitQuaternion::new_unchecked(Quaternion::from_parts(cosine, imaginary))
+        };
+        let rotation = about(2, self.yaw_rad) * about(1, self.pitch_rad) * about(0, self.roll_rad);
+        Isometry3::from_parts(Translation3::new(self.x_m, self.y_m, self.z_m), rotation)
     }
 
     /// Whether every component is a finite number.

@@ -54,7 +54,7 @@ impl PlaneSums {
 
     /// How far the samples lie from the centre on average, as a vector's length.
     pub(crate) fn distance_of_mean(&self) -> f64 {
-        (self.x / self.n).hypot(self.y / self.n)
+        libm::hypot(self.x / self.n, self.y / self.n)
     }
 
     /// Standard deviation of the heights, with n degrees of freedom; `None` below two samples.

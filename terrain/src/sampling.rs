@@ -56,7 +56,8 @@ pub fn envelope_height<T: Height>(heights: &GridMap<T>, x_m: f64, y_m: f64, radi
     for row in rows {
         for col in centre.col.saturating_sub(reach)..(centre.col + reach + 1).min(geometry.n_cols) {
             let [cell_x_m, cell_y_m] = geometry.centre_m(Cell { row, col });
-            if (cell_x_m - x_m).hypot(cell_y_m - y_m) <= radius_m {
+            let [dx_m, dy_m] = [cell_x_m - x_m, cell_y_m - y_m];
+            if dx_m * dx_m + dy_m * dy_m <= radius_m * radius_m {
                 // `max` passes over NaN.
                 highest_m = highest_m.max(heights[Cell { row, col }].height_m());
             }

@@ -36,7 +36,7 @@ impl Slope {
 
     /// Angle between the plane and the horizontal [rad].
     pub fn angle_rad(&self) -> f32 {
-        self.gradient[0].hypot(self.gradient[1]).atan()
+        libm::atanf(libm::hypotf(self.gradient[0], self.gradient[1]))
     }
 }
 

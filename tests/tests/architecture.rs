@@ -94,14 +94,7 @@ impl Source {
 
     /// Where `needle` stands in the code as whole words.
     fn places(&self, needle: &str) -> Vec<String> {
-        let is_word = |c: char| c.is_alphanumeric() || c == '_';
-        let found = |line: &str| {
-            line.match_indices(needle).any(|(start, _)| {
-                let (before, after) = (&line[..start], &line[start + needle.len()..]);
-                !before.ends_with(is_word) && !after.starts_with(is_word)
-            })
-        };
-        let lines = self.code.lines().enumerate().filter(|(_, line)| found(line));
+        let lines = self.code.lines().enumerate().filter(|(_, line)| has_word(line, needle));
         lines.map(|(i, line)| format!("{}:{}: {}", self.path, i + 1, line.trim())).collect()
     }
 
@@ -125,6 +118,13 @@ impl Source {
 
 /// Every Rust file of every crate but this one, which has to name what it forbids.
 fn sources() -> Vec<Source> {
+    let mut sources = all_sources();
+    sources.retain(|source| source.path != "tests/tests/architecture.rs");
+    sources
+}
+
+/// Every Rust file of every crate.
+fn all_sources() -> Vec<Source> {
     let mut folders: Vec<PathBuf> = MAY_USE.iter().map(|(name, _)| root().join(name)).collect();
     let mut sources = Vec::new();
     while let Some(folder) = folders.pop() {
@@ -137,7 +137,6 @@ fn sources() -> Vec<Source> {
             }
         }
     }
-    sources.retain(|source| source.path != "tests/tests/architecture.rs");
     assert!(sources.len() > 20, "the walk found only {} files", sources.len());
     sources
 }
@@ -163,6 +162,44 @@ fn crates_use_only_what_they_may() {
             assert!(allowed, "{name} uses {used}; it may use {:?}", may_use[name]);
         }
     }
+}
+
+#[test]
+fn every_declared_dependency_is_used() {
+    let sources = all_sources();
+    let mut declared: BTreeSet<String> = BTreeSet::new();
+    let mut unused = Vec::new();
+    for package in METADATA.workspace_packages() {
+        for dependency in &package.dependencies {
+            let name = dependency.rename.as_ref().unwrap_or(&dependency.name);
+            // Where the code that it is declared for stands.
+            let places: &[&str] = match dependency.kind {
+                DependencyKind::Normal => &["src/"],
+                DependencyKind::Build => &["build.rs"],
+                _ => &[""],
+            };
+            let is_place = |path: &str| {
+                let inside = path.strip_prefix(package.name.as_str()).and_then(|path| path.strip_prefix('/'));
+                inside.is_some_and(|path| places.iter().any(|place| path.starts_with(place)))
+            };
+            let word = name.replace('-', "_");
+            let is_used = |source: &Source| is_place(&source.path) && has_word(&source.code, &word);
+            if !sources.iter().any(is_used) {
+                unused.push(format!("{}: {name} ({:?})", package.name, dependency.kind));
+            }
+            declared.insert(name.clone());
+        }
+    }
+    let manifest = read("Cargo.toml");
+    let offered = manifest.lines().skip_while(|line| *line != "[workspace.dependencies]").skip(1);
+    let offered = offered.take_while(|line| !line.starts_with('[')).filter_map(|line| line.split_once(" = "));
+    unused.extend(
+        offered
+            .map(|(name, _)| name)
+            .filter(|name| !declared.contains(*name))
+            .map(|name| format!("workspace: {name}")),
+    );
+    assert!(unused.is_empty(), "declared and not used:\n{}", unused.join("\n"));
 }
 
 #[test]
@@ -234,9 +271,105 @@ fn unsafe_code_stands_in_the_kernel_alone() {
 }
 
 #[test]
-fn no_test_is_skipped() {
-    // Put together here, so that this line is no such attribute itself.
-    assert_absent(concat!("#", "[ignore"), |_| true);
+fn tests_of_shared_data_and_no_others_are_left_to_who_has_it() {
+    let faults: Vec<String> = sources()
+        .iter()
+        .flat_map(|source| {
+            ignored_wrongly(&source.code).into_iter().map(|fault| format!("{}: {fault}", source.path))
+        })
+        .collect();
+    assert!(faults.is_empty(), "{}", faults.join("\n"));
+}
+
+/// Tests of a file that reach the shared data and are not ignored, or are ignored and do not reach it, and reasons
+/// other than the one there is.
+fn ignored_wrongly(code: &str) -> Vec<String> {
+    let (attribute, reason, place) = ("#[ignore", " = \"needs the shared data\"]", "../shared");
+    let items = items(code);
+    let mut reaching: BTreeSet<&str> = BTreeSet::new();
+    let reaches = |item: &Item, reaching: &BTreeSet<&str>| {
+        item.code.contains(place) || reaching.iter().any(|name| has_word(item.code, name))
+    };
+    loop {
+        let more = items.iter().filter(|item| !item.name.is_empty() && reaches(item, &reaching));
+        let more: BTreeSet<&str> = more.map(|item| item.name).collect();
+        if more.len() == reaching.len() {
+            break;
+        }
+        reaching = more;
+    }
+    let wrong = |item: &Item| {
+        let n_tests = item.code.matches("#[test]").count();
+        let (n_ignored, n_rightly) = (
+            item.code.matches(attribute).count(),
+            item.code.matches(&format!("{attribute}{reason}")).count(),
+        );
+        let n_expected = if reaches(item, &reaching) { n_tests } else { 0 };
+        (n_ignored != n_rightly || n_ignored != n_expected).then(|| {
+            format!("{}: {n_tests} tests, {n_expected} of shared data, {n_ignored} ignored", item.name)
+        })
+    };
+    items.iter().filter_map(wrong).collect()
+}
+
+/// Something that stands at a file's outermost level, with its attributes.
+struct Item<'a> {
+    name: &'a str,
+    code: &'a str,
+}
+
+/// The items of a file as rustfmt lays them out: each ends with a line that is not indented and closes it.
+fn items(code: &str) -> Vec<Item<'_>> {
+    let mut items = Vec::new();
+    let (mut start, mut end) = (0, 0);
+    for line in code.split_inclusive('\n') {
+        end += line.len();
+        let closes = line.starts_with('}') || line.trim_end().ends_with([';', '}']);
+        if !line.starts_with(' ') && closes {
+            let code = &code[start..end];
+            items.push(Item { name: item_name(code), code });
+            start = end;
+        }
+    }
+    items
+}
+
+/// The name after the first word that brings one; empty where there is none.
+fn item_name(code: &str) -> &str {
+    let is_separator = |c: char| !(c.is_alphanumeric() || c == '_');
+    let mut words = code.split(is_separator).filter(|word| !word.is_empty());
+    while let Some(word) = words.next() {
+        if ["fn", "const", "static", "struct", "enum", "mod", "impl"].contains(&word) {
+            return words.next().unwrap_or_default();
+        }
+    }
+    ""
+}
+
+fn has_word(text: &str, word: &str) -> bool {
+    let is_word = |c: char| c.is_alphanumeric() || c == '_';
+    text.match_indices(word).any(|(start, _)| {
+        !text[..start].ends_with(is_word) && !text[start + word.len()..].starts_with(is_word)
+    })
+}
+
+#[test]
+fn a_test_that_should_be_ignored_is_found_through_what_it_calls() {
+    let path = "const DATA: &str = \"../shared/data\";\n";
+    let helper = "fn read() -> String {\n    DATA.to_owned()\n}\n";
+    let test = |attributes: &str, call: &str| {
+        format!("{path}{helper}#[test]\n{attributes}fn it() {{\n    {call};\n}}\n")
+    };
+    let (right, other) = ("#[ignore = \"needs the shared data\"]\n", "#[ignore = \"slow\"]\n");
+    for (attributes, call, n_wrong) in [
+        (right, "read()", 0),
+        ("", "read()", 1),
+        (other, "read()", 1),
+        ("", "ready()", 0),
+        (right, "ready()", 1),
+    ] {
+        assert_eq!(ignored_wrongly(&test(attributes, call)).len(), n_wrong, "{attributes}{call}");
+    }
 }
 
 #[test]
@@ -249,7 +382,9 @@ fn the_readme_says_how_to_drive_and_to_test_and_ci_does_the_latter() {
         *found.unwrap_or_else(|| panic!("README.md: no `{start}` among {commands:?}"))
     };
     first("cargo run --release -- drive");
+    let test = first("cargo test");
     let script = read(".ci/run");
-    let run: Vec<&str> = script.lines().filter(|line| line.starts_with("cargo ")).collect();
-    assert_eq!(run, [first("cargo test")], ".ci/run and README.md must agree");
+    let tests: Vec<&str> = script.lines().filter(|line| line.starts_with("cargo test")).collect();
+    // What needs the shared data runs apart, so that nothing runs twice.
+    assert_eq!(tests, [test, &format!("{test} -- --ignored")], ".ci/run and README.md must agree");
 }

@@ -19,6 +19,7 @@ fn report() -> TractionMapReport {
 }
 
 #[test]
+#[ignore = "needs the shared data"]
 fn the_forest_is_as_published() {
     let report = report();
     assert_eq!(report.height_step_m, Some(0.5), "a map of voxels");
@@ -43,6 +44,7 @@ fn the_forest_is_as_published() {
 }
 
 #[test]
+#[ignore = "needs the shared data"]
 fn physics_repairs_a_prediction_from_another_forest() {
     let report = report();
     let error = |head: &Head, source| head.score(source).emd2.value;
@@ -75,6 +77,7 @@ fn efficiencies(command: Column, achieved: Column, command_min: f64) -> Vec<f64>
 }
 
 #[test]
+#[ignore = "needs the shared data"]
 fn the_skid_steer_prior_has_the_quantiles_of_the_recorded_drive() {
     let cases = [
         (LINEAR, efficiencies(Column::CmdSpeed, Column::Vx, 0.5)),
@@ -90,6 +93,7 @@ fn the_skid_steer_prior_has_the_quantiles_of_the_recorded_drive() {
 }
 
 #[test]
+#[ignore = "needs the shared data"]
 fn the_warthogs_effective_track_is_that_of_its_drive() {
     // Yaw rate over that of its wheels: 1 / 1.69.
     let efficiencies = efficiencies(Column::WheelWz, Column::Wz, 0.3);

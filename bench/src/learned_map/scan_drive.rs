@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use bicycle::Vehicle;
+use bicycle::lanes::{Instructions, Isa};
 use evidential::{BeliefMap, Learned, Unfamiliar};
 use serde::Serialize;
 use terrain::{
@@ -37,6 +38,8 @@ pub struct ScanDrive {
     pub n_threads: usize,
     /// Sizes of the networks.
     pub sizes: Sizes,
+    /// Instruction set.
+    pub isa: Isa,
 }
 
 /// What the maps along the way cost.
@@ -79,7 +82,9 @@ fn along_the_way(drive: &ScanDrive, vehicle: &Vehicle) -> Result<ScanDriveReport
         obstacle_margin_m: 0.0,
         level: CvarLevel::new(CVAR_LEVEL)?,
     };
-    let mut map = BeliefMap::new(&vehicle.geometry, &learned, WINDOW.resolution_m, WINDOW, N_YAWS)?;
+    let instructions = Instructions::find(drive.isa).map_err(mppi::ConfigError::from)?;
+    let resolution_m = WINDOW.resolution_m;
+    let mut map = BeliefMap::new(&vehicle.geometry, &learned, resolution_m, WINDOW, N_YAWS, instructions)?;
     let (mut fuse_ms, mut update_all_ms) = (Vec::new(), Vec::new());
     let mut n_judged = 0;
     for step in 0..drive.n_scans + N_WARM_UP {
@@ -153,7 +158,8 @@ mod tests {
         };
         let sizes = Sizes { encoder_hidden: vec![4], n_latent: 2, ..Sizes::default() };
         let points_m = (0..1500).map(ring).collect();
-        let report = measure_scan_drive(&ScanDrive { points_m, n_scans: 5, n_threads: 1, sizes }).unwrap();
+        let drive = ScanDrive { points_m, n_scans: 5, n_threads: 1, sizes, isa: Isa::Auto };
+        let report = measure_scan_drive(&drive).unwrap();
         assert_eq!((report.points, report.scans), (1500, 5));
         assert!(report.fuse_ms.min > 0.0 && report.update_ms.min > 0.0);
         assert!(0.0 < report.judged_share && report.judged_share <= 1.0, "{}", report.judged_share);
@@ -162,7 +168,7 @@ mod tests {
     #[test]
     fn no_scan_is_refused() {
         let points_m = vec![[3.0, 0.0, -1.0]];
-        let drive = ScanDrive { points_m, n_scans: 0, n_threads: 1, sizes: Sizes::default() };
+        let drive = ScanDrive { points_m, n_scans: 0, n_threads: 1, sizes: Sizes::default(), isa: Isa::Auto };
         assert!(matches!(measure_scan_drive(&drive), Err(BenchError::NoUpdates)));
     }
 }

@@ -1,5 +1,6 @@
 //! From trained networks to the report.
 
+use bicycle::lanes::Instructions;
 use evidential::{Architecture, Dataset, Example, Method, Prediction, Predictor, Prior, Sidecar};
 use rayon::prelude::*;
 use traversability::N_BINS;
@@ -121,7 +122,7 @@ impl<'a> Test<'a> {
         let refused =
             |source| LearningError::Prediction { training: trained.planned.name(), source: Box::new(source) };
         let sidecar = &trained.checkpoint.sidecar;
-        let predictor = Predictor::new(&trained.checkpoint).map_err(refused)?;
+        let predictor = Predictor::new(&trained.checkpoint, Instructions::widest()).map_err(refused)?;
         let predictions = predictor.predict(&features(&self.testbed.test)).map_err(refused)?;
         let rows = Row::ALL.into_iter().filter(|row| row.method() == Some(sidecar.method));
         let tally = |row: Row| {

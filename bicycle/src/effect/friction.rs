@@ -27,7 +27,12 @@ impl Definition for Friction {
 
     fn constants(&self, step_s: f64) -> [f64; 4] {
         let limit_mps2 = self.mu * STANDARD_GRAVITY_MPS2;
-        [limit_mps2, limit_mps2 * self.driven_share, self.agility * limit_mps2 * step_s, limit_mps2.powi(2)]
+        [
+            limit_mps2,
+            limit_mps2 * self.driven_share,
+            self.agility * limit_mps2 * step_s,
+            limit_mps2 * limit_mps2,
+        ]
     }
 
     fn n_slots(&self, _step_s: f64) -> usize {

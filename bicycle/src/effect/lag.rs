@@ -9,7 +9,7 @@ pub(super) fn constants(time_constant_s: f64, step_s: f64) -> [f64; 4] {
     if time_constant_s <= 0.0 {
         return [1.0, 1.0, 0.0, 0.0];
     }
-    let closed = -(-step_s / time_constant_s).exp_m1();
+    let closed = -libm::expm1(-step_s / time_constant_s);
     [closed, 1.0 - closed * time_constant_s / step_s, 0.0, 0.0]
 }
 

@@ -35,7 +35,7 @@ impl SensorModel {
         let yaw_rate_radps = measured.yaw_rate_radps - self.yaw_rate_bias_radps;
         let turned_rad = yaw_rate_radps * self.pose_latency_s;
         let yaw_rad = measured.attitude_rad[2] - self.yaw_offset_rad;
-        let (sine, cosine) = (yaw_rad + turned_rad / 2.0).sin_cos();
+        let (sine, cosine) = libm::sincos(yaw_rad + turned_rad / 2.0);
         let [ahead_m, left_m] = velocity_mps.map(|value| value * self.pose_latency_s);
         let [x_m, y_m, z_m] = measured.position_m;
         let [roll_rad, pitch_rad, _] = measured.attitude_rad;

@@ -60,18 +60,7 @@ macro_rules! arithmetic_of_pulp {
 
 /// Comparison "not less than or equal", true for NaN, quiet.
 const NOT_LESS_EQUAL: i32 = 22;
-/// Keeps the reciprocal square root away from zero.
-const TINY: Constant = Constant { double: 1e-12, single: 1e-12 };
-const HALF: Constant = Constant { double: 0.5, single: 0.5 };
-
-/// One Newton step from an estimate `y` of 1 / sqrt(x) to sqrt(x).
-#[inline(always)]
-fn refined_sqrt<L: Lanes>(lanes: L, x: L::Value, y: L::Value) -> L::Value {
-    let half = lanes.constant(HALF);
-    let root = lanes.mul(x, y);
-    let error = lanes.sub(half, lanes.mul(lanes.mul(root, half), y));
-    lanes.mul_add(root, error, root)
-}
+const ZERO: Constant = Constant { double: 0.0, single: 0.0 };
 
 impl Lanes for V4 {
     type Value = f32x16;
@@ -81,8 +70,7 @@ impl Lanes for V4 {
 
     #[inline(always)]
     fn sqrt(self, a: f32x16) -> f32x16 {
-        let x = self.max(self.constant(TINY), a);
-        refined_sqrt(self, x, cast!(self.avx512f._mm512_rsqrt14_ps(cast!(x))))
+        self.sqrt_f32s(self.max(self.constant(ZERO), a))
     }
     #[inline(always)]
     fn wrap_turns(self, a: f32x16) -> f32x16 {
@@ -115,8 +103,7 @@ impl Lanes for V3 {
 
     #[inline(always)]
     fn sqrt(self, a: f32x8) -> f32x8 {
-        let x = self.max(self.constant(TINY), a);
-        refined_sqrt(self, x, cast!(self.avx._mm256_rsqrt_ps(cast!(x))))
+        self.sqrt_f32s(self.max(self.constant(ZERO), a))
     }
     #[inline(always)]
     fn wrap_turns(self, a: f32x8) -> f32x8 {

@@ -1,4 +1,4 @@
-//! The reference: one number, f64, the standard library's functions.
+//! The reference: one number, f64, functions that are the same on every platform.
 
 use super::{Constant, Lanes};
 
@@ -60,9 +60,9 @@ impl Lanes for Scalar {
         if mask { a + b } else { a }
     }
     fn sin_cos_turns(self, a: f64) -> (f64, f64) {
-        (a * std::f64::consts::TAU).sin_cos()
+        libm::sincos(a * std::f64::consts::TAU)
     }
     fn tan(self, a: f64) -> f64 {
-        a.tan()
+        libm::tan(a)
     }
 }

@@ -46,7 +46,7 @@ pub struct BenchControlArguments {
     #[arg(long = "config", value_enum, default_value_t = BenchWork::Bound)]
     pub work: BenchWork,
 
-    /// Instruction set of the controller; auto takes the best the machine has
+    /// Instruction set; auto takes the best the machine has
     #[arg(long, value_enum, default_value_t = super::InstructionSet::Auto)]
     pub isa: super::InstructionSet,
 
@@ -84,6 +84,10 @@ pub struct BenchPriorMapArguments {
     #[arg(long, value_name = "N", value_parser = values::update_count, default_value = "50",
           allow_hyphen_values = true)]
     pub updates: usize,
+
+    /// Instruction set; auto takes the best the machine has
+    #[arg(long, value_enum, default_value_t = super::InstructionSet::Auto)]
+    pub isa: super::InstructionSet,
 
     /// Write the result to this file too
     #[arg(long, value_name = "FILE")]
@@ -130,7 +134,7 @@ pub struct BenchNavigationArguments {
     #[arg(long, value_name = "N", value_parser = values::thread_count, allow_hyphen_values = true)]
     pub threads: Option<usize>,
 
-    /// Instruction set of the controller; auto takes the best the machine has
+    /// Instruction set of maps and controller; auto takes the best the machine has
     #[arg(long, value_enum, default_value_t = super::InstructionSet::Auto)]
     pub isa: super::InstructionSet,
 

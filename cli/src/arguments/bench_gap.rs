@@ -30,7 +30,7 @@ pub struct BenchGapArguments {
     #[arg(long, value_name = "N", value_parser = values::thread_count, allow_hyphen_values = true)]
     pub threads: Option<usize>,
 
-    /// Instruction set of the controller; auto takes the best the machine has
+    /// Instruction set of maps and controller; auto takes the best the machine has
     #[arg(long, value_enum, default_value_t = super::InstructionSet::Auto)]
     pub isa: super::InstructionSet,
 

@@ -9,6 +9,10 @@ use super::AskedDeviation;
 use super::values::{self, Goal, StartPose, WorldSource};
 use crate::UsageError;
 
+/// What says how to plan: it means nothing where nobody does.
+const PLANNING: [&str; 9] =
+    ["goal", "method", "weights", "model", "alpha", "config", "oracle_map", "threads", "isa"];
+
 /// What to drive, where, and what to believe.
 #[derive(Args, Clone, Debug)]
 #[command(after_long_help = AFTER_HELP)]
@@ -84,16 +88,16 @@ pub struct DriveArguments {
           allow_hyphen_values = true, help_heading = "Run")]
     pub time_limit: f64,
 
-    /// As fast as the machine allows, or wall-clock time
-    #[arg(long, value_enum, default_value_t = Pace::Fast, help_heading = "Run")]
-    pub pace: Pace,
+    /// As fast as the machine allows, or wall-clock time [default: fast; real where processes drive]
+    #[arg(long, value_enum, help_heading = "Run")]
+    pub pace: Option<Pace>,
 
     /// Threads of the controller, 1 to 256 [default: the machine's]; the result does not depend on it
     #[arg(long, value_name = "N", value_parser = values::thread_count, allow_hyphen_values = true,
           help_heading = "Run")]
     pub threads: Option<usize>,
 
-    /// Instruction set of the controller; auto takes the best the machine has
+    /// Instruction set of maps and controller; auto takes the best the machine has
     #[arg(long, value_enum, default_value_t = InstructionSet::Auto, help_heading = "Run")]
     pub isa: InstructionSet,
 
@@ -103,7 +107,7 @@ pub struct DriveArguments {
 
     /// Carry out the commands of this drive log (.csv or .mcap: t, cmd_speed, cmd_steer) instead of planning; nothing but
     /// the world's edge, a fall or a standstill ends the drive before they do
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["goal", "method", "weights"], help_heading = "Run")]
+    #[arg(long, value_name = "FILE", conflicts_with_all = PLANNING, help_heading = "Run")]
     pub commands: Option<PathBuf>,
 
     /// Write the summary to this file too
@@ -199,7 +203,7 @@ pub enum Pace {
     Real,
 }
 
-/// Instruction set of the controller's kernels.
+/// Instruction set of every kernel between scan and command.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum InstructionSet {
     /// The best the machine has
@@ -254,8 +258,9 @@ Files written to --out:
                 and risk grids, best rollouts and controller diagnostics; opens
                 in Foxglove
   summary.json  outcome, time to goal, path length, largest roll and pitch,
-                control and map milliseconds, stops by reason, and all that is
-                needed to repeat the drive
+                control and map milliseconds, stops by reason, jumps of the
+                localisation, measurements refused, scans and their points, and
+                all that is needed to repeat the drive
 
 Outcomes:
   goal            the goal was reached

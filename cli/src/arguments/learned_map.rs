@@ -29,6 +29,10 @@ pub struct BenchLearnedMapArguments {
     #[arg(long, value_name = "FILE")]
     pub scan: Option<PathBuf>,
 
+    /// Instruction set; auto takes the best the machine has
+    #[arg(long, value_enum, default_value_t = super::InstructionSet::Auto)]
+    pub isa: super::InstructionSet,
+
     /// Write the result to this file too
     #[arg(long, value_name = "FILE")]
     pub json: Option<PathBuf>,
@@ -73,6 +77,7 @@ networks are untrained.";
 
 const AFTER_HELP: &str = "\
 Prints JSON, and with --json writes it to a file too:
+  threads, updates, isa, poses, changed_cells
   networks  of each: sizes, multiply_adds per footprint, memory_mb, and min, median, p99 of
     ms        full, changed
     alone_ms  prior, networks: these parts by themselves

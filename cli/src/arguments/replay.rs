@@ -25,7 +25,8 @@ pub struct ReplayArguments {
 pub(super) const LONG_ABOUT: &str = "\
 Makes every decision of a recording again: the maps from the recorded scans and the networks, checked by their hashes, \
 and the commands from the maps and what control says it used. Every command must come out to the last bit; the first \
-that does not is told. What the recording lacks is told too, and what hangs on it is not counted as made again.";
+that does not is told. Each decision must also have been made on the newest maps that there were, and on the one of them \
+that is to be driven on. What the recording lacks is told too, and what hangs on it is not counted as made again.";
 
 const AFTER_HELP: &str = "\
 Example:
@@ -33,5 +34,6 @@ Example:
 
 Exit codes:
   0  every decision was made again to the last bit
-  1  one was not, or something that it needs was not recorded; one line says which
+  1  one was not, or was made on another map than it had to be, or something that it needs was not recorded, or
+     there is none; one line says which
   2  bad usage or input; one line says what was expected and what was found";

@@ -3,7 +3,8 @@
 use std::net::SocketAddr;
 
 use clap::{Args, ValueEnum};
-use runtime::channel::RunName;
+use runtime::ages::Periods;
+use runtime::channel::{RunName, THIRD_PARTIES};
 use runtime::status::Role;
 
 use super::DriveArguments;
@@ -26,13 +27,33 @@ pub struct UpArguments {
 
     /// Decisions per second, 1 to 50 [Hz]
     #[arg(long, value_name = "HERTZ", value_parser = rate_hz, default_value = "10",
-          allow_hyphen_values = true, help_heading = "Processes")]
+          allow_hyphen_values = true, help_heading = "Times")]
     pub rate: f64,
 
-    /// Age up to which the vehicle follows a command [s]; then it stops
-    #[arg(long, value_name = "SECONDS", value_parser = values::duration_s, default_value = "0.3",
-          allow_hyphen_values = true, help_heading = "Processes")]
-    pub command_age: f64,
+    /// Odometry messages per second, 2 to 400 [Hz]: what the simulated vehicle sends, or your own does
+    #[arg(long, value_name = "HERTZ", value_parser = odometry_rate_hz, default_value = "50",
+          allow_hyphen_values = true, help_heading = "Times")]
+    pub odometry_rate: f64,
+
+    /// Scans per second, 0.5 to 50 [Hz]: what the simulated vehicle sends, or your own does
+    ///
+    /// Limits on ages follow from this and the two rates above; see docs/runtime.md. Give every process of a run the same.
+    #[arg(long, value_name = "HERTZ", value_parser = scan_rate_hz, default_value = "5",
+          allow_hyphen_values = true, help_heading = "Times")]
+    pub scan_rate: f64,
+
+    /// Age of the odometry behind a command up to which the vehicle follows it [s]; then it stops [default: 0.3, more
+    /// where decisions are rarer than 10 a second]
+    #[arg(long, value_name = "SECONDS", value_parser = values::duration_s, allow_hyphen_values = true,
+          help_heading = "Times")]
+    pub command_age: Option<f64>,
+
+    /// Readers that each channel has room for beside the run's own; give every process of a run the same
+    ///
+    /// A publisher of maps reserves shared memory for every place: for a full-size vehicle some 25 MB in all.
+    #[arg(long, value_name = "N", value_parser = third_parties, default_value_t = THIRD_PARTIES,
+          help_heading = "Processes")]
+    pub third_parties: usize,
 
     /// Pin processes to cores, ask for SCHED_FIFO and lock memory; each says on standard error what was not permitted
     #[arg(long, help_heading = "Processes")]
@@ -45,6 +66,17 @@ pub struct UpArguments {
     #[arg(long, value_name = "HOST:PORT", num_args = 0..=1, require_equals = true,
           default_missing_value = LIVE_DEFAULT, help_heading = "Live view")]
     pub live: Option<SocketAddr>,
+
+    /// Size that all recordings in the output folder together may reach, those of before included [MB]; then the vehicle
+    /// drives on without a recording, and the recorder says so
+    #[arg(long, value_name = "MEGABYTES", value_parser = quota_mb, default_value = "16000",
+          allow_hyphen_values = true, help_heading = "Recording")]
+    pub record_quota: f64,
+
+    /// Time after which what was recorded is put onto the disk (fsync): what a failure of the power may cost [s]
+    #[arg(long, value_name = "SECONDS", value_parser = values::duration_s, default_value = "1",
+          allow_hyphen_values = true, help_heading = "Recording")]
+    pub record_sync: f64,
 
     /// Go on learning from the drive; networks that prove better are used and kept in OUT/learned
     ///
@@ -70,6 +102,19 @@ pub struct UpArguments {
     pub drive: DriveArguments,
 }
 
+impl UpArguments {
+    /// How often the parts of the run speak.
+    pub fn periods(&self) -> Periods {
+        let Self { rate, odometry_rate, scan_rate, .. } = *self;
+        Periods {
+            control_s: rate.recip(),
+            odometry_s: odometry_rate.recip(),
+            scan_s: scan_rate.recip(),
+            ..Periods::default()
+        }
+    }
+}
+
 /// A process, or all of them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum UpRole {
@@ -90,6 +135,15 @@ pub enum UpRole {
 }
 
 impl UpRole {
+    /// Name on the command line.
+    pub fn name(self) -> &'static str {
+        match (self, self.role()) {
+            (_, Some(role)) => role.name(),
+            (Self::Live, None) => "live",
+            _ => "all",
+        }
+    }
+
     /// The one part of the machine; `None` for all, and for the view of it.
     pub fn role(self) -> Option<Role> {
         match self {
@@ -107,13 +161,31 @@ fn rate_hz(word: &str) -> Result<f64, String> {
     values::number_where(word, "a rate from 1 to 50 Hz", |value| (1.0..=50.0).contains(&value))
 }
 
+fn odometry_rate_hz(word: &str) -> Result<f64, String> {
+    values::number_where(word, "a rate from 2 to 400 Hz", |value| (2.0..=400.0).contains(&value))
+}
+
+fn scan_rate_hz(word: &str) -> Result<f64, String> {
+    values::number_where(word, "a rate from 0.5 to 50 Hz", |value| (0.5..=50.0).contains(&value))
+}
+
+fn third_parties(word: &str) -> Result<usize, String> {
+    let places = word.trim().parse().ok().filter(|n| (0..=16).contains(n));
+    places.ok_or_else(|| format!("expected a number of readers from 0 to 16, found {word:?}"))
+}
+
+fn quota_mb(word: &str) -> Result<f64, String> {
+    values::number_where(word, "a size from 1 to 1000000 MB", |value| (1.0..=1e6).contains(&value))
+}
+
 pub(super) const LONG_ABOUT: &str = "\
 Drives as `surefoot drive` does, with every part a process of its own: the vehicle, mapping, learning, control and \
 the recorder, linked by channels in shared memory.
 
 Control decides at absolute deadlines on what there is and never waits for a map. When learning dies, physics judges \
 the ground; when nothing young enough is left to drive on, the vehicle stops; when control dies, the vehicle's own \
-watchdog stops it. Processes may start in any order, each in its own terminal, and be restarted at any time.";
+watchdog stops it. Processes may start in any order, each in its own terminal, and be restarted at any time. Give each \
+the same words: what describes the run concerns them all.";
 
 const AFTER_HELP: &str = "\
 Examples:
@@ -124,8 +196,9 @@ Examples:
   surefoot up --realtime --rate 50
       As regular as the system permits, 50 decisions a second.
 
-`--role all` leaves drive-000.mcap, drive-001.mcap and so on, summary.json and runtime.json: how control kept its
-times (jitter, lateness, misses, age of its maps) and what each process took of processor and memory.
+`--role all` leaves drive-000.mcap, drive-001.mcap and so on, summary.json (how the drive
+ended, how often the localisation jumped) and runtime.json: how control kept its times (jitter, lateness, misses, age of
+its maps) and what each process took of processor and memory.
 
 Exit codes:
   0  the goal was reached, or the process was told to end

@@ -69,7 +69,7 @@ fn bar(n_drives: u64) -> ProgressBar {
 /// An instruction set that the machine lacks is the user's choice; all else is not.
 fn told(error: ClosedLoopError) -> anyhow::Error {
     match error {
-        ClosedLoopError::Controller(refused @ mppi::ConfigError::IsaAbsent { .. }) => {
+        ClosedLoopError::Controller(refused @ mppi::ConfigError::Isa(_)) => {
             UsageError::from_input(refused).into()
         }
         other => other.into(),
@@ -156,7 +156,7 @@ mod tests {
 
     #[test]
     fn instruction_set_that_is_absent_is_the_users_choice() {
-        let absent = mppi::ConfigError::IsaAbsent { isa: mppi::Isa::Avx512 };
+        let absent = mppi::ConfigError::Isa(bicycle::lanes::IsaAbsent { isa: mppi::Isa::Avx512 });
         assert!(told(ClosedLoopError::Controller(absent)).is::<UsageError>());
         assert!(!told(ClosedLoopError::NoDrives).is::<UsageError>());
     }

@@ -24,15 +24,15 @@ pub(crate) fn run_learned_map(arguments: &BenchLearnedMapArguments) -> anyhow::R
     json.map_or(Ok(()), output::prepare_json)?;
     let points = arguments.scan.as_deref().map(formats::read_scan_points).transpose();
     let points_m = points.map_err(UsageError::from_input)?;
-    let n_threads = arguments.n_threads();
+    let (n_threads, isa) = (arguments.n_threads(), arguments.isa.into());
     let sizes: Vec<_> = arguments.networks.iter().map(|network| network.0.clone()).collect();
     let scan = match (points_m, sizes.last().cloned()) {
         (Some(points_m), Some(sizes)) => {
-            let drive = ScanDrive { points_m, n_scans: N_SCANS, n_threads, sizes };
+            let drive = ScanDrive { points_m, n_scans: N_SCANS, n_threads, sizes, isa };
             Some(measure_scan_drive(&drive).map_err(told)?)
         }
         _ => None,
     };
-    let maps = measure(&Request { n_threads, n_updates: arguments.updates, sizes }).map_err(told)?;
+    let maps = measure(&Request { n_threads, n_updates: arguments.updates, sizes, isa }).map_err(told)?;
     show(&Written { maps, scan }, json)
 }

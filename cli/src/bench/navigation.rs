@@ -74,7 +74,7 @@ fn bar(request: &Request) -> ProgressBar {
 fn told(error: NavigationError) -> anyhow::Error {
     if let NavigationError::Drive { source, .. } = &error
         && let BrokenDrive::Loop(DriveError::Navigator(NavigatorError::Controller(refused))) = source.as_ref()
-        && matches!(refused, mppi::ConfigError::IsaAbsent { .. })
+        && matches!(refused, mppi::ConfigError::Isa(_))
     {
         return UsageError(refused.to_string()).into();
     }
@@ -209,7 +209,7 @@ mod tests {
 
     #[test]
     fn instruction_set_that_is_absent_is_the_users_choice() {
-        let absent = || mppi::ConfigError::IsaAbsent { isa: mppi::Isa::Avx512 };
+        let absent = || mppi::ConfigError::Isa(bicycle::lanes::IsaAbsent { isa: mppi::Isa::Avx512 });
         let broken = NavigationError::Drive {
             drive: "truth, seed 1".to_owned(),
             source: Box::new(DriveError::from(NavigatorError::from(absent())).into()),

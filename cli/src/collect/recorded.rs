@@ -4,12 +4,12 @@ use std::path::Path;
 
 use bench::collection::{Collection, Recorded, collect_recorded};
 use bicycle::{Column, DriveLog, Vehicle};
-use formats::{ElevationFile, read_drive_log_csv, read_drive_log_mcap, read_elevation};
-use scenarios::WorldLayers;
+use formats::{read_drive_log_csv, read_drive_log_mcap, read_elevation};
 
 use super::told;
 use crate::UsageError;
 use crate::arguments::{CollectArguments, Goal};
+use crate::drive::scene::layers;
 
 /// Reads both files and labels what was driven.
 pub(super) fn gather(
@@ -55,15 +55,5 @@ fn read_log(path: &Path) -> Result<DriveLog, UsageError> {
             "--log: expected a file ending in .csv or .mcap, found {}",
             path.display()
         ))),
-    }
-}
-
-fn layers(file: ElevationFile) -> WorldLayers {
-    WorldLayers {
-        elevation_m: file.elevation,
-        canopy_height_m: file.layers.canopy_height_m,
-        low_vegetation_fraction: file.layers.low_vegetation_fraction,
-        water: file.layers.water,
-        ground_gap_m: file.layers.ground_gap_m,
     }
 }

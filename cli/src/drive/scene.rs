@@ -1,27 +1,20 @@
 //! From arguments to a vehicle, a world and a task in it.
 
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
+use bicycle::lanes::{Instructions, Isa};
 use bicycle::{Model, Vehicle};
 use formats::{ConfigText, ElevationFile, overlay, read_elevation, read_model, read_vehicle};
-use navigator::Config;
+use navigator::{Config, GuardConfig};
 use scenarios::{
-    ArenaConfig, ArenaError, Bounds, LayerConfig, Pair, PairWish, ROCK_FIELD_DISTANCE_M, RockFieldConfig,
-    Task, WorldLayers, check_pair, feasible_pair, world_from_layers,
+    ArenaConfig, ArenaError, Pair, PairWish, ROCK_FIELD_DISTANCE_M, RockFieldConfig, Task, WorldLayers,
+    check_pair,
 };
 
 use super::knowledge::Knowledge;
 use super::open_loop::Script;
 use crate::UsageError;
 use crate::arguments::{DriveArguments, WorldSource};
-
-/// Maps up to so many cells a side are built whole.
-const WHOLE_MAP_CELLS: f64 = 3500.0;
-/// What of a larger map is built around its start and goal, beyond the distance between them [m].
-const WINDOW_MARGIN_M: f64 = 30.0;
-/// Places of a large map that are searched for a start and a goal.
-const WINDOWS_TRIED: u64 = 8;
 
 /// What is driven, with what.
 pub(super) struct Scene {
@@ -44,7 +37,7 @@ pub(crate) struct Machine {
 
 /// Reads and builds everything; whatever cannot be is refused here, before anything drives.
 pub(super) fn prepare(arguments: &DriveArguments) -> Result<Scene, UsageError> {
-    let Machine { vehicle, model, config, knowledge } = machine(arguments)?;
+    let Machine { vehicle, model, config, knowledge } = machine(arguments, GuardConfig::default())?;
     let mut task = task(arguments, &vehicle)?;
     let read = |path: &PathBuf| Script::read(path, &vehicle.limits);
     let script = arguments.commands.as_ref().map(read).transpose()?;
@@ -55,22 +48,32 @@ pub(super) fn prepare(arguments: &DriveArguments) -> Result<Scene, UsageError> {
     Ok(Scene { vehicle, model, config, task, knowledge, script })
 }
 
-/// The machine alone.
-pub(crate) fn machine(arguments: &DriveArguments) -> Result<Machine, UsageError> {
+/// The machine alone, with a guard that its configuration may change.
+pub(crate) fn machine(arguments: &DriveArguments, guard: GuardConfig) -> Result<Machine, UsageError> {
     let vehicle = read_vehicle(arguments.vehicle_name_or_path()).map_err(UsageError::from_input)?;
     let model = match &arguments.model {
         Some(path) => read_model(path).map_err(UsageError::from_input)?,
         None => Model::of(&vehicle),
     };
-    let mut config = Config::for_vehicle(&vehicle);
+    let mut config = Config { guard, ..Config::for_vehicle(&vehicle) };
     if let Some(path) = &arguments.config {
         let text = ConfigText::read(path).map_err(UsageError::from_input)?;
         config = overlay(&text, &config).map_err(UsageError::from_input)?;
     }
     config.controller.n_threads = arguments.n_threads();
-    config.controller.isa = arguments.isa.into();
+    config.controller.isa = isa(arguments, config.controller.isa)?;
     let knowledge = Knowledge::choose(arguments, &vehicle)?;
     Ok(Machine { vehicle, model, config, knowledge })
+}
+
+/// The instruction set as asked, else as configured; by its name, so that whoever records the settings tells what was
+/// used.
+fn isa(arguments: &DriveArguments, configured: Isa) -> Result<Isa, UsageError> {
+    let wished = match Isa::from(arguments.isa) {
+        Isa::Auto => configured,
+        asked => asked,
+    };
+    Ok(Instructions::find(wished).map_err(UsageError::from_input)?.isa())
 }
 
 /// Where to drive, from where, where to.
@@ -107,62 +110,46 @@ fn in_file(arguments: &DriveArguments, vehicle: &Vehicle, path: &Path) -> Result
         goal_m: arguments.goal.map(|goal| [goal.x_m, goal.y_m]),
         distance_m: ROCK_FIELD_DISTANCE_M.min(0.5 * shortest_m),
     };
-    let whole_m = WHOLE_MAP_CELLS * LayerConfig::for_vehicle(vehicle).resolution_m;
-    let mut windows = windows(&bounds, &wish, (arguments.seed, whole_m)).into_iter().peekable();
-    loop {
-        let window = windows.next().flatten();
-        let config = LayerConfig { window, ..LayerConfig::for_vehicle(vehicle) };
-        let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
-        let world =
-            world_from_layers(name, &layers, &config, arguments.seed).map_err(UsageError::from_input)?;
-        let world = Arc::new(world);
-        match feasible_pair(&world, vehicle, &wish, arguments.seed) {
-            Ok(Pair { start, goal_m }) => {
-                return Ok(Task::in_world(world, start, goal_m, Task::tolerance_m(vehicle)));
-            }
-            Err(error) if windows.peek().is_none() => return Err(UsageError::from_input(error)),
-            Err(_) => {}
-        }
-    }
+    let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
+    Task::in_layers(&name, &layers, vehicle, &wish, arguments.seed).map_err(UsageError::from_input)
 }
 
-/// The parts of a map to build and look for a pair in, one after the other: all of a small map; of a large one what
-/// lies around the ends that are given, or places by the seed.
-fn windows(map: &Bounds, wish: &PairWish, (seed, whole_m): (u64, f64)) -> Vec<Option<Bounds>> {
-    let side_m = [0, 1].map(|k| map.north_east_m[k] - map.south_west_m[k]);
-    if side_m[0].max(side_m[1]) <= whole_m {
-        return vec![None];
-    }
-    let ends = wish.start.map(|[x_m, y_m, _]| [x_m, y_m]).into_iter().chain(wish.goal_m);
-    let given: Vec<[f64; 2]> = ends.collect();
-    let around = |places: &[[f64; 2]], within_m: f64| {
-        let bound = |k: usize, pick: fn(f64, f64) -> f64| {
-            places.iter().map(|place| place[k]).fold(places[0][k], pick)
-        };
-        Bounds {
-            south_west_m: [0, 1].map(|k| bound(k, f64::min) - within_m),
-            north_east_m: [0, 1].map(|k| bound(k, f64::max) + within_m),
-        }
-    };
-    if !given.is_empty() {
-        let free_m = if given.len() == 2 { 0.0 } else { wish.distance_m };
-        return vec![Some(around(&given, WINDOW_MARGIN_M + free_m))];
-    }
-    // The fractional parts of multiples of the plastic number's powers spread evenly over a square.
-    let place = |try_: u64| {
-        let turn = (seed.wrapping_mul(WINDOWS_TRIED).wrapping_add(try_) % (1 << 32)) as f64;
-        [(0, 0.754_877_666_246_693), (1, 0.569_840_290_998_053)]
-            .map(|(k, step)| map.south_west_m[k] + side_m[k] * (turn * step).fract())
-    };
-    (0..WINDOWS_TRIED).map(|try_| Some(around(&[place(try_)], WINDOW_MARGIN_M + wish.distance_m))).collect()
-}
-
-fn layers(file: ElevationFile) -> WorldLayers {
+/// The file's layers as a world takes them.
+pub(crate) fn layers(file: ElevationFile) -> WorldLayers {
     WorldLayers {
         elevation_m: file.elevation,
         canopy_height_m: file.layers.canopy_height_m,
         low_vegetation_fraction: file.layers.low_vegetation_fraction,
         water: file.layers.water,
         ground_gap_m: file.layers.ground_gap_m,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
+
+    use super::*;
+    use crate::arguments::{Arguments, Command};
+    use clap::Parser;
+
+    fn isa_of(words: &[&str]) -> Isa {
+        let words = ["surefoot", "drive", "--method", "physics"].iter().chain(words);
+        match Arguments::try_parse_from(words).unwrap().command {
+            Command::Drive(arguments) => {
+                machine(&arguments, GuardConfig::default()).unwrap().config.controller.isa
+            }
+            _ => unreachable!("parsed from `drive`"),
+        }
+    }
+
+    #[test]
+    fn settings_name_the_instruction_set_that_is_used() {
+        assert_eq!(isa_of(&[]), Instructions::widest().isa());
+        assert_eq!(isa_of(&["--isa", "portable"]), Isa::Portable);
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("settings.toml");
+        std::fs::write(&file, "[controller]\nisa = \"portable\"\n").unwrap();
+        assert_eq!(isa_of(&["--config", file.to_str().unwrap()]), Isa::Portable, "as the file says");
     }
 }

@@ -1,24 +1,15 @@
 //! What a recording holds, also one that breaks off.
 
 use std::collections::BTreeMap;
-use std::fs::File;
-use std::io::BufReader;
 use std::path::Path;
 
-use mcap::io::MessageReader;
-use mcap::sans_io::LinearReaderOptions;
+use formats::open_recording;
 use runtime::message::Stamp;
 use runtime::timing::Timing;
 use runtime::{recorder, replay};
 use serde_json::{Value, json};
 
 use crate::UsageError;
-
-/// Longest record that is believed: far above what recorders write.
-const RECORD_BYTES_MAX: usize = 1 << 28;
-
-/// Topics of messages as they went over the channels.
-const CHANNELS: &str = "/channel/";
 
 #[derive(Default)]
 struct Topic {
@@ -37,8 +28,9 @@ impl Topic {
         let missing = self
             .last
             .insert(stamp.epoch_ns, stamp.sequence)
-            .map_or(0, |last| stamp.sequence.saturating_sub(last + 1));
-        *self.lost.get_or_insert(0) += missing;
+            .map_or(0, |last| stamp.sequence.saturating_sub(last.saturating_add(1)));
+        let lost = self.lost.get_or_insert(0);
+        *lost = lost.saturating_add(missing);
     }
 }
 
@@ -46,15 +38,12 @@ pub(super) fn look(path: &Path) -> Result<Value, UsageError> {
     let refused = |problem: String| {
         UsageError(format!("{}: expected a recording in MCAP, found {problem}", path.display()))
     };
-    let file = File::open(path).map_err(|error| refused(error.to_string()))?;
-    let n_bytes = file.metadata().map_err(|error| refused(error.to_string()))?.len();
-    let options = LinearReaderOptions::default()
-        .with_record_length_limit(RECORD_BYTES_MAX)
-        .with_prevalidate_chunk_crcs(true);
+    let n_bytes = std::fs::metadata(path).map_err(|error| refused(error.to_string()))?.len();
+    let messages = open_recording(path).map_err(|error| refused(error.to_string()))?;
     let mut topics: BTreeMap<String, Topic> = BTreeMap::new();
     let mut timing = Timing::default();
     let (mut setup, mut ended_early, mut times_ns) = (Value::Null, None, None);
-    for message in MessageReader::new_with_options(BufReader::new(file), options) {
+    for message in messages {
         let message = match message {
             Ok(message) => message,
             Err(error) => {
@@ -67,11 +56,11 @@ pub(super) fn look(path: &Path) -> Result<Value, UsageError> {
             setup = serde_json::from_slice(&message.data).unwrap_or(Value::Null);
         }
         let topic = topics.entry(channel.topic.clone()).or_default();
-        topic.schema = channel.schema.as_ref().map_or(String::new(), |schema| schema.name.clone());
-        topic.encoding.clone_from(&channel.message_encoding);
+        topic.schema.clone_from(&channel.schema);
+        topic.encoding.clone_from(&channel.encoding);
         topic.messages += 1;
         topic.bytes += message.data.len() as u64;
-        if channel.topic.starts_with(CHANNELS) {
+        if channel.topic.starts_with(recorder::topic::CHANNELS) {
             replay::recorded_stamp(&message.data).iter().for_each(|stamp| topic.count(stamp));
         }
         if channel.topic == recorder::topic::DECISION
@@ -79,8 +68,8 @@ pub(super) fn look(path: &Path) -> Result<Value, UsageError> {
         {
             timing.take(&stamp, &decision);
         }
-        let (first, last) = times_ns.unwrap_or((message.log_time, message.log_time));
-        times_ns = Some((first.min(message.log_time), last.max(message.log_time)));
+        let (first, last) = times_ns.unwrap_or((message.log_time_ns, message.log_time_ns));
+        times_ns = Some((first.min(message.log_time_ns), last.max(message.log_time_ns)));
     }
     if topics.is_empty() {
         return Err(refused(ended_early.unwrap_or_else(|| "no message in it".to_owned())));

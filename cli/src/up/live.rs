@@ -5,10 +5,10 @@ use std::net::{Ipv4Addr, SocketAddr};
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
 
-use runtime::channel::Bus;
 use runtime::live;
 use rustix::process::{Signal, set_parent_process_death_signal};
 
+use super::roles;
 use crate::arguments::UpArguments;
 use crate::interrupt;
 
@@ -19,7 +19,7 @@ pub(super) fn run(arguments: &UpArguments) -> anyhow::Result<()> {
     }
     let address = arguments.live.unwrap_or(SocketAddr::from((Ipv4Addr::LOCALHOST, live::PORT)));
     let host = address.ip().to_string();
-    live::run(&Bus::join(&arguments.run)?, (&host, address.port()), &interrupt::interrupted, &mut |port| {
+    live::run(&roles::join(arguments)?, (&host, address.port()), &interrupt::interrupted, &mut |port| {
         eprintln!("surefoot live: Foxglove WebSocket on ws://{host}:{port}");
     })?;
     Ok(())

@@ -2,7 +2,8 @@
 
 use bench::closed_loop::Method;
 use navigator::Belief;
-use runtime::channel::Bus;
+use runtime::ages::AgeLimits;
+use runtime::channel::{Bus, ChannelError};
 use runtime::control::{self, ControlSetup};
 use runtime::learning::{self, LearningSetup};
 use runtime::mapping::{self, MappingSetup};
@@ -10,7 +11,7 @@ use runtime::online::Told;
 use runtime::plant::{self, PlantReport, PlantSetup};
 use runtime::realtime;
 use runtime::recorder::{self, RecorderSetup};
-use runtime::setup::{MachineSetup, RecordedSetup};
+use runtime::setup::{ClockAnchor, MachineSetup, RecordedSetup};
 use runtime::status::Role;
 use rustix::process::{Signal, set_parent_process_death_signal};
 use scenarios::{EpisodeConfig, Outcome};
@@ -30,10 +31,27 @@ const STANDING_MAX_S: f64 = 30.0;
 
 /// Reads everything that the processes will, so that bad input is refused before they start.
 pub(super) fn prepare(arguments: &UpArguments) -> Result<(), UsageError> {
-    let machine = scene::machine(&arguments.drive)?;
+    let machine = machine(arguments)?;
     scene::task(&arguments.drive, &machine.vehicle)?;
     learn::school(arguments, &machine)?;
+    ages(arguments, &machine)?;
+    plant::cycles_per_scan(&arguments.periods()).map_err(UsageError::from_input)?;
     Ok(())
+}
+
+/// Joins the processes of the run.
+pub(super) fn join(arguments: &UpArguments) -> Result<Bus, ChannelError> {
+    Bus::join_with_room(&arguments.run, arguments.third_parties)
+}
+
+/// The machine, with a guard that fits the periods of the run.
+fn machine(arguments: &UpArguments) -> Result<Machine, UsageError> {
+    scene::machine(&arguments.drive, arguments.periods().guard())
+}
+
+fn ages(arguments: &UpArguments, machine: &Machine) -> Result<AgeLimits, UsageError> {
+    AgeLimits::new(&arguments.periods(), &machine.config.guard, arguments.command_age)
+        .map_err(UsageError::from_input)
 }
 
 pub(super) fn run(arguments: &UpArguments, role: Role) -> anyhow::Result<()> {
@@ -43,18 +61,20 @@ pub(super) fn run(arguments: &UpArguments, role: Role) -> anyhow::Result<()> {
     if arguments.realtime {
         eprintln!("surefoot {}: {}", role.name(), realtime::settle(role));
     }
-    let machine = scene::machine(&arguments.drive)?;
+    let machine = machine(arguments)?;
+    let ages = ages(arguments, &machine)?;
     let is_over = &interrupt::interrupted;
     match role {
-        Role::Plant => run_plant(arguments, &machine)?,
+        Role::Plant => run_plant(arguments, &machine, ages)?,
         Role::Mapping => {
             let setup = MappingSetup {
                 vehicle: &machine.vehicle,
                 config: machine.config.clone(),
                 level: level(arguments)?,
                 model: &machine.model,
+                ages,
             };
-            mapping::run(&Bus::join(&arguments.run)?, &setup, is_over)?;
+            mapping::run(&join(arguments)?, &setup, is_over)?;
         }
         Role::Learning => {
             let (belief, checkpoint) = belief(&machine)?;
@@ -66,7 +86,7 @@ pub(super) fn run(arguments: &UpArguments, role: Role) -> anyhow::Result<()> {
                 level: level(arguments)?,
                 limits: machine.model.limits,
             };
-            let bus = Bus::join(&arguments.run)?;
+            let bus = join(arguments)?;
             match learn::school(arguments, &machine)? {
                 None => learning::run(&bus, &setup, is_over)?,
                 Some(school) => {
@@ -81,14 +101,14 @@ pub(super) fn run(arguments: &UpArguments, role: Role) -> anyhow::Result<()> {
                 // It has one core of its own.
                 config.controller.n_threads = 1;
             }
-            let setup =
-                ControlSetup { model, config, seed: arguments.drive.seed, period_s: 1.0 / arguments.rate };
-            control::run(&Bus::join(&arguments.run)?, setup, is_over)?;
+            let (seed, period_s) = (arguments.drive.seed, arguments.periods().control_s);
+            let setup = ControlSetup { model, config, seed, period_s, ages };
+            control::run(&join(arguments)?, setup, is_over)?;
         }
         Role::Recorder => {
-            let setup = recorder_setup(arguments, machine)?;
+            let setup = recorder_setup(arguments, machine, ages)?;
             std::fs::create_dir_all(&setup.folder)?;
-            recorder::run(&Bus::join(&arguments.run)?, setup, is_over, &mut |line| {
+            recorder::run(&join(arguments)?, setup, is_over, &mut |line| {
                 eprintln!("surefoot recorder: {line}");
             })?;
         }
@@ -100,7 +120,11 @@ pub(super) fn run(arguments: &UpArguments, role: Role) -> anyhow::Result<()> {
 const FILE_BYTES_MAX: u64 = 256 << 20;
 const FILE_TIME_MAX_S: f64 = 600.0;
 
-fn recorder_setup(arguments: &UpArguments, machine: Machine) -> anyhow::Result<RecorderSetup> {
+fn recorder_setup(
+    arguments: &UpArguments,
+    machine: Machine,
+    ages: AgeLimits,
+) -> anyhow::Result<RecorderSetup> {
     let Machine { vehicle, model, config, knowledge } = machine;
     let checkpoint_sha256 = match &knowledge.networks {
         Some(networks) => hexadecimal(&Sha256::digest(networks.weights_bytes()?)),
@@ -109,6 +133,8 @@ fn recorder_setup(arguments: &UpArguments, machine: Machine) -> anyhow::Result<R
     let vehicle_name = vehicle.name.clone();
     let [vehicle_toml, model_toml, config_toml] = MachineSetup { vehicle, model, config }.texts()?;
     let setup = RecordedSetup {
+        format: RecordedSetup::FORMAT,
+        clock: ClockAnchor::now(),
         vehicle_name,
         vehicle_toml,
         model_toml,
@@ -117,10 +143,18 @@ fn recorder_setup(arguments: &UpArguments, machine: Machine) -> anyhow::Result<R
         checkpoint_sha256,
         alpha: arguments.drive.alpha,
         seed: arguments.drive.seed.to_string(),
+        ages,
         revision: revision().to_owned(),
     };
     let folder = arguments.drive.out.clone();
-    Ok(RecorderSetup { folder, setup, file_bytes_max: FILE_BYTES_MAX, file_time_max_s: FILE_TIME_MAX_S })
+    Ok(RecorderSetup {
+        folder,
+        setup,
+        file_bytes_max: FILE_BYTES_MAX,
+        file_time_max_s: FILE_TIME_MAX_S,
+        quota_bytes: (arguments.record_quota * 1e6) as u64,
+        sync_interval_s: arguments.record_sync,
+    })
 }
 
 fn hexadecimal(bytes: &[u8]) -> String {
@@ -153,13 +187,14 @@ struct LiveSummary<'a> {
     path_length_m: f64,
     distance_to_goal_m: f64,
     cycles_stopped_by_watchdog: u64,
+    localisation_jumps: u64,
     seed: u64,
     vehicle: &'a str,
     world: &'a str,
     method: &'static str,
 }
 
-fn run_plant(arguments: &UpArguments, machine: &Machine) -> anyhow::Result<()> {
+fn run_plant(arguments: &UpArguments, machine: &Machine, ages: AgeLimits) -> anyhow::Result<()> {
     let task = scene::task(&arguments.drive, &machine.vehicle)?;
     let world = task.world.name.clone();
     let mut episode = EpisodeConfig::for_vehicle(&machine.vehicle);
@@ -172,25 +207,28 @@ fn run_plant(arguments: &UpArguments, machine: &Machine) -> anyhow::Result<()> {
         vehicle: &machine.vehicle,
         episode,
         seed: arguments.drive.seed,
-        command_age_max_s: arguments.command_age,
+        periods: arguments.periods(),
+        ages,
     };
-    let report = plant::run(&Bus::join(&arguments.run)?, setup, &interrupt::interrupted)?;
-    let PlantReport { outcome, time_s, path_length_m, distance_to_goal_m, n_stopped_by_watchdog } = report;
+    let report = plant::run(&join(arguments)?, setup, &interrupt::interrupted)?;
+    let PlantReport { outcome, time_s, path_length_m, distance_to_goal_m, .. } = report;
+    let summary = LiveSummary {
+        outcome,
+        duration_s: time_s,
+        path_length_m,
+        distance_to_goal_m,
+        cycles_stopped_by_watchdog: report.n_stopped_by_watchdog,
+        localisation_jumps: report.n_jumps,
+        seed: arguments.drive.seed,
+        vehicle: &machine.vehicle.name,
+        world: &world,
+        method: machine.knowledge.method.name(),
+    };
     std::fs::create_dir_all(&arguments.drive.out)?;
-    formats::write_json_atomic(
-        &arguments.drive.out.join("summary.json"),
-        &LiveSummary {
-            outcome,
-            duration_s: time_s,
-            path_length_m,
-            distance_to_goal_m,
-            cycles_stopped_by_watchdog: n_stopped_by_watchdog,
-            seed: arguments.drive.seed,
-            vehicle: &machine.vehicle.name,
-            world: &world,
-            method: machine.knowledge.method.name(),
-        },
-    )?;
+    let kept = arguments.drive.out.join("summary.json");
+    for path in std::iter::once(&kept).chain(&arguments.drive.json) {
+        formats::write_json_atomic(path, &summary)?;
+    }
     match outcome {
         Some(Outcome::Goal) | None => Ok(()),
         Some(outcome) => Err(WorkFailed(format!(

@@ -38,7 +38,7 @@ pub(super) struct PatchStencil {
 impl PatchStencil {
     /// The stencil for a rear axle's centre at `phase` (columns, rows in [0, 1)) of its base cell.
     pub fn new(layout: &FeatureLayout, resolution_m: f64, phase: [f64; 2], yaw_rad: f64) -> Self {
-        let (sin, cos) = yaw_rad.sin_cos();
+        let (sin, cos) = libm::sincos(yaw_rad);
         let place = |[forward_m, left_m]: [f64; 2]| {
             let turned_m = [cos * forward_m - sin * left_m, sin * forward_m + cos * left_m];
             [0, 1].map(|axis| phase[axis] + turned_m[axis] / resolution_m)

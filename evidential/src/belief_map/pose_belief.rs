@@ -76,7 +76,7 @@ impl BeliefLayers {
         stencil.lay_on(&self.ground, base);
         let mut features = Features::default();
         features.reserve(layout.n_features(), 1);
-        pulp::Arch::new().dispatch(Extract {
+        self.instructions.run(Extract {
             ground: &self.ground,
             line: Line { stencil: &stencil, base, n_lanes: 1 },
             first_lane: 0,

@@ -163,7 +163,7 @@ impl BeliefLayers {
             let cell = [line.first_col, line.row];
             let stencil = self.stencil(cell, line.yaw);
             let base = cell.map(|index| ratio.base(index));
-            pulp::Arch::new().dispatch(Extract {
+            self.instructions.run(Extract {
                 ground: &self.ground,
                 line: Line { stencil, base, n_lanes: line.n_lanes },
                 first_lane: line.first_lane,
@@ -203,7 +203,7 @@ impl BeliefLayers {
         }
         self.predictor.apply(&mut scratch.workspace);
         let stride = scratch.n_lanes_max;
-        pulp::Arch::new().dispatch(Fuse {
+        self.instructions.run(Fuse {
             fusion: &self.fusion,
             prediction: &scratch.workspace.prediction,
             moments: Moments { values: &scratch.moments, stride, first_lane },

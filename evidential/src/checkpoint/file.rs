@@ -3,14 +3,12 @@
 use std::collections::BTreeMap;
 
 use safetensors::tensor::{Dtype, SafeTensorError, SafeTensors, TensorView};
+use serde::Deserialize;
 use sha2::{Digest, Sha256};
 use traversability::Bins;
 
 use super::{Checkpoint, Sidecar, Tensor};
 use crate::FeatureLayout;
-
-/// Patches with more rows or columns than this are no patches of a footprint.
-const PATCH_SIDE_MAX: usize = 1024;
 
 /// Why bytes are no checkpoint, or one that does not fit.
 #[derive(Debug, thiserror::Error)]
@@ -71,20 +69,25 @@ fn require_positive(what: &str, values: &[f32]) -> Result<(), CheckpointError> {
 }
 
 impl Sidecar {
+    /// Reads the version first: what else stands in one of another version means something else, if anything.
+    fn read(json: &[u8]) -> Result<Self, CheckpointError> {
+        #[derive(Deserialize)]
+        struct Version {
+            format: u32,
+        }
+        let Version { format } = serde_json::from_slice(json).map_err(CheckpointError::Json)?;
+        require("format", &Self::FORMAT, &format)?;
+        serde_json::from_slice(json).map_err(CheckpointError::Json)
+    }
+
     /// Refuses what this program cannot use: another format or bins, lengths that contradict one another, numbers out
     /// of range.
     fn validate(&self) -> Result<(), CheckpointError> {
         require("format", &Self::FORMAT, &self.format)?;
         require("traction_bins", &Bins::TRACTION.values().to_vec(), &self.traction_bins)?;
         require("attitude_bins_rad", &Bins::ATTITUDE.values().to_vec(), &self.attitude_bins_rad)?;
-        for (name, patch) in [("height", self.layout.height_patch), ("cover", self.layout.cover_patch)] {
-            if patch.n_rows.max(patch.n_cols) > PATCH_SIDE_MAX {
-                return Err(CheckpointError::Mismatch {
-                    what: format!("layout, {name} patch"),
-                    expected: format!("at most {PATCH_SIDE_MAX} rows and columns"),
-                    found: format!("{} x {}", patch.n_rows, patch.n_cols),
-                });
-            }
+        if let Some((name, expected, found)) = self.layout.first_huge_patch() {
+            return Err(CheckpointError::Mismatch { what: format!("layout, {name} patch"), expected, found });
         }
         require_positive("layout, height_scale_m", &[self.layout.height_scale_m as f32])?;
         let n_features = self.layout.n_features();
@@ -149,7 +152,7 @@ impl Checkpoint {
     /// Truncated or other bytes, another format, weights of another hash than the sidecar's, other bins, shapes or
     /// lengths than the sidecar's architecture and layout demand, numbers that are not finite.
     pub fn from_bytes(weights: &[u8], sidecar: &[u8]) -> Result<Self, CheckpointError> {
-        let sidecar: Sidecar = serde_json::from_slice(sidecar).map_err(CheckpointError::Json)?;
+        let sidecar = Sidecar::read(sidecar)?;
         sidecar.validate()?;
         require("SHA-256 of the weights", &sidecar.weights_sha256, &sha256(weights))?;
         let mut tensors = BTreeMap::new();

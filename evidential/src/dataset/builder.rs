@@ -1,6 +1,7 @@
 //! From labels on a surface to examples.
 
 use bicycle::Geometry;
+use bicycle::lanes::Instructions;
 use physics_prior::{Assumption, PriorConfig, PriorField, PriorMapError};
 use terrain::{
     Footprint, GridGeometry, GridMap, SurfaceCell, WheelLayout, YawFootprint, footprint_unevenness,
@@ -49,7 +50,14 @@ impl Surveyor {
                 rear_m: geometry.rear_overhang_m,
                 half_width_m: 0.5 * geometry.width_m,
             },
-            prior: PriorField::new(geometry, &assumption, resolution_m, window, N_YAWS)?,
+            prior: PriorField::new(
+                geometry,
+                &assumption,
+                resolution_m,
+                window,
+                N_YAWS,
+                Instructions::widest(),
+            )?,
         })
     }
 

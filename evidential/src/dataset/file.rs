@@ -96,6 +96,9 @@ impl Dataset {
         }
         let Header { origin, .. } = serde_json::from_str(told)
             .map_err(|error| part("header, origin", "the origin of a dataset", error))?;
+        if let Some((name, expected, found)) = origin.layout.first_huge_patch() {
+            return Err(part("header, origin", format!("{name} patch: {expected}"), found));
+        }
         let tensors = SafeTensors::deserialize(bytes).map_err(container)?;
         let n = match tensors.tensor("features") {
             Ok(features) => features.shape().first().copied().unwrap_or(0),

@@ -7,7 +7,7 @@
 
 use pulp::Simd;
 
-use super::lanes::Lanes;
+use super::lanes::{Lanes, mul_add};
 
 /// Outputs that are accumulated in registers at a time.
 const ROWS: usize = 12;
@@ -74,15 +74,35 @@ impl Dense {
         for ((weights, biases), output) in tiles.zip(output[..self.n_outputs].chunks_mut(ROWS)) {
             let tile = Tile { weights, biases, slope };
             // As many sums as there are registers for; a short last tile needs fewer.
-            match (S::REGISTER_COUNT >= 32, output.len()) {
-                (true, 9..) => tile.apply::<12, 2>(simd, input, output),
-                (true, 5..=8) => tile.apply::<8, 2>(simd, input, output),
-                (true, _) => tile.apply::<4, 2>(simd, input, output),
-                (false, 9..) => tile.apply::<12, 1>(simd, input, output),
-                (false, 5..=8) => tile.apply::<8, 1>(simd, input, output),
-                (false, _) => tile.apply::<4, 1>(simd, input, output),
+            match (registers::<S>(), output.len()) {
+                (Registers::Many, 9..) => tile.apply::<12, 2>(simd, input, output),
+                (Registers::Many, 5..=8) => tile.apply::<8, 2>(simd, input, output),
+                (Registers::Many, _) => tile.apply::<4, 2>(simd, input, output),
+                (Registers::Few, 9..) => tile.apply::<12, 1>(simd, input, output),
+                (Registers::Few, 5..=8) => tile.apply::<8, 1>(simd, input, output),
+                (Registers::Few, _) => tile.apply::<4, 1>(simd, input, output),
+                (Registers::OfOne, 9..) => tile.apply::<12, 4>(simd, input, output),
+                (Registers::OfOne, 5..=8) => tile.apply::<8, 4>(simd, input, output),
+                (Registers::OfOne, _) => tile.apply::<4, 4>(simd, input, output),
             }
         }
+    }
+}
+
+/// What an instruction set has to add up in.
+enum Registers {
+    Many,
+    Few,
+    /// Of one number each: the compiler makes four of them one of the machine's.
+    OfOne,
+}
+
+#[inline(always)]
+const fn registers<S: Simd>() -> Registers {
+    match (S::F32_LANES, S::REGISTER_COUNT) {
+        (1, _) => Registers::OfOne,
+        (_, 32..) => Registers::Many,
+        _ => Registers::Few,
     }
 }
 
@@ -112,7 +132,7 @@ impl<S: Simd> Tile<'_, S> {
                 for row in 0..N {
                     let weight = simd.splat_f32s(weights[row]);
                     for v in 0..V {
-                        sums[row][v] = simd.mul_add_f32s(weight, values[v], sums[row][v]);
+                        sums[row][v] = mul_add(simd, weight, values[v], sums[row][v]);
                     }
                 }
             }
@@ -157,11 +177,14 @@ mod tests {
                 (0..n_inputs).map(|k| Lanes(std::array::from_fn(|lane| number(k * 3 + lane)))).collect();
             for (activation, slope) in [(Activation::Linear, 1.0), (Activation::Leaky(0.25), 0.25)] {
                 let layer = Dense::new(&weights, &biases, activation);
-                let (mut widest, mut plain) = (vec![Lanes::ZERO; n_outputs], vec![Lanes::ZERO; n_outputs]);
-                pulp::Arch::new().dispatch(Apply(&layer, &input, &mut widest));
+                let mut plain = vec![Lanes::ZERO; n_outputs];
                 pulp::WithSimd::with_simd(Apply(&layer, &input, &mut plain), pulp::Scalar);
-                assert_eq!(widest, plain);
-                for (output, lanes) in widest.iter().enumerate() {
+                for instructions in bicycle::lanes::Instructions::all() {
+                    let mut found = vec![Lanes::ZERO; n_outputs];
+                    instructions.run(Apply(&layer, &input, &mut found));
+                    assert_eq!(found, plain, "{instructions:?}");
+                }
+                for (output, lanes) in plain.iter().enumerate() {
                     for lane in 0..N_LANES {
                         let products =
                             (0..n_inputs).map(|k| weights[output * n_inputs + k] * input[k].0[lane]);

@@ -4,6 +4,9 @@ use pulp::Simd;
 
 use super::lanes::{Lanes, ln};
 
+/// ln(2 pi).
+const LN_TAU: f32 = 1.837_877;
+
 /// One layer: z + b h (z - centre) with h = 1 / (a + |z - centre|).
 #[derive(Clone, Debug)]
 struct Radial {
@@ -42,7 +45,7 @@ impl RadialFlow {
                 log_determinant = simd.add_f32s(log_determinant, more);
             }
             // That of the standard normal distribution, times -2.
-            let mut normal = simd.splat_f32s(self.n_latent as f32 * std::f32::consts::TAU.ln());
+            let mut normal = simd.splat_f32s(self.n_latent as f32 * LN_TAU);
             for z in latent.iter() {
                 let z = z.get::<S>(register);
                 normal = simd.add_f32s(normal, simd.mul_f32s(z, z));
@@ -78,5 +81,5 @@ impl Radial {
 }
 
 fn softplus(x: f64) -> f64 {
-    x.max(0.0) + (-x.abs()).exp().ln_1p()
+    x.max(0.0) + libm::log1p(libm::exp(-x.abs()))
 }

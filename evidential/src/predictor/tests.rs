@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
 use bicycle::Geometry;
+use bicycle::lanes::Instructions;
 use candle_core::{Device, Tensor};
 use rand::RngExt;
 use traversability::Bins;
@@ -73,7 +74,8 @@ fn both_forms_of_the_networks_agree() {
         let footprints: Vec<Vec<f32>> = (0..N_FOOTPRINTS)
             .map(|_| (0..n_features).map(|_| rng.random_range(-1.0..1.0)).collect())
             .collect();
-        let predictions = Predictor::new(&checkpoint).unwrap().predict(&footprints).unwrap();
+        let predictions =
+            Predictor::new(&checkpoint, Instructions::widest()).unwrap().predict(&footprints).unwrap();
         for (found, expected) in predictions.iter().zip(outputs(&network, &checkpoint, &footprints)) {
             for (pmf, logits) in found.pmfs.iter().zip(expected.chunks(12)) {
                 let sum: f32 = logits.iter().map(|logit| logit.exp()).sum();

@@ -1,6 +1,7 @@
 use std::sync::LazyLock;
 
 use bicycle::Geometry;
+use bicycle::lanes::Instructions;
 use physics_prior::PriorConfig;
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -240,7 +241,8 @@ fn fast_inference_says_what_the_trained_networks_say() {
     let outputs = run.network.outputs(&inputs).unwrap().to_vec2::<f32>().unwrap();
     let checkpoint = run.checkpoint(&TRAINING.origin, "here").unwrap();
     let footprints: Vec<&[f32]> = VALIDATION.examples.iter().map(|e| e.features.as_slice()).collect();
-    let predictions = Predictor::new(&checkpoint).unwrap().predict(&footprints).unwrap();
+    let predictions =
+        Predictor::new(&checkpoint, Instructions::widest()).unwrap().predict(&footprints).unwrap();
     for (output, prediction) in outputs.iter().zip(&predictions) {
         let evidence = prediction.evidence.unwrap();
         let log_density = output[4 * N_BINS + 4];

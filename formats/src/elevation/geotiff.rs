@@ -1,7 +1,7 @@
 //! Elevation as GeoTIFF: one band, square pixels, projected metres; pixel scale from tag 33550, place from tag 33922,
 //! the value of holes from GDAL's tag 42113. Rows come from the north and are turned over.
 
-use std::io::{Read, Seek};
+use std::io::{Read, Result as ReadResult, Seek, SeekFrom};
 
 use terrain::GridGeometry;
 use tiff::decoder::{Decoder, DecodingResult, Limits};
@@ -24,8 +24,9 @@ mod key {
 /// Longest value of a tag that is read: far above what tags of ours hold.
 const TAG_BYTES_MAX: usize = 1 << 20;
 
-pub(super) fn read(file: impl Read + Seek, n_bytes: u64) -> Result<ElevationFile, Refusal> {
+pub(super) fn read(mut file: impl Read + Seek, n_bytes: u64) -> Result<ElevationFile, Refusal> {
     let limit = CellLimit::of(n_bytes);
+    check_counts(&mut file, n_bytes)?;
     let decoder = Decoder::new(file).map_err(|error| broken("file", &error))?;
     let mut decoder = decoder.with_limits(limits(&limit));
     let (n_cols, n_rows) = decoder.dimensions().map_err(|error| broken("size", &error))?;
@@ -54,6 +55,52 @@ pub(super) fn read(file: impl Read + Seek, n_bytes: u64) -> Result<ElevationFile
     let heights_m: Vec<f32> = flip_rows(&heights_m.collect::<Vec<_>>(), n_cols).collect();
     let geometry = GridGeometry { resolution_m: cell_m, origin: [0, 0], n_rows, n_cols };
     Ok(ElevationFile { file_south_west_m, ..assemble("pixels", geometry, heights_m)? })
+}
+
+/// The decoder takes memory for as many values as an entry of the directory claims before it looks at its limits.
+fn check_counts(file: &mut (impl Read + Seek), n_bytes: u64) -> Result<(), Refusal> {
+    let most = largest_count(file).and_then(|most| file.rewind().map(|()| most));
+    let most = most.map_err(|error| Refusal::new("file", "a complete GeoTIFF", error))?;
+    let expected = || format!("at most {n_bytes} values for a tag, the bytes of the file");
+    if most > n_bytes { Err(Refusal::new("directory", expected(), most)) } else { Ok(()) }
+}
+
+/// The most values that an entry of the first directory claims. A file of another kind has none.
+fn largest_count(file: &mut (impl Read + Seek)) -> ReadResult<u64> {
+    let mut head = [0; 4];
+    file.read_exact(&mut head)?;
+    // Bytes of an offset and of a count, of the number of entries; the large kind says its own before the offset.
+    let (is_little, width, n_width) = match &head {
+        b"II*\0" => (true, 4, 2),
+        b"MM\0*" => (false, 4, 2),
+        b"II+\0" => (true, 8, 8),
+        b"MM\0+" => (false, 8, 8),
+        _ => return Ok(0),
+    };
+    if width == 8 {
+        word(file, 4, is_little)?;
+    }
+    let directory = word(file, width, is_little)?;
+    file.seek(SeekFrom::Start(directory))?;
+    let mut most = 0;
+    for _ in 0..word(file, n_width, is_little)? {
+        // Tag and type.
+        word(file, 4, is_little)?;
+        most = most.max(word(file, width, is_little)?);
+        // The values, or where they stand.
+        word(file, width, is_little)?;
+    }
+    Ok(most)
+}
+
+/// A whole number of up to eight bytes.
+fn word(file: &mut impl Read, n_bytes: usize, is_little: bool) -> ReadResult<u64> {
+    let mut bytes = [0; 8];
+    file.read_exact(&mut bytes[..n_bytes])?;
+    if !is_little {
+        bytes[..n_bytes].reverse();
+    }
+    Ok(u64::from_le_bytes(bytes))
 }
 
 /// Up to eight bytes for a cell, as it is decoded and as it is read.

@@ -8,11 +8,13 @@ mod messages;
 mod raw;
 mod read;
 mod scene;
+mod syncer;
 mod topics;
 mod watched_file;
 
 use std::collections::BTreeMap;
-use std::io::Write as _;
+use std::fs::File;
+use std::io::{self, ErrorKind, Write as _};
 use std::path::{Path, PathBuf};
 
 use bicycle::{Command, Decision, DriveRow};
@@ -23,9 +25,10 @@ use terrain::{GridMap, Pose, Scan, SurfaceCell};
 use traversability::RiskMapView;
 
 use raw::RawChannels;
+use syncer::Syncer;
 use watched_file::{Fault, WatchedFile};
 
-pub use messages::open_recording;
+pub use messages::{RecordedChannel, RecordedMessage, RecordingError, RecordingMessages, open_recording};
 pub use topics::DriveTopics;
 
 pub use read::{McapDriveLog, McapReadError, read_drive_log_mcap};
@@ -47,6 +50,12 @@ pub enum RecordError {
         path: PathBuf,
         /// What the system said.
         problem: String,
+    },
+    /// There is a file already, and it was not to be written over.
+    #[error("{}: expected a name that is free, found a file", path.display())]
+    Exists {
+        /// Path as given.
+        path: PathBuf,
     },
     /// A later write failed, e.g. because the disk is full; what was written before stays readable.
     #[error("{}: the recording ends here, a write failed: {problem}", path.display())]
@@ -75,6 +84,7 @@ pub struct DriveRecorder {
     path: PathBuf,
     writer: McapWriterHandle<WatchedFile>,
     fault: Fault,
+    syncer: Syncer,
     flushed_at_ns: Option<u64>,
     topics: DriveTopics,
     raw: RawChannels,
@@ -85,17 +95,31 @@ impl DriveRecorder {
     ///
     /// Errors: [`RecordError::Create`], also when the disk is full already.
     pub fn create(path: &Path, about: BTreeMap<String, String>) -> Result<Self, RecordError> {
-        let problem = |problem: String| RecordError::Create { path: path.to_owned(), problem };
-        let file = std::fs::File::create(path).map_err(|error| problem(error.to_string()))?;
-        Self::into_file(path, WatchedFile::new(file), about)
+        Self::into_file(path, File::create(path), about)
+    }
+
+    /// The same for a name that must be free. Errors: also [`RecordError::Exists`].
+    pub fn create_new(path: &Path, about: BTreeMap<String, String>) -> Result<Self, RecordError> {
+        match File::create_new(path) {
+            Err(error) if error.kind() == ErrorKind::AlreadyExists => {
+                Err(RecordError::Exists { path: path.to_owned() })
+            }
+            file => Self::into_file(path, file, about),
+        }
     }
 
     fn into_file(
         path: &Path,
-        file: WatchedFile,
+        file: io::Result<File>,
         about: BTreeMap<String, String>,
     ) -> Result<Self, RecordError> {
+        let refused =
+            |error: io::Error| RecordError::Create { path: path.to_owned(), problem: error.to_string() };
+        let file = file.map_err(refused)?;
+        let for_syncer = file.try_clone().map_err(refused)?;
+        let file = WatchedFile::new(file);
         let fault = file.fault();
+        let syncer = Syncer::start(for_syncer, fault.clone()).map_err(refused)?;
         let problem = |error: FoxgloveError| {
             let problem = fault.text().unwrap_or_else(|| error.to_string());
             RecordError::Create { path: path.to_owned(), problem }
@@ -107,7 +131,7 @@ impl DriveRecorder {
         writer.write_metadata("surefoot", about).map_err(problem)?;
         writer.flush().map_err(problem)?;
         let (topics, raw) = (DriveTopics::new(&context), RawChannels::new(context));
-        Ok(Self { path: path.to_owned(), writer, fault, flushed_at_ns: None, topics, raw })
+        Ok(Self { path: path.to_owned(), writer, fault, syncer, flushed_at_ns: None, topics, raw })
     }
 
     /// Where the vehicle is. Errors, here and below: [`RecordError::Write`].
@@ -192,16 +216,25 @@ impl DriveRecorder {
         self.json("/setup", at_ns, setup)
     }
 
-    /// Hands over to the system what was recorded so far; a crash after this costs none of it.
+    /// Hands over to the system what was recorded so far; a crash of this process after this costs none of it.
     pub fn flush(&mut self) -> Result<(), RecordError> {
         self.writer.flush().map_err(|error| self.failed(error.to_string()))?;
         self.fault.text().map_or(Ok(()), |problem| Err(self.failed(problem)))
     }
 
-    /// Writes the index and closes the file. One whose last writes failed is cut back to what is whole and ended there,
+    /// Flushes, and lets the system put all that onto the disk, beside further recording: once that is done, a crash of
+    /// the system costs none of it. A disk that is still at it from the last time is not asked again. What it says is
+    /// the error of a later call.
+    pub fn sync(&mut self) -> Result<(), RecordError> {
+        self.flush()?;
+        self.syncer.ask();
+        Ok(())
+    }
+
+    /// Writes the index, waits until all is on the disk and closes the file. One whose last writes failed is cut back to what is whole and ended there,
     /// without an index, where that much can still be written. Errors: [`RecordError::Write`].
     pub fn finish(self) -> Result<(), RecordError> {
-        let Self { path, writer, fault, .. } = self;
+        let Self { path, writer, fault, syncer, .. } = self;
         let problem = |problem: String| RecordError::Write { path: path.clone(), problem };
         let closed = writer.close();
         if let Some(text) = fault.text() {
@@ -210,7 +243,10 @@ impl DriveRecorder {
             return Err(problem(text));
         }
         let mut file = closed.map_err(|error| problem(error.to_string()))?;
-        file.flush().map_err(|error| problem(error.to_string()))
+        file.flush().map_err(|error| problem(error.to_string()))?;
+        syncer.ask();
+        drop(syncer);
+        fault.text().map_or(Ok(()), |text| Err(problem(text)))
     }
 
     fn json(&mut self, topic: &'static str, at_ns: u64, value: &impl Serialize) -> Result<(), RecordError> {
@@ -242,7 +278,6 @@ fn timestamp(at_ns: u64) -> Timestamp {
 
 #[cfg(all(test, unix))]
 mod tests {
-    use std::fs::File;
     use std::os::fd::OwnedFd;
     use std::os::unix::net::UnixStream;
 
@@ -251,9 +286,9 @@ mod tests {
     #[test]
     fn a_write_that_fails_during_the_drive_is_reported_and_stays_reported() {
         let (ours, theirs) = UnixStream::pair().unwrap();
-        let file = WatchedFile::new(File::from(OwnedFd::from(ours)));
+        let file = File::from(OwnedFd::from(ours));
         let path = Path::new("drive.mcap");
-        let mut recorder = DriveRecorder::into_file(path, file, BTreeMap::new()).unwrap();
+        let mut recorder = DriveRecorder::into_file(path, Ok(file), BTreeMap::new()).unwrap();
         recorder.pose(0, &Pose::default()).unwrap();
         drop(theirs);
         // The next flush is due one second of the drive later.
@@ -263,6 +298,37 @@ mod tests {
         assert!(recorder.pose(1_000_000_001, &Pose::default()).is_err());
         let message = recorder.finish().unwrap_err().to_string();
         assert!(message.contains("Broken pipe"), "the cause, not what followed from it: {message}");
+    }
+
+    /// A socket takes everything that is written and has no disk below: the system says so when it is asked to sync.
+    #[test]
+    #[cfg(target_os = "linux")]
+    fn what_was_flushed_is_put_onto_the_disk_and_a_failure_of_that_is_reported() {
+        let (ours, _theirs) = UnixStream::pair().unwrap();
+        let file = File::from(OwnedFd::from(ours));
+        let mut recorder =
+            DriveRecorder::into_file(Path::new("drive.mcap"), Ok(file), BTreeMap::new()).unwrap();
+        recorder.pose(0, &Pose::default()).unwrap();
+        recorder.flush().unwrap();
+        recorder.sync().unwrap();
+        let told = (1..10_000).find_map(|at_ns| {
+            // Gives way to the thread that asks for it.
+            std::thread::park_timeout(std::time::Duration::from_millis(1));
+            recorder.pose(at_ns, &Pose::default()).err()
+        });
+        let told = told.unwrap().to_string();
+        assert!(told.ends_with("a write failed: onto the disk: Invalid argument (os error 22)"), "{told}");
+    }
+
+    #[test]
+    fn a_recording_that_is_there_is_not_written_over() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("drive.mcap");
+        DriveRecorder::create_new(&path, BTreeMap::new()).unwrap().finish().unwrap();
+        let before = std::fs::read(&path).unwrap();
+        let told = DriveRecorder::create_new(&path, BTreeMap::new()).err().unwrap().to_string();
+        assert!(told.ends_with("drive.mcap: expected a name that is free, found a file"), "{told}");
+        assert_eq!(std::fs::read(&path).unwrap(), before);
     }
 
     #[test]

@@ -5,7 +5,8 @@ use std::path::Path;
 
 use bicycle::DriveLog;
 
-use super::{drive_row, open_recording};
+use super::drive_row::{self, Fields};
+use super::open_recording;
 
 /// A drive log from a recording.
 #[derive(Clone, Debug)]
@@ -39,7 +40,8 @@ pub enum McapReadError {
     },
 }
 
-/// Reads the drive log of a recording made by [`super::DriveRecorder`].
+/// Reads the drive log of a recording made by [`super::DriveRecorder`], of this version or another: its own schema says
+/// which column is which, and columns that this program does not know are passed over.
 ///
 /// A recording that breaks off or is damaged gives all rows before that place, and says so. Errors: the file cannot
 /// be opened, or holds no row at all.
@@ -52,10 +54,18 @@ pub fn read_drive_log_mcap(path: &Path) -> Result<McapDriveLog, McapReadError> {
     let mut topics = BTreeSet::new();
     let mut log = DriveLog::default();
     let mut ended_early = None;
+    let mut fields = None;
     for message in messages {
         let added = message.map_err(|error| error.to_string()).and_then(|message| {
             topics.insert(message.channel.topic.clone());
-            if message.channel.topic == drive_row::TOPIC { add_row(&mut log, &message.data) } else { Ok(()) }
+            if message.channel.topic != drive_row::TOPIC {
+                return Ok(());
+            }
+            if fields.is_none() {
+                let schema = Fields::of(&message.channel.schema_data);
+                fields = Some(schema.ok_or("messages without a schema of a drive log")?);
+            }
+            fields.as_ref().map_or(Ok(()), |fields| add_row(fields, &mut log, &message.data))
         });
         if let Err(problem) = added {
             ended_early = Some(format!("after {} rows: {problem}", log.n_rows()));
@@ -70,7 +80,7 @@ pub fn read_drive_log_mcap(path: &Path) -> Result<McapDriveLog, McapReadError> {
     Err(McapReadError::NoRows { file, topic: drive_row::TOPIC, found })
 }
 
-fn add_row(log: &mut DriveLog, bytes: &[u8]) -> Result<(), String> {
-    let (run, row) = drive_row::decode(bytes).ok_or("a message that is no row of a drive log")?;
+fn add_row(fields: &Fields, log: &mut DriveLog, bytes: &[u8]) -> Result<(), String> {
+    let (run, row) = fields.decode(bytes).ok_or("a message that is no row of a drive log")?;
     log.push(&run, &row).map_err(|error| error.to_string())
 }

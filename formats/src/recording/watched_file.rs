@@ -25,6 +25,13 @@ impl Fault {
         self.0.whole_bytes.load(Ordering::Relaxed)
     }
 
+    /// What came of putting the file onto its disk.
+    pub(super) fn note_sync(&self, result: Result<()>) {
+        if let Err(error) = result {
+            self.0.problem.get_or_init(|| format!("onto the disk: {error}"));
+        }
+    }
+
     fn note<T>(&self, result: Result<T>) -> Result<T> {
         if let Err(error) = &result
             && error.kind() != ErrorKind::Interrupted

@@ -21,6 +21,7 @@ fn relief_m(map: &GridMap<f32>) -> f32 {
 }
 
 #[test]
+#[ignore = "needs the shared data"]
 fn real_terrain_is_as_its_notes_say() {
     let cases = [
         ("lidr_topography.npz", 286, 286, 1.0, 25.8, 0.0),
@@ -40,6 +41,7 @@ fn real_terrain_is_as_its_notes_say() {
 }
 
 #[test]
+#[ignore = "needs the shared data"]
 fn the_forest_has_its_layers() {
     let layers = terrain_data("lidr_topography.npz").layers;
     let range = |map: &Option<GridMap<f32>>| {
@@ -92,6 +94,25 @@ fn npz_of_any_number_type_and_order_gives_the_same_hill() {
     let file = read_elevation(&path).unwrap();
     assert_eq!(file.elevation.values(), [1.0, -2.0, 300.0, 4.0]);
     assert_eq!(file.layers.water.unwrap().values(), [0.0, 1.0, 0.0, 0.0]);
+}
+
+#[test]
+fn layers_come_back_by_their_names_and_are_absent_where_they_are_not_there() {
+    let folder = Folder::new();
+    let layer = |first: f32| Array2::from_shape_fn((3, 4), |(row, col)| first + (4 * row + col) as f32);
+    let path = write_npz(&folder, |npz| {
+        npz.add_array("elevation", &hill()).unwrap();
+        npz.add_array("cell", &arr0(1.0_f64)).unwrap();
+        npz.add_array("canopy_height", &layer(100.0)).unwrap();
+        npz.add_array("low_veg_fraction", &layer(200.0)).unwrap();
+        npz.add_array("ground_gap", &layer(300.0)).unwrap();
+    });
+    let layers = read_elevation(&path).unwrap().layers;
+    let of = |map: Option<GridMap<f32>>| map.unwrap().values().to_vec();
+    assert_eq!(of(layers.canopy_height_m), layer(100.0).into_raw_vec_and_offset().0);
+    assert_eq!(of(layers.low_vegetation_fraction), layer(200.0).into_raw_vec_and_offset().0);
+    assert_eq!(of(layers.ground_gap_m), layer(300.0).into_raw_vec_and_offset().0);
+    assert!(layers.water.is_none());
 }
 
 #[test]

@@ -3,6 +3,7 @@
 use super::{Controller, LONGEST_STEPS};
 use crate::config::{Actuation, Temperature};
 use crate::judgement::Judge;
+use crate::kernel;
 use crate::objective::{Input, Objective, ReferencePath, ReferenceStep, Terminal, TerminalField};
 use crate::recovery::Mode;
 use crate::rollout::{GoalTask, Grid, MAX_SLOTS, Prices, RollOut, Scene, Start, Task};
@@ -113,10 +114,10 @@ impl Controller {
             start,
             key,
         };
-        let (machine, n_used) = (self.machine, self.n_used);
+        let (instructions, n_used) = (self.instructions, self.n_used);
         self.workers.run(&mut self.chunks, |index, chunk| {
             if index < n_used {
-                machine.run(Sample { sampler: &sampler, index, chunk });
+                kernel::run(instructions, Sample { sampler: &sampler, index, chunk });
             }
         });
     }
@@ -189,10 +190,10 @@ impl Controller {
             prices: self.prices(),
             task,
         };
-        let (machine, n_used) = (self.machine, self.n_used);
+        let (instructions, n_used) = (self.instructions, self.n_used);
         self.workers.run(&mut self.chunks, |index, chunk| {
             if index < n_used {
-                machine.run(RollOut { scene: &scene, chunk });
+                kernel::run(instructions, RollOut { scene: &scene, chunk });
             }
         });
     }
@@ -215,17 +216,17 @@ impl Controller {
             temperature: self.config.temperature,
             last_s: self.temperature_s,
         };
-        let summary = self.machine.run(work);
+        let summary = kernel::run(self.instructions, work);
         self.temperature_s = summary.temperature_s;
         summary
     }
 
     /// The weighted mean of all rollouts becomes the plan. Chunks are added in their order, whoever computed them.
     pub(super) fn average(&mut self, summary: &WeightSummary) {
-        let (machine, n_used) = (self.machine, self.n_used);
+        let (instructions, n_used) = (self.instructions, self.n_used);
         self.workers.run(&mut self.chunks, |index, chunk| {
             if index < n_used {
-                machine.run(Accumulate { chunk });
+                kernel::run(instructions, Accumulate { chunk });
             }
         });
         self.plan.nominal.fill([0.0; 2]);

@@ -49,7 +49,7 @@ const fn knight(towards: [isize; 2]) -> Edge {
 impl Edge {
     /// Heading along the edge [rad].
     pub fn yaw_rad(&self) -> f64 {
-        (self.towards[1] as f64).atan2(self.towards[0] as f64)
+        libm::atan2(self.towards[1] as f64, self.towards[0] as f64)
     }
 
     /// Distance in a row-major array between start and end.

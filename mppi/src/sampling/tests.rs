@@ -3,16 +3,16 @@
 
 use super::*;
 use crate::config::{Config, SampleSpace, Sampling};
-use crate::kernel::functions::key;
-use crate::kernel::{Isa, Machine};
+use crate::kernel::{self, functions::key};
 use crate::plan::Plan;
+use bicycle::lanes::Instructions;
 use nalgebra::{DMatrix, DVector};
 
 const N_STEPS: usize = 20;
 const STEP_S: f64 = 0.1;
 
-fn machines() -> Vec<Machine> {
-    [Isa::Portable, Isa::Avx2, Isa::Avx512].into_iter().filter_map(Machine::find).collect()
+fn machines() -> Vec<Instructions> {
+    Instructions::all().collect()
 }
 
 fn plan(space: SampleSpace, correlation_s: f64) -> Plan {
@@ -33,10 +33,10 @@ fn sampler(plan: &Plan) -> Sampler<'_> {
     }
 }
 
-fn sample(machine: Machine, sampler: &Sampler<'_>, n_chunks: usize) -> Vec<Chunk> {
+fn sample(machine: Instructions, sampler: &Sampler<'_>, n_chunks: usize) -> Vec<Chunk> {
     let mut chunks = vec![Chunk::new(N_STEPS); n_chunks];
     for (index, chunk) in chunks.iter_mut().enumerate() {
-        machine.run(Sample { sampler, index, chunk });
+        kernel::run(machine, Sample { sampler, index, chunk });
     }
     chunks
 }
@@ -92,7 +92,7 @@ fn coloured_noise_is_stationary_with_the_given_correlation_time() {
 fn every_instruction_set_draws_the_same() {
     let mut plan = plan(SampleSpace::Rates, 0.3);
     plan.prepare([0.4, 0.1], 0.2);
-    let reference = sample(Machine::Portable, &sampler(&plan), 4);
+    let reference = sample(Instructions::Portable, &sampler(&plan), 4);
     for machine in machines() {
         let chunks = sample(machine, &sampler(&plan), 4);
         for (a, b) in sequences(&chunks, 1).concat().iter().zip(sequences(&reference, 1).concat()) {

@@ -2,10 +2,11 @@
 #![allow(clippy::unwrap_used, reason = "a test that cannot be set up has failed")]
 
 use super::*;
-use crate::kernel::{Isa, Machine};
+use crate::kernel;
+use bicycle::lanes::Instructions;
 
-fn machines() -> Vec<Machine> {
-    [Isa::Portable, Isa::Avx2, Isa::Avx512].into_iter().filter_map(Machine::find).collect()
+fn machines() -> Vec<Instructions> {
+    Instructions::all().collect()
 }
 
 /// 256 costs between 3 and 12 s.
@@ -13,12 +14,12 @@ fn costs() -> Vec<f32> {
     (0..256u32).map(|i| 3.0 + 9.0 * ((i * 97 % 256) as f32 / 255.0).powi(2)).collect()
 }
 
-fn weigh(machine: Machine, costs: &[f32], temperature: Temperature) -> (Vec<Chunk>, WeightSummary) {
+fn weigh(machine: Instructions, costs: &[f32], temperature: Temperature) -> (Vec<Chunk>, WeightSummary) {
     let mut chunks = vec![Chunk::new(2); costs.len() / CHUNK];
     for (chunk, costs) in chunks.iter_mut().zip(costs.as_chunks::<CHUNK>().0) {
         chunk.costs.0 = *costs;
     }
-    let summary = machine.run(Weigh { chunks: &mut chunks, temperature, last_s: 1.0 });
+    let summary = kernel::run(machine, Weigh { chunks: &mut chunks, temperature, last_s: 1.0 });
     (chunks, summary)
 }
 

@@ -84,7 +84,8 @@ impl Drive {
     }
 
     fn decide(&mut self) -> Decision {
-        let chart = Chart { map: self.map.view(), time_to_goal: self.field.view() };
+        let (map, time_to_goal) = (self.map.view(), self.field.view());
+        let chart = Chart { map, time_to_goal, odometry_at_ns: u64::MAX };
         let destination = Destination { goal_m: self.goal_m, tolerance_m: 0.5 };
         let decision = self.pilot.decide(self.cycle * CYCLE_NS, Some(chart), &destination);
         self.cycle += 1;

@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "helpers of tests may panic as tests do")]
 
 use bicycle::Geometry;
+use bicycle::lanes::Instructions;
 use physics_prior::{Assumption, PriorConfig, PriorMap};
 use terrain::{Cell, GridGeometry, GridMap, SurfaceCell, TerrainClass};
 use traversability::{CvarLevel, Risk};
@@ -93,7 +94,9 @@ pub fn prior_map(
     n_yaws: usize,
 ) -> PriorMap {
     let window = *surface.geometry();
-    let mut map = PriorMap::new(geometry, assumption, window.resolution_m, window, n_yaws).unwrap();
+    let mut map =
+        PriorMap::new(geometry, assumption, window.resolution_m, window, n_yaws, Instructions::widest())
+            .unwrap();
     map.update_all(surface).unwrap();
     map
 }

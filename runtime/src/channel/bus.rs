@@ -1,20 +1,30 @@
 //! A process among the others of its run.
 
+mod folder;
+
 use std::os::unix::fs::MetadataExt;
 use std::str::FromStr;
 
 use iceoryx2::config::Config;
 use iceoryx2::node::{Node, NodeBuilder};
-use iceoryx2::prelude::{FileName, LogLevel, Path, SemanticString, SignalHandlingMode, ipc, set_log_level};
+use iceoryx2::port::publisher::PublisherCreateError;
+use iceoryx2::port::subscriber::SubscriberCreateError;
+use iceoryx2::prelude::{
+    FileName, LogLevel, Path, PortFactory as _, SemanticString, SignalHandlingMode, ipc, set_log_level,
+};
 use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
 
-use super::{Channel, ChannelError, Element, Header, Inlet, Outlet, PUBLISHERS_MAX};
-use crate::clock;
+use super::failures::Failures;
+use super::{Channel, ChannelError, Element, Header, Inlet, Outlet, THIRD_PARTIES};
+use crate::clock::{self, SECOND_NS};
 
 /// Where shared memory lies.
 const SHARED_MEMORY: &str = "/dev/shm";
-/// Where the files lie by which processes find one another.
-const ROOT: &str = "/tmp/surefoot";
+
+/// How long a publisher waits for the place of one that has just died [ns].
+const HAND_OVER_NS: u64 = SECOND_NS;
+/// Time between two looks whether that place is free [ns].
+const POLL_NS: u64 = SECOND_NS / 50;
 
 /// Name of a run: its processes find one another by it, and no others.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -50,72 +60,111 @@ impl std::fmt::Display for RunName {
 impl RunName {
     /// Start of the names of its files in shared memory.
     pub fn prefix(&self) -> String {
-        format!("{}{}_", Self::prefix_of_all(), self.0)
+        format!("{}{}_{}_", Self::prefix_of_all(), folder::user(), self.0)
     }
 
     const fn prefix_of_all() -> &'static str {
         "surefoot_"
     }
 
-    /// Folder of the files by which its processes find one another.
+    /// Folder of the files by which its processes find one another, in the one that its user has alone.
     pub fn folder(&self) -> String {
-        format!("{ROOT}/{}", self.0)
+        format!("{}/{}", folder::root(), self.0)
     }
 }
 
 /// The process's way to its channels.
 pub struct Bus {
     node: Node<ipc::Service>,
-    epoch_ns: u64,
+    n_third_parties: usize,
 }
+
+type Service<H, T> = PortFactory<ipc::Service, [T], H>;
 
 impl Bus {
     /// Joins the processes of a run; clears away what dead ones have left behind.
     ///
     /// # Errors
-    /// The folder of the run or the shared memory cannot be used.
+    /// The user's folder is not his alone, or the folder of the run or the shared memory cannot be used.
     pub fn join(run: &RunName) -> Result<Self, ChannelError> {
+        Self::join_with_room(run, THIRD_PARTIES)
+    }
+
+    /// The same for a run whose channels have so many places for readers beside its own. Whoever opens a channel first
+    /// decides, so all processes of a run are given the same number. A publisher reserves memory for every place: one
+    /// more costs each channel of maps 2 x depth + 1 maps.
+    pub fn join_with_room(run: &RunName, n_third_parties: usize) -> Result<Self, ChannelError> {
         // Failures come back as values; what else it says is for its own developers.
         set_log_level(LogLevel::Fatal);
         let refused = |problem: String| ChannelError::Join { run: run.to_string(), problem };
-        // Of the reasons why it may fail, this one has a name: another user's folder.
-        let folder = run.folder();
-        std::fs::create_dir_all(&folder).map_err(|error| refused(format!("{folder}: {error}")))?;
+        folder::claim(std::path::Path::new(&folder::root()), folder::user())?;
         let config = config(run).map_err(refused)?;
         let builder = NodeBuilder::new().config(&config).signal_handling_mode(SignalHandlingMode::Disabled);
         let node = builder.create::<ipc::Service>().map_err(|error| refused(error.to_string()))?;
-        Ok(Self { node, epoch_ns: clock::now_ns() })
+        Ok(Self { node, n_third_parties })
     }
 
-    /// When this process joined, which names its life [ns].
-    pub fn epoch_ns(&self) -> u64 {
-        self.epoch_ns
-    }
-
-    /// The way into a channel, for messages of up to `n_max` elements.
+    /// The way into a channel, for messages of up to `n_max` elements. There is one at a time, whatever process has it;
+    /// the place of one that has just died is waited for.
+    ///
+    /// # Errors
+    /// [`ChannelError::Taken`] while another process has it; too little memory; a channel of other types.
     pub fn outlet<H: Header, T: Element>(
         &self,
         channel: &Channel<H, T>,
         n_max: usize,
     ) -> Result<Outlet<H, T>, ChannelError> {
         let service = self.service(channel)?;
-        let n_samples = channel.n_readers * (2 * channel.depth + 1) + 2;
+        self.await_place(channel.name, &service)?;
+        let n_samples = service.static_config().max_subscribers() * (2 * channel.depth + 1) + 2;
         check_memory((n_samples * n_max * size_of::<T>()) as f64)?;
+        let failures = Failures::default();
         let publisher = service
             .publisher_builder()
             .initial_max_slice_len(n_max)
             .max_loaned_samples(1)
+            .set_degradation_handler(failures.handler())
             .create()
-            .map_err(|error| open_error(channel.name, error))?;
-        Ok(Outlet::new(channel.name, publisher, self.epoch_ns, n_max))
+            .map_err(|error| match error {
+                PublisherCreateError::ExceedsMaxSupportedPublishers => taken(channel.name),
+                error => open_error(channel.name, error),
+            })?;
+        // Later than that of every publisher before: the place was free only then.
+        Ok(Outlet::new(channel.name, publisher, failures, (clock::now_ns(), n_max)))
+    }
+
+    /// Waits for the place of a publisher that may just have died.
+    fn await_place<H: Header, T: Element>(
+        &self,
+        channel: &'static str,
+        service: &Service<H, T>,
+    ) -> Result<(), ChannelError> {
+        let until_ns = clock::now_ns() + HAND_OVER_NS;
+        while service.dynamic_config().number_of_publishers() > 0 {
+            if clock::now_ns() > until_ns {
+                return Err(taken(channel));
+            }
+            self.clear_dead();
+            clock::sleep_until(clock::now_ns() + POLL_NS);
+        }
+        Ok(())
     }
 
     /// The way out of a channel.
     pub fn inlet<H: Header, T: Element>(&self, channel: &Channel<H, T>) -> Result<Inlet<H, T>, ChannelError> {
         let service = self.service(channel)?;
+        let n_readers = service.static_config().max_subscribers();
+        let failures = Failures::default();
         let subscriber =
-            service.subscriber_builder().create().map_err(|error| open_error(channel.name, error))?;
-        Ok(Inlet::new(channel, subscriber))
+            service.subscriber_builder().set_degradation_handler(failures.handler()).create().map_err(
+                |error| match error {
+                    SubscriberCreateError::ExceedsMaxSupportedSubscribers => {
+                        ChannelError::Full { channel: channel.name, n_readers }
+                    }
+                    error => open_error(channel.name, error),
+                },
+            )?;
+        Ok(Inlet::new(channel, service, subscriber, failures))
     }
 
     /// Clears away what dead processes of the run have left behind; returns of how many.
@@ -123,25 +172,27 @@ impl Bus {
         self.node.try_cleanup_dead_nodes().cleanups
     }
 
-    fn service<H: Header, T: Element>(
-        &self,
-        channel: &Channel<H, T>,
-    ) -> Result<PortFactory<ipc::Service, [T], H>, ChannelError> {
+    fn service<H: Header, T: Element>(&self, channel: &Channel<H, T>) -> Result<Service<H, T>, ChannelError> {
         let name = channel.name.try_into().map_err(|error| open_error(channel.name, error))?;
-        // A reader may hold as many as can wait and one that it goes on using: so a flood of one publisher is passed
-        // over once its share is held, and the others are heard.
-        self.node
+        // A reader may hold as many as can wait and one that it goes on using: so a look ends, whatever comes meanwhile.
+        let service = self
+            .node
             .service_builder(&name)
             .publish_subscribe::<[T]>()
             .user_header::<H>()
-            .max_publishers(PUBLISHERS_MAX)
-            .max_subscribers(channel.n_readers)
+            .max_publishers(1)
+            .max_subscribers(channel.n_readers + self.n_third_parties)
             .subscriber_max_buffer_size(channel.depth)
             .subscriber_max_borrowed_samples(channel.depth + 1)
             .history_size(0)
             .enable_safe_overflow(true)
             .open_or_create()
-            .map_err(|error| open_error(channel.name, error))
+            .map_err(|error| open_error(channel.name, error))?;
+        // Whoever made it may have meant it for several: then its readers need not agree on whom they hear.
+        match service.static_config().max_publishers() {
+            1 => Ok(service),
+            n => Err(open_error(channel.name, format!("a channel of another program, for {n} publishers"))),
+        }
     }
 }
 
@@ -151,6 +202,10 @@ fn config(run: &RunName) -> Result<Config, String> {
     config.global.prefix = FileName::new(run.prefix().as_bytes()).map_err(problem)?;
     config.global.set_root_path(&Path::new(run.folder().as_bytes()).map_err(problem)?);
     Ok(config)
+}
+
+const fn taken(channel: &'static str) -> ChannelError {
+    ChannelError::Taken { channel }
 }
 
 fn open_error(channel: &'static str, error: impl std::fmt::Display) -> ChannelError {
@@ -189,7 +244,10 @@ mod tests {
 
     #[test]
     fn runs_have_plain_names() {
-        assert_eq!("field-2_b".parse::<RunName>().unwrap().prefix(), "surefoot_field-2_b_");
+        let run: RunName = "field-2_b".parse().unwrap();
+        let user = folder::user();
+        assert_eq!(run.prefix(), format!("surefoot_{user}_field-2_b_"));
+        assert_eq!(run.folder(), format!("/tmp/surefoot-{user}/field-2_b"));
         let long = "x".repeat(33);
         for wrong in ["", "a b", "../up", "a/b", "\u{e4}", &long] {
             assert!(wrong.parse::<RunName>().unwrap_err().to_string().contains("found"), "{wrong}");

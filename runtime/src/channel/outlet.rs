@@ -4,6 +4,7 @@ use iceoryx2::port::publisher::Publisher;
 use iceoryx2::prelude::ipc;
 use iceoryx2::sample_mut::SampleMut;
 
+use super::failures::Failures;
 use super::{ChannelError, Element, Header};
 use crate::clock;
 use crate::message::{LAYOUT_VERSION, Stamp};
@@ -12,6 +13,7 @@ use crate::message::{LAYOUT_VERSION, Stamp};
 pub struct Outlet<H: Header, T: Element> {
     channel: &'static str,
     publisher: Publisher<ipc::Service, [T], H>,
+    failures: Failures,
     epoch_ns: u64,
     n_sent: u64,
     n_max: usize,
@@ -41,10 +43,15 @@ impl<H: Header, T: Element> Outlet<H, T> {
     pub(super) fn new(
         channel: &'static str,
         publisher: Publisher<ipc::Service, [T], H>,
-        epoch_ns: u64,
-        n_max: usize,
+        failures: Failures,
+        (epoch_ns, n_max): (u64, usize),
     ) -> Self {
-        Self { channel, publisher, epoch_ns, n_sent: 0, n_max }
+        Self { channel, publisher, failures, epoch_ns, n_sent: 0, n_max }
+    }
+
+    /// Failures of the transport so far: readers that are there and could not be reached.
+    pub fn n_failed(&self) -> u64 {
+        self.failures.n()
     }
 
     /// Most elements of a message.

@@ -1,12 +1,13 @@
 //! Between the messages and what the pipeline is made of.
 
 use bicycle::{Column, Command, Decision, DriveRow, HoldReason, Odometry, StopReason};
-use terrain::{GridGeometry, RangePoint, Scan, TerrainClass};
+use navigator::Jump;
+use terrain::{GridGeometry, LATTICE_MAX, RangePoint, Scan, TerrainClass};
 
-use super::{CommandRecord, Grid, OdometryRecord, PointRecord, ScanHeader, Source, Stamp};
+use super::{CommandRecord, Grid, OdometryRecord, PointRecord, ScanHeader, Source, Stamp, SurfaceHeader};
 
 /// Reasons to stop; the first has the number 1.
-pub const STOP_REASONS: [StopReason; 7] = [
+pub const STOP_REASONS: [StopReason; 11] = [
     StopReason::StaleOdometry,
     StopReason::StaleScan,
     StopReason::NonFiniteInput,
@@ -14,9 +15,13 @@ pub const STOP_REASONS: [StopReason; 7] = [
     StopReason::NonFiniteResult,
     StopReason::OutsideMap,
     StopReason::StaleCommand,
+    StopReason::StaleMission,
+    StopReason::InputOutOfRange,
+    StopReason::InputOutOfOrder,
+    StopReason::InputFromFuture,
 ];
 /// Reasons to hold; the first has the number 1.
-pub const HOLD_REASONS: [HoldReason; 2] = [HoldReason::NoMap, HoldReason::AtGoal];
+pub const HOLD_REASONS: [HoldReason; 3] = [HoldReason::NoMap, HoldReason::AtGoal, HoldReason::NoMission];
 
 /// Numbers of [`CommandRecord::decision`].
 const DRIVE: u32 = 1;
@@ -25,8 +30,6 @@ const STOP: u32 = 3;
 
 /// Longest edge of a grid that is believed.
 const CELLS_MAX: u64 = 1 << 14;
-/// Farthest cell from the origin that is believed.
-const LATTICE_MAX: u64 = 1 << 40;
 
 impl Stamp {
     /// Names the message.
@@ -48,7 +51,7 @@ impl Grid {
         let Self { resolution_m, origin, n_rows, n_cols } = *self;
         let is_place = resolution_m.is_finite()
             && resolution_m > 0.0
-            && origin.iter().all(|index| index.unsigned_abs() <= LATTICE_MAX);
+            && origin.iter().all(|index| index.unsigned_abs() <= LATTICE_MAX.unsigned_abs());
         let is_size = |n: u64| (1..=CELLS_MAX).contains(&n);
         (is_place && is_size(n_rows) && is_size(n_cols)).then_some(GridGeometry {
             resolution_m,
@@ -138,18 +141,32 @@ impl ScanHeader {
     }
 }
 
+impl SurfaceHeader {
+    /// The jump of the localisation that it tells of.
+    pub fn jump(&self) -> Jump {
+        Jump { step_m: self.jump_m, yaw_rad: self.jump_yaw_rad }
+    }
+
+    /// All jumps so far together.
+    pub fn shift(&self) -> Jump {
+        Jump { step_m: self.shift_m, yaw_rad: self.shift_yaw_rad }
+    }
+}
+
 impl From<&Decision> for CommandRecord {
     fn from(decision: &Decision) -> Self {
         let standing = |decision, reason: Option<usize>| Self {
-            speed_mps: 0.0,
-            steering_rad: 0.0,
             decision,
             reason: reason.map_or(0, |place| place as u32 + 1),
+            ..Self::default()
         };
         match decision {
-            Decision::Drive(Command { speed_mps, steering_rad }) => {
-                Self { speed_mps: *speed_mps, steering_rad: *steering_rad, decision: DRIVE, reason: 0 }
-            }
+            Decision::Drive(Command { speed_mps, steering_rad }) => Self {
+                speed_mps: *speed_mps,
+                steering_rad: *steering_rad,
+                decision: DRIVE,
+                ..Self::default()
+            },
             Decision::Hold(reason) => standing(HOLD, HOLD_REASONS.iter().position(|known| known == reason)),
             Decision::Stop(reason) => standing(STOP, STOP_REASONS.iter().position(|known| known == reason)),
         }
@@ -157,6 +174,11 @@ impl From<&Decision> for CommandRecord {
 }
 
 impl CommandRecord {
+    /// With the times of what was decided on; see the fields.
+    pub fn decided_on(self, odometry_at_ns: u64, scan_at_ns: u64) -> Self {
+        Self { odometry_at_ns, scan_at_ns, ..self }
+    }
+
     /// The decision; `None` for a number that is none.
     pub fn decision(&self) -> Option<Decision> {
         let place = (self.reason as usize).wrapping_sub(1);
@@ -191,7 +213,7 @@ mod tests {
 
     #[test]
     fn numbers_that_are_no_decision_are_none() {
-        for (decision, reason) in [(0, 0), (4, 1), (2, 0), (2, 3), (3, 0), (3, 8), (u32::MAX, u32::MAX)] {
+        for (decision, reason) in [(0, 0), (4, 1), (2, 0), (2, 4), (3, 0), (3, 12), (u32::MAX, u32::MAX)] {
             let record = CommandRecord { decision, reason, ..CommandRecord::default() };
             assert_eq!(record.decision(), None, "{decision} {reason}");
         }

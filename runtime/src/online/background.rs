@@ -174,7 +174,7 @@ mod tests {
     fn stretch() -> Stretch {
         let geometry = GridGeometry { resolution_m: 0.5, origin: [0, 0], n_rows: 2, n_cols: 2 };
         let surface = GridMap::filled(geometry, SurfaceCell::UNKNOWN);
-        Stretch { rows: Vec::new(), surface, shift_m: [0.0; 2] }
+        Stretch { rows: Vec::new(), surface, shift: navigator::Jump::NONE }
     }
 
     #[test]

@@ -195,7 +195,7 @@ impl Learner {
                         continue;
                     };
                     // Where it was before the localisation ever jumped.
-                    (0..2).for_each(|axis| example.pose[axis] -= stretch.shift_m[axis]);
+                    example.pose = stretch.shift.inverse().pose(example.pose);
                     self.remember(example);
                 }
             }

@@ -3,6 +3,7 @@
 use std::collections::VecDeque;
 
 use bicycle::{Decision, DriveRow, Odometry};
+use navigator::Jump;
 use terrain::{GridMap, SurfaceCell};
 
 use crate::message::drive_row;
@@ -25,8 +26,8 @@ pub struct Stretch {
     pub rows: Vec<DriveRow>,
     /// The ground as it is known at the end.
     pub surface: GridMap<SurfaceCell>,
-    /// All jumps of the localisation before it: east, north [m].
-    pub shift_m: [f64; 2],
+    /// All jumps of the localisation before it together.
+    pub shift: Jump,
 }
 
 /// Collects rows; bounded, whatever comes in.
@@ -90,11 +91,11 @@ impl Notebook {
     }
 
     /// Hands on what was noted, with the ground below it.
-    pub fn take(&mut self, surface: GridMap<SurfaceCell>, shift_m: [f64; 2]) -> Stretch {
+    pub fn take(&mut self, surface: GridMap<SurfaceCell>, shift: Jump) -> Stretch {
         let rows: Vec<DriveRow> = self.rows.iter().map(|(_, row)| *row).collect();
         let lead_s = rows.last().map_or(0.0, |last| last.time_s - LEAD_S);
         self.rows.retain(|(_, row)| row.time_s >= lead_s);
-        Stretch { rows, surface, shift_m }
+        Stretch { rows, surface, shift }
     }
 }
 
@@ -134,7 +135,7 @@ mod tests {
         for at_ms in [20, 90, 110, 210] {
             notebook.note_odometry(&odometry(at_ms * 1_000_000));
         }
-        let rows = notebook.take(surface(), [0.0; 2]).rows;
+        let rows = notebook.take(surface(), Jump::NONE).rows;
         let speeds: Vec<f64> = rows.iter().map(|row| row.value(Column::CmdSpeed)).collect();
         assert_eq!(speeds, [1.0, 1.0, 2.0, 0.0]);
         assert!((rows[3].value(Column::CmdSteer) - 0.1).abs() < 1e-6, "the wheels stay as they are");
@@ -150,7 +151,7 @@ mod tests {
         assert!(!notebook.is_full());
         (300..=301).for_each(|k| notebook.note_odometry(&at(k)));
         assert!(notebook.is_full());
-        assert_eq!(notebook.take(surface(), [0.0; 2]).rows.len(), 302);
+        assert_eq!(notebook.take(surface(), Jump::NONE).rows.len(), 302);
         assert!((60..=62).contains(&notebook.n_rows()), "{}", notebook.n_rows());
         // Without maps, with a flood, or with garbage.
         (302..9000).for_each(|k| notebook.note_odometry(&at(k)));

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use bicycle::SensorModel;
 use evidential::{Checkpoint, Unfamiliar};
+use navigator::Jump;
 
 use super::background::{Background, Judge, News};
 use super::learner::{Learner, LearnerSetup, Round};
@@ -47,7 +48,7 @@ pub struct School {
     background: Background,
     sensors: SensorModel,
     /// Life of the mapping, and all jumps that it has made out.
-    shift: Option<(u64, [f64; 3])>,
+    shift: Option<(u64, Jump)>,
     in_use: Option<(CheckpointHeader, Vec<u8>)>,
     told_at_ns: u64,
 }
@@ -91,15 +92,14 @@ impl School {
 
     /// Looks at a map of the ground that was judged: when enough has been noted, it is handed on with that map.
     pub fn note_surface(&mut self, header: &SurfaceHeader, payload: &[[f32; 8]]) {
-        let shift = Some((header.stamp.epoch_ns, header.shift_m));
+        let shift = Some((header.stamp.epoch_ns, header.shift()));
         if std::mem::replace(&mut self.shift, shift) != shift {
             self.notebook.break_off();
         }
         if self.notebook.is_full()
             && let Some(surface) = payload::surface_map(header, payload)
         {
-            let [east_m, north_m, _] = header.shift_m;
-            self.background.offer(self.notebook.take(surface, [east_m, north_m]));
+            self.background.offer(self.notebook.take(surface, header.shift()));
         }
     }
 

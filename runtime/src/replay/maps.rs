@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use bicycle::SensorModel;
-use navigator::{Assessor, Belief, Jump, NavigatorError, Surface, Surveyor};
+use navigator::{Assessor, Belief, NavigatorError, Surface, Surveyor};
 use traversability::CvarLevel;
 
 use super::records::{Key, Records};
@@ -153,7 +153,7 @@ impl<'a> Maps<'a> {
             };
             surveyor.fuse(&odometry, &scan.scan(points))?;
         } else {
-            surveyor.follow_jump(&odometry, &Jump { step_m: header.jump_m })?;
+            surveyor.follow_jump(&odometry, &header.jump())?;
         }
         let cells: Vec<[f32; 8]> = surveyor.surface().values().iter().map(cell_numbers).collect();
         if content_hash(&cells) != header.content_hash {

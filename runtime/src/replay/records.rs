@@ -2,27 +2,21 @@
 
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
-use std::fs::File;
-use std::io::BufReader;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use bytemuck::AnyBitPattern;
 use evidential::Checkpoint;
-use mcap::io::MessageReader;
-use mcap::sans_io::LinearReaderOptions;
 
 use crate::channel::Header;
 use crate::message::{
-    CheckpointHeader, DecisionRecord, OdometryRecord, PointRecord, RiskHeader, ScanHeader, Source, Stamp,
-    StuckRecord, SurfaceHeader,
+    CheckpointHeader, DecisionRecord, LAYOUT_VERSION, MissionRecord, OdometryRecord, PointRecord, RiskHeader,
+    ScanHeader, Source, Stamp, StuckRecord, SurfaceHeader,
 };
+use crate::mission::Mission;
 use crate::online::hash_of;
 use crate::recorder::topic;
 use crate::setup::RecordedSetup;
-
-/// Longest record that is believed: far above what recorders write.
-const RECORD_BYTES_MAX: usize = 1 << 28;
 
 /// A message, by its publisher's life and its number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -54,6 +48,8 @@ pub struct Records {
     pub risks: [BTreeMap<Key, RiskHeader>; 2],
     /// Stuck poses.
     pub stuck: BTreeMap<Key, (Stamp, StuckRecord)>,
+    /// What was said of where to go.
+    pub missions: BTreeMap<Key, (Stamp, MissionRecord)>,
     /// Decisions.
     pub decisions: BTreeMap<Key, DecisionRecord>,
     /// Networks that were learned while driving, by [`RiskHeader::checkpoint`].
@@ -64,12 +60,71 @@ pub struct Records {
 
 /// A recording that cannot be read.
 #[derive(Debug, thiserror::Error)]
-#[error("{file}: expected a readable file, found: {source}")]
-pub struct ReadError {
-    /// Path as given.
-    pub file: String,
-    /// What the system said.
-    pub source: std::io::Error,
+pub enum ReadError {
+    /// The file cannot be opened.
+    #[error("{file}: expected a readable file, found: {source}")]
+    Unreadable {
+        /// Path as given.
+        file: String,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// It was made by another version of the program, whose numbers mean something else.
+    #[error(
+        "{file}: expected {what} of version {expected}, found version {found}; replay it with the program that made it"
+    )]
+    Version {
+        /// Path as given.
+        file: String,
+        /// What is of another version: the recording, or the messages of a topic.
+        what: String,
+        /// The version that this program reads.
+        expected: u32,
+        /// The version that is there.
+        found: u32,
+    },
+    /// Its setup is none.
+    #[error("{file}: expected the setup of a recording, found: {problem}")]
+    Setup {
+        /// Path as given.
+        file: String,
+        /// What the reader said.
+        problem: String,
+    },
+    /// It is of another run than the files before it.
+    #[error("{file}: expected a file of the same run as those before it, found another setup")]
+    OtherRun {
+        /// Path as given.
+        file: String,
+    },
+}
+
+/// Why a message is not taken.
+#[derive(Debug, PartialEq)]
+enum Untaken {
+    /// It is none: the recording breaks off here.
+    Broken,
+    /// It is of another version.
+    Version { what: String, expected: u32, found: u32 },
+    /// It is a setup that this program does not know.
+    Setup(String),
+    /// It is the setup of another run.
+    OtherRun,
+}
+
+impl Untaken {
+    /// As the error of a file; `None` for what is only its end.
+    fn into_error(self, file: &str) -> Option<ReadError> {
+        let file = file.to_owned();
+        match self {
+            Self::Broken => None,
+            Self::Version { what, expected, found } => {
+                Some(ReadError::Version { file, what, expected, found })
+            }
+            Self::Setup(problem) => Some(ReadError::Setup { file, problem }),
+            Self::OtherRun => Some(ReadError::OtherRun { file }),
+        }
+    }
 }
 
 impl Records {
@@ -82,19 +137,27 @@ impl Records {
         Ok(records)
     }
 
+    /// What a decision knew of where to go; says which message is missing.
+    pub fn mission(&self, source: Source) -> Result<Mission, String> {
+        let mut mission = Mission::default();
+        if source != Source::default() {
+            let (stamp, record) =
+                self.missions.get(&source.into()).ok_or_else(|| format!("mission {}", source.sequence))?;
+            mission.note(stamp, record);
+        }
+        Ok(mission)
+    }
+
     fn read_file(&mut self, path: &Path) -> Result<(), ReadError> {
         let file = path.display().to_string();
-        let source = File::open(path).map_err(|source| ReadError { file: file.clone(), source })?;
-        let options = LinearReaderOptions::default()
-            .with_record_length_limit(RECORD_BYTES_MAX)
-            .with_prevalidate_chunk_crcs(true);
-        for message in MessageReader::new_with_options(BufReader::new(source), options) {
+        let unreadable = |source| ReadError::Unreadable { file: file.clone(), source };
+        for message in formats::open_recording(path).map_err(unreadable)? {
             match message {
                 Ok(message) => {
-                    if self.take(&message.channel.topic, &message.data).is_none() {
-                        let topic = &message.channel.topic;
+                    let topic = &message.channel.topic;
+                    if let Err(untaken) = self.take(topic, &message.data) {
                         self.ended_early = Some(format!("{file}: a message on {topic} that is none"));
-                        break;
+                        return untaken.into_error(&file).map_or(Ok(()), Err);
                     }
                 }
                 Err(error) => {
@@ -106,12 +169,37 @@ impl Records {
         Ok(())
     }
 
+    fn take(&mut self, name: &str, bytes: &[u8]) -> Result<(), Untaken> {
+        if name == topic::SETUP {
+            return self.take_setup(bytes);
+        }
+        if !name.starts_with(topic::CHANNELS) {
+            return Ok(());
+        }
+        let stamp = recorded_stamp(bytes).ok_or(Untaken::Broken)?;
+        require_version(|| format!("messages on {name}"), LAYOUT_VERSION, stamp.layout_version)?;
+        self.take_message(name, bytes).ok_or(Untaken::Broken)
+    }
+
+    /// It comes first in a file, before anything that is of its version.
+    fn take_setup(&mut self, bytes: &[u8]) -> Result<(), Untaken> {
+        let found = RecordedSetup::format_of(bytes).ok_or(Untaken::Broken)?;
+        require_version(|| "a recording".to_owned(), RecordedSetup::FORMAT, found)?;
+        let setup: RecordedSetup =
+            serde_json::from_slice(bytes).map_err(|error| Untaken::Setup(error.to_string()))?;
+        if self.setup.as_ref().is_some_and(|before| !before.is_of_same_run(&setup)) {
+            return Err(Untaken::OtherRun);
+        }
+        self.setup.get_or_insert(setup);
+        Ok(())
+    }
+
     /// `None` for bytes that are no message of the topic.
-    fn take(&mut self, name: &str, bytes: &[u8]) -> Option<()> {
+    fn take_message(&mut self, name: &str, bytes: &[u8]) -> Option<()> {
         match name {
-            topic::SETUP => self.setup = serde_json::from_slice(bytes).ok(),
             topic::ODOMETRY => put(&mut self.odometry, one(bytes)?),
             topic::STUCK => put(&mut self.stuck, one(bytes)?),
+            topic::MISSION => put(&mut self.missions, one(bytes)?),
             topic::DECISION => {
                 let (stamp, decision): (Stamp, DecisionRecord) = one(bytes)?;
                 self.decisions.insert(stamp.source().into(), decision);
@@ -147,6 +235,11 @@ impl Records {
     }
 }
 
+/// Refuses what is of another version.
+fn require_version(what: impl FnOnce() -> String, expected: u32, found: u32) -> Result<(), Untaken> {
+    if expected == found { Ok(()) } else { Err(Untaken::Version { what: what(), expected, found }) }
+}
+
 fn put<T>(records: &mut BTreeMap<Key, (Stamp, T)>, (stamp, record): (Stamp, T)) {
     records.insert(stamp.source().into(), (stamp, record));
 }
@@ -179,18 +272,81 @@ fn split<H: Header, T: AnyBitPattern>(bytes: &[u8]) -> Option<(H, Vec<T>)> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::ages::{AgeLimits, Periods};
+    use navigator::GuardConfig;
+
+    fn message(stamp: &Stamp, record: &OdometryRecord) -> Vec<u8> {
+        [bytemuck::bytes_of(stamp), bytemuck::bytes_of(record)].concat()
+    }
 
     #[test]
     fn messages_are_read_back_as_they_were_and_garbage_is_none() {
-        let stamp = Stamp { epoch_ns: 7, sequence: 3, ..Stamp::default() };
+        let stamp = Stamp { layout_version: LAYOUT_VERSION, epoch_ns: 7, sequence: 3, ..Stamp::default() };
         let odometry = OdometryRecord { yaw_rate_radps: 0.5, ..OdometryRecord::default() };
-        let mut bytes = bytemuck::bytes_of(&stamp).to_vec();
-        bytes.extend(bytemuck::bytes_of(&odometry));
+        let bytes = message(&stamp, &odometry);
         let mut records = Records::default();
-        assert_eq!(records.take(topic::ODOMETRY, &bytes), Some(()));
+        assert_eq!(records.take(topic::ODOMETRY, &bytes), Ok(()));
         assert_eq!(records.odometry[&Key { epoch_ns: 7, sequence: 3 }], (stamp, odometry));
-        assert_eq!(records.take(topic::ODOMETRY, &bytes[1..]), None);
-        assert_eq!(records.take(topic::SCAN, &bytes[..9]), None);
-        assert_eq!(records.take("/pose", b"anything"), Some(()), "other topics are for people");
+        assert_eq!(records.take(topic::ODOMETRY, &bytes[..bytes.len() - 1]), Err(Untaken::Broken));
+        assert_eq!(records.take(topic::SCAN, &bytes[..9]), Err(Untaken::Broken));
+        assert_eq!(records.take("/pose", b"anything"), Ok(()), "other topics are for people");
+    }
+
+    #[test]
+    fn messages_of_another_layout_are_refused_with_both_versions() {
+        for found in [0, LAYOUT_VERSION - 1, LAYOUT_VERSION + 1] {
+            let stamp = Stamp { layout_version: found, sequence: 1, ..Stamp::default() };
+            let mut records = Records::default();
+            let untaken =
+                records.take(topic::ODOMETRY, &message(&stamp, &OdometryRecord::default())).unwrap_err();
+            let told = untaken.into_error("drive-000.mcap").unwrap().to_string();
+            let expected = format!(
+                "drive-000.mcap: expected messages on /channel/odometry of version {LAYOUT_VERSION}, found version \
+                 {found}; replay it with the program that made it"
+            );
+            assert_eq!(told, expected);
+            assert!(records.odometry.is_empty());
+        }
+    }
+
+    #[test]
+    fn setups_of_another_version_or_run_are_refused() {
+        let setup = RecordedSetup {
+            format: RecordedSetup::FORMAT,
+            clock: crate::setup::ClockAnchor::now(),
+            vehicle_name: "rc_car".to_owned(),
+            vehicle_toml: String::new(),
+            model_toml: String::new(),
+            config_toml: String::new(),
+            ages: AgeLimits::new(&Periods::default(), &GuardConfig::default(), None).unwrap(),
+            method: "physics".to_owned(),
+            checkpoint_sha256: String::new(),
+            alpha: 0.6,
+            seed: "1".to_owned(),
+            revision: String::new(),
+        };
+        let mut records = Records::default();
+        let mut json = serde_json::to_value(&setup).unwrap();
+        let take = |records: &mut Records, json: &serde_json::Value| {
+            records.take(topic::SETUP, &serde_json::to_vec(json).unwrap())
+        };
+        assert_eq!(take(&mut records, &json), Ok(()));
+        json["clock"]["utc_ns"] = "1".into();
+        assert_eq!(take(&mut records, &json), Ok(()), "every file has its own moment");
+        json["alpha"] = 0.7.into();
+        assert_eq!(take(&mut records, &json), Err(Untaken::OtherRun));
+        // As it was before there were versions: without one, and without the clocks.
+        let mut first = json.clone();
+        let fields = first.as_object_mut().unwrap();
+        fields.remove("format");
+        fields.remove("clock");
+        let told =
+            take(&mut Records::default(), &first).unwrap_err().into_error("old.mcap").unwrap().to_string();
+        let expected = format!("expected a recording of version {}, found version 1", RecordedSetup::FORMAT);
+        assert!(told.starts_with("old.mcap: ") && told.contains(&expected), "{told}");
+        json["surplus"] = 1.into();
+        let told =
+            take(&mut Records::default(), &json).unwrap_err().into_error("odd.mcap").unwrap().to_string();
+        assert!(told.contains("surplus"), "{told}");
     }
 }

@@ -14,6 +14,11 @@ pub enum SensorFault {
     MissingScan,
     /// The localisation corrects itself: from now on the position is off by this [m].
     PoseJump([f64; 2]),
+    /// The localisation corrects its heading: from now on what it tells is turned about this place of the map [m] by
+    /// this angle [rad].
+    PoseTurn([f64; 2], f64),
+    /// Every return comes from this place in the body frame [m]: a cover over the sensor, or nothing but the sky's edge.
+    ReturnsFrom([f32; 3]),
     /// Pose and velocity stay what they were; the stamp, the wheels' speed and the steering go on.
     FrozenOdometry,
     /// The last message is repeated with its old stamp.
@@ -49,7 +54,11 @@ impl Fault {
                     point.position_m[k / 3 % 3] = if k % 2 == 0 { f32::NAN } else { f32::INFINITY };
                 }
             }
+            SensorFault::ReturnsFrom(place_m) => {
+                scan.points.iter_mut().for_each(|point| point.position_m = place_m);
+            }
             SensorFault::PoseJump(_)
+            | SensorFault::PoseTurn(..)
             | SensorFault::FrozenOdometry
             | SensorFault::SilentOdometry
             | SensorFault::NonFiniteOdometry => {}
@@ -64,13 +73,23 @@ impl Fault {
                 odometry.position_m[0] += east_m;
                 odometry.position_m[1] += north_m;
             }
+            SensorFault::PoseTurn([x_m, y_m], yaw_rad) => {
+                let [east_m, north_m, _] = odometry.position_m;
+                let ([dx_m, dy_m], (sin, cos)) = ([east_m - x_m, north_m - y_m], yaw_rad.sin_cos());
+                odometry.position_m[0] = x_m + cos * dx_m - sin * dy_m;
+                odometry.position_m[1] = y_m + sin * dx_m + cos * dy_m;
+                odometry.attitude_rad[2] += yaw_rad;
+            }
             SensorFault::FrozenOdometry => {
                 let Odometry { valid_at_ns, wheel_speed_mps, steering_rad, .. } = odometry;
                 odometry = Odometry { valid_at_ns, wheel_speed_mps, steering_rad, ..*last };
             }
             SensorFault::SilentOdometry => odometry = *last,
             SensorFault::NonFiniteOdometry => odometry.attitude_rad[2] = f64::NAN,
-            SensorFault::NonFinitePoints | SensorFault::EmptyScan | SensorFault::MissingScan => {}
+            SensorFault::NonFinitePoints
+            | SensorFault::EmptyScan
+            | SensorFault::MissingScan
+            | SensorFault::ReturnsFrom(_) => {}
         }
         odometry
     }

@@ -54,8 +54,10 @@ pub(super) struct CellState {
     /// Points of each class, capped.
     pub evidence: [f32; TerrainClass::COUNT],
     pub ground: Ground,
-    /// Scans in a row whose rays passed below what is stored.
-    pub contradictions: u8,
+    /// Scans in a row that contradict the height of the ground.
+    pub ground_contradictions: u8,
+    /// Scans in a row that show nothing where an obstacle stood.
+    pub obstacle_contradictions: u8,
 }
 
 /// Share of an innovation that a cell's spread and its variance take over when it is far outside both.
@@ -77,7 +79,8 @@ impl CellState {
         ceiling_m: f32::INFINITY,
         evidence: [0.0; TerrainClass::COUNT],
         ground: Ground::Unseen,
-        contradictions: 0,
+        ground_contradictions: 0,
+        obstacle_contradictions: 0,
     };
 
     /// The same cell `by_m` higher.
@@ -130,6 +133,7 @@ impl CellState {
         if touching.clone().next().is_none() {
             return self.hang(points, config);
         }
+        self.ground_contradictions = 0;
         let highest_m = touching.clone().fold(f32::NEG_INFINITY, |high, p| high.max(p.height_m));
         self.fade_obstacle(highest_m, config);
         let rigid = touching.clone().filter(|p| p.is_rigid());
@@ -161,8 +165,8 @@ impl CellState {
         if !points.iter().all(CellPoint::is_rigid) {
             return;
         }
-        self.contradictions = self.contradictions.saturating_add(1);
-        if self.contradictions >= config.ghost_scans {
+        self.ground_contradictions = self.ground_contradictions.saturating_add(1);
+        if self.ground_contradictions >= config.ghost_scans {
             *self = Self::NEW;
             self.fuse(points, f32::NAN, config);
         }
@@ -173,11 +177,13 @@ impl CellState {
         if self.ground == Ground::Unseen {
             self.ceiling_m = self.ceiling_m.min(height_m);
         } else if height_m < self.ground_m - self.margin_m(config) {
-            self.contradictions = self.contradictions.saturating_add(1);
-            if self.contradictions >= config.ghost_scans {
+            self.ground_contradictions = self.ground_contradictions.saturating_add(1);
+            if self.ground_contradictions >= config.ghost_scans {
                 *self = Self { ceiling_m: height_m, ..Self::NEW };
             }
             return;
+        } else {
+            self.ground_contradictions = 0;
         }
         self.fade_obstacle(height_m, config);
     }
@@ -186,12 +192,12 @@ impl CellState {
     /// sparse rays miss a thin trunk in one scan and hit it in the next.
     fn fade_obstacle(&mut self, highest_m: f32, config: &ElevationConfig) {
         if highest_m >= self.obstacle_top_m - config.visibility_margin_m {
-            self.contradictions = 0;
+            self.obstacle_contradictions = 0;
             return;
         }
-        self.contradictions = self.contradictions.saturating_add(1);
+        self.obstacle_contradictions = self.obstacle_contradictions.saturating_add(1);
         let evidence = &mut self.evidence[TerrainClass::Obstacle as usize];
-        if self.contradictions >= config.ghost_scans {
+        if self.obstacle_contradictions >= config.ghost_scans {
             *evidence *= 0.5;
         }
         if *evidence < 1.0 {
@@ -270,5 +276,52 @@ impl CellState {
         if is_surprise {
             self.variance_m2 += SURPRISE_GAIN * between_scans_m2;
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const CONFIG_SCANS: u8 = 2;
+
+    fn config() -> ElevationConfig {
+        ElevationConfig { ghost_scans: CONFIG_SCANS, visibility_margin_m: 0.1, ..ElevationConfig::default() }
+    }
+
+    fn points(height_m: f32, class: TerrainClass, n: usize) -> Vec<CellPoint> {
+        vec![CellPoint { place: [0.5; 2], height_m, variance_m2: 1e-4, shared_m2: 0.0, class }; n]
+    }
+
+    /// Ground at zero with eight points of an obstacle of 1.5 m, each seen in two scans.
+    fn ground_with_obstacle() -> CellState {
+        let mut cell = CellState::NEW;
+        let both = [points(0.0, TerrainClass::Open, 9), points(1.5, TerrainClass::Obstacle, 8)].concat();
+        cell.fuse(&both, f32::NAN, &config());
+        cell.fuse(&both, 0.0, &config());
+        assert_eq!((cell.ground, cell.obstacle_top_m), (Ground::Seen, 1.5));
+        cell
+    }
+
+    #[test]
+    fn an_obstacle_that_is_missed_once_is_no_word_against_the_ground() {
+        let mut cell = ground_with_obstacle();
+        // Nothing at the obstacle's height; then one ray far below the ground.
+        cell.fuse(&points(0.0, TerrainClass::Open, 3), 0.0, &config());
+        cell.pass(-2.0, &config());
+        assert_eq!(cell.ground, Ground::Seen, "one contradiction of {CONFIG_SCANS}");
+        cell.pass(-2.0, &config());
+        assert_eq!(cell.ground, Ground::Unseen);
+    }
+
+    #[test]
+    fn ground_that_is_contradicted_once_is_no_word_against_the_obstacle() {
+        let mut cell = ground_with_obstacle();
+        let before = cell.evidence[TerrainClass::Obstacle as usize];
+        cell.pass(-2.0, &config());
+        cell.fade_obstacle(0.5, &config());
+        assert_eq!(cell.evidence[TerrainClass::Obstacle as usize], before, "one scan of {CONFIG_SCANS}");
+        cell.fade_obstacle(0.5, &config());
+        assert_eq!(cell.evidence[TerrainClass::Obstacle as usize], 0.5 * before);
     }
 }

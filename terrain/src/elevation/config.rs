@@ -2,8 +2,13 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::BodyBox;
+
 /// Slope of the steepest ground that is still ground: the tangent of 70 degrees.
 const STEEPEST_GROUND: f64 = 2.747;
+
+/// Most cells of a window: beyond all that a vehicle looks over, and still in memory.
+const CELLS_MAX: usize = 1 << 22;
 
 /// How points become ground. Every length is in metres, every default is meant for a vehicle of 1 to 4 m
 /// with a spinning range sensor of 64 beams.
@@ -14,7 +19,7 @@ pub struct ElevationConfig {
     pub resolution_m: f64,
     /// Rows of the window, > 0.
     pub n_rows: usize,
-    /// Columns of the window, > 0.
+    /// Columns of the window, > 0; at most 4,194,304 cells in all.
     pub n_cols: usize,
     /// The window follows the vehicle once it is this far from the centre along x or y [m]; infinite = never.
     pub recentre_m: f64,
@@ -26,7 +31,7 @@ pub struct ElevationConfig {
     pub scan_noise_m: f64,
     /// Standard deviation of the tilt that all points of a scan share (attitude error) [rad].
     pub scan_tilt_rad: f64,
-    /// Growth of a height's variance while nothing is seen of it [m2/s].
+    /// Growth of a height's variance while nothing is seen of it [m2/s]; published as every change of a variance is.
     pub fading_m2ps: f64,
     /// Points a class's evidence is remembered for: older ones fade beyond it, > 0.
     pub evidence_cap: f32,
@@ -52,6 +57,9 @@ pub struct ElevationConfig {
     /// A change of a height below this is not published [m], nor are changes of a variance by less than a fifth
     /// or of a probability by less than a twentieth; 0 = every change is.
     pub publish_step_m: f32,
+    /// The box that the vehicle takes up, with a margin: points inside are the vehicle itself. Empty = the sensor sees
+    /// nothing of it.
+    pub own_body: BodyBox,
 }
 
 impl Default for ElevationConfig {
@@ -69,6 +77,7 @@ impl Default for ElevationConfig {
             evidence_cap: 30.0,
             open_prior: 1.0,
             own_body_m: 0.0,
+            own_body: BodyBox::EMPTY,
             clearance_m: 2.5,
             wall_span_m: 0.8,
             hidden_ground_std_m: 0.15,
@@ -139,7 +148,13 @@ impl ElevationConfig {
             ("publish_step_m", f64::from(self.publish_step_m)),
         ];
         check(&positive, "a finite number > 0", |v| v.is_finite() && v > 0.0)?;
+        let n_cells = self.n_rows.saturating_mul(self.n_cols);
+        check(&[("n_rows x n_cols", n_cells as f64)], "at most 4194304 cells", |n| n <= CELLS_MAX as f64)?;
         check(&not_negative, "a finite number >= 0", |v| v.is_finite() && v >= 0.0)?;
+        let faces = self.own_body.min_m.map(|face| ("own_body.min_m", face));
+        check(&faces, "three finite numbers", f64::is_finite)?;
+        let faces = self.own_body.max_m.map(|face| ("own_body.max_m", face));
+        check(&faces, "three finite numbers", f64::is_finite)?;
         check(&[("recentre_m", self.recentre_m)], "a number > 0, infinity allowed", |v| v > 0.0)
     }
 

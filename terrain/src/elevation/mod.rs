@@ -11,7 +11,9 @@ mod visibility;
 pub use config::{ElevationConfig, ElevationConfigError};
 
 use crate::region::LatticeBounds;
-use crate::{CellRegion, Footprint, GridGeometry, GridMap, Pose, Scan, SurfaceCell, TerrainClass};
+use crate::{
+    CellRegion, DistantPosition, Footprint, GridGeometry, GridMap, Pose, Scan, SurfaceCell, TerrainClass,
+};
 use cell::{CellState, Ground};
 use nalgebra::{Point3, Vector3};
 use sorting::SortedPoints;
@@ -32,12 +34,22 @@ pub struct FuseReport {
     pub changed: Option<CellRegion>,
 }
 
+impl FuseReport {
+    /// Points that were mapped.
+    pub fn n_mapped(&self) -> usize {
+        self.n_points - self.n_rejected_non_finite - self.n_own_body - self.n_out_of_window
+    }
+}
+
 /// What the map refuses to take in; it is then left as it was.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum FuseError {
     /// The pose is not a pose.
     #[error("expected a pose of finite numbers, found {0:?}")]
     NonFinitePose(Pose),
+    /// The pose is farther away than cells can be counted.
+    #[error(transparent)]
+    Distant(#[from] DistantPosition),
     /// The place from which the rays start is not a place.
     #[error("expected a ray origin of finite numbers, found {0:?}")]
     NonFiniteOrigin([f32; 3]),
@@ -79,10 +91,6 @@ impl AssumedGround {
         }
         Ok(())
     }
-}
-
-fn check_pose(pose: &Pose) -> Result<(), FuseError> {
-    if pose.is_finite() { Ok(()) } else { Err(FuseError::NonFinitePose(*pose)) }
 }
 
 /// The semantic elevation map, fused online from scans and poses.
@@ -139,7 +147,7 @@ impl ElevationMap {
 
     /// Fuses one scan that was taken at `pose`. Non-finite points are dropped and counted.
     pub fn fuse(&mut self, scan: &Scan, pose: &Pose) -> Result<FuseReport, FuseError> {
-        check_pose(pose)?;
+        self.check_pose(pose)?;
         if !scan.origin_m.iter().all(|v| v.is_finite()) {
             return Err(FuseError::NonFiniteOrigin(scan.origin_m));
         }
@@ -160,15 +168,20 @@ impl ElevationMap {
         Ok(report)
     }
 
+    /// Forgets when the last scan was, because the clock was set: the next one fades nothing.
+    pub fn forget_time(&mut self) {
+        self.fused_at_ns = None;
+    }
+
     /// Takes for granted, where nothing was seen, that the ground carries the wheels of a vehicle at `pose`:
     /// a sensor cannot see below its own vehicle. The cells count as interpolated until they are seen.
     pub fn assume_ground(&mut self, pose: &Pose, assumed: &AssumedGround) -> Result<(), FuseError> {
-        check_pose(pose)?;
+        self.check_pose(pose)?;
         let motion = pose.isometry();
         let normal = motion.rotation * Vector3::z();
         assumed.check(normal.z)?;
         self.follow(pose);
-        let (sin, cos) = pose.yaw_rad.sin_cos();
+        let (sin, cos) = libm::sincos(pose.yaw_rad);
         let contact = motion * Point3::new(0.0, 0.0, -assumed.axle_height_m);
         let geometry = *self.states.geometry();
         for (index, state) in self.states.values_mut().iter_mut().enumerate() {
@@ -194,8 +207,8 @@ impl ElevationMap {
     /// Whole-cell translations are exact. Otherwise each cell takes over the nearest stored cell, so that
     /// places are off by at most half a cell's diagonal.
     pub fn reanchor(&mut self, before: &Pose, after: &Pose) -> Result<(), FuseError> {
-        check_pose(before)?;
-        check_pose(after)?;
+        self.check_pose(before)?;
+        self.check_pose(after)?;
         let [dx_m, dy_m] = [after.x_m - before.x_m, after.y_m - before.y_m];
         let mut geometry = *self.states.geometry();
         geometry.origin[0] += (dx_m / geometry.resolution_m).round() as i64;
@@ -205,6 +218,13 @@ impl ElevationMap {
         self.surface = GridMap::filled(geometry, SurfaceCell::UNKNOWN);
         self.publish();
         Ok(())
+    }
+
+    fn check_pose(&self, pose: &Pose) -> Result<(), FuseError> {
+        if !pose.is_finite() {
+            return Err(FuseError::NonFinitePose(*pose));
+        }
+        Ok(DistantPosition::check([pose.x_m, pose.y_m], self.config.resolution_m)?)
     }
 
     /// Rolls the window when the vehicle left its middle.
@@ -222,7 +242,8 @@ impl ElevationMap {
         self.changed.include_entered(&old, &new);
     }
 
-    /// Lets what was seen grow uncertain with time. A scan older than the last one fades nothing.
+    /// Lets what was seen grow uncertain with time. A scan older than the last one fades nothing. The surface follows
+    /// when it is published: whoever brings a map up to date with what changed must not read what did not.
     fn fade(&mut self, now_ns: u64) {
         let elapsed_ns = self.fused_at_ns.map_or(0, |then_ns| now_ns.saturating_sub(then_ns));
         self.fused_at_ns = self.fused_at_ns.max(Some(now_ns));
@@ -231,7 +252,6 @@ impl ElevationMap {
             for state in self.states.values_mut() {
                 state.variance_m2 += by_m2;
             }
-            surfacing::fade(&mut self.surface, by_m2);
         }
     }
 
@@ -259,7 +279,7 @@ fn moved_states(
     after: &Pose,
 ) -> GridMap<CellState> {
     let correction = after.isometry() * before.isometry().inverse();
-    let (sin, cos) = (before.yaw_rad - after.yaw_rad).sin_cos();
+    let (sin, cos) = libm::sincos(before.yaw_rad - after.yaw_rad);
     let mut new = GridMap::filled(geometry, CellState::NEW);
     for (index, state) in new.values_mut().iter_mut().enumerate() {
         let [x_m, y_m] = geometry.centre_m(geometry.cell(index));

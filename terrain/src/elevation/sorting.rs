@@ -71,9 +71,10 @@ impl SortedPoints {
                 self.n_rejected_non_finite += 1;
                 continue;
             }
-            let position = motion * Point3::from(point.position_m.map(f64::from));
+            let in_body_m = point.position_m.map(f64::from);
+            let position = motion * Point3::from(in_body_m);
             let range_m = (position - origin).norm();
-            if range_m < config.own_body_m {
+            if range_m < config.own_body_m || config.own_body.contains(in_body_m) {
                 self.n_own_body += 1;
                 continue;
             }

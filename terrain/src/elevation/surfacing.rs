@@ -166,13 +166,6 @@ fn differs(published: &SurfaceCell, next: &SurfaceCell, config: &ElevationConfig
             .any(|(a, b)| (a - b).abs() > probability_step)
 }
 
-/// Grows the published variances as time passes.
-pub(super) fn fade(surface: &mut GridMap<SurfaceCell>, by_m2: f32) {
-    for cell in surface.values_mut() {
-        cell.height_variance_m2 += by_m2;
-    }
-}
-
 #[cfg(test)]
 impl Scratch {
     /// Where the buffers lie and how much they hold.

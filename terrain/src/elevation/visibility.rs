@@ -34,7 +34,7 @@ impl RayFloor {
                 continue;
             };
             let [col, row] = lowest.place;
-            let length_m = f64::from((col - start[0]).hypot(row - start[1])) * geometry.resolution_m;
+            let length_m = f64::from(libm::hypotf(col - start[0], row - start[1])) * geometry.resolution_m;
             let slack_m = config.scan_noise_m + config.scan_tilt_rad * length_m;
             let ray = Ray {
                 start: [start[0], start[1], start_m],

@@ -5,7 +5,9 @@ use rand::SeedableRng;
 use rand_distr::{Distribution, Normal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use terrain::TerrainClass::{Loose, Obstacle, Open, Vegetation};
-use terrain::{ElevationConfig, ElevationMap, FuseError, Knowledge, Pose, Scan, SurfaceCell, TerrainClass};
+use terrain::{
+    BodyBox, ElevationConfig, ElevationMap, FuseError, Knowledge, Pose, Scan, SurfaceCell, TerrainClass,
+};
 
 const HERE: Pose = Pose { x_m: 0.0, y_m: 0.0, z_m: 0.0, roll_rad: 0.0, pitch_rad: 0.0, yaw_rad: 0.0 };
 /// Centre of one cell of the plain map.
@@ -263,6 +265,22 @@ fn bad_points_are_dropped_and_counted() {
 }
 
 #[test]
+fn points_on_the_vehicles_own_body_are_no_ground_and_those_beside_above_and_below_it_are() {
+    let body = BodyBox { min_m: [-0.8, -0.9, -0.1], max_m: [2.6, 0.9, 1.4] };
+    let mut map = plain_map(|config| config.own_body = body);
+    let own = [[2.0, 0.0, 0.9], [2.59, 0.89, 1.39], [-0.79, -0.89, -0.09]].map(|place| (place, Open));
+    let others =
+        [[2.7, 0.0, 0.9], [0.0, 1.0, 0.5], [0.0, 0.0, -0.2], [0.0, 0.0, 1.5]].map(|place| (place, Open));
+    // The body turns and tilts with the pose.
+    let pose = Pose { x_m: 1.0, yaw_rad: 2.0, pitch_rad: 0.3, roll_rad: -0.2, ..HERE };
+    let report = map.fuse(&scan_of(own), &pose).unwrap();
+    assert_eq!((report.n_own_body, report.n_mapped()), (3, 0));
+    assert!(map.surface().values().iter().all(|cell| !cell.is_known()));
+    let report = map.fuse(&scan_of(own.into_iter().chain(others)), &pose).unwrap();
+    assert_eq!((report.n_own_body, report.n_mapped()), (3, 4));
+}
+
+#[test]
 fn an_empty_scan_changes_nothing() {
     let mut map = plain_map(|_| {});
     map.fuse(&scan_of(column(&[0.3], Open)), &HERE).unwrap();
@@ -290,6 +308,28 @@ fn a_pose_or_origin_that_is_no_number_is_refused_and_leaves_the_map_alone() {
     assert!(matches!(map.fuse(&nowhere, &HERE), Err(FuseError::NonFiniteOrigin(_))));
     assert!(map.surface().values().iter().all(|cell| !cell.is_known()));
     assert_eq!(map.take_changed(), None);
+}
+
+#[test]
+fn a_pose_beyond_all_lattices_is_refused_and_one_at_their_end_is_not() {
+    let mut map = plain_map(|config| config.recentre_m = 1.0);
+    let scan = scan_of(column(&[0.3], Open));
+    map.fuse(&scan, &HERE).unwrap();
+    let before = map.surface().geometry().origin;
+    for far_m in [1e19, -1e19, 1e300, 5.6e11] {
+        for pose in [Pose { x_m: far_m, ..HERE }, Pose { y_m: far_m, ..HERE }] {
+            let error = map.fuse(&scan, &pose).unwrap_err();
+            assert!(matches!(error, FuseError::Distant(_)), "{far_m}: {error}");
+            assert!(error.to_string().contains("5.497"), "says what would do: {error}");
+            assert_eq!(map.reanchor(&HERE, &pose), Err(error));
+        }
+    }
+    assert_eq!(map.surface().geometry().origin, before);
+    // Half a metre times 2^40 is 5.5e11.
+    for far_m in [5.4e11, -5.4e11] {
+        map.fuse(&scan, &Pose { x_m: far_m, y_m: -far_m, ..HERE }).unwrap();
+        map.take_changed();
+    }
 }
 
 #[test]
@@ -321,6 +361,7 @@ fn settings_that_cannot_be_are_refused_with_field_and_number() {
     assert_eq!(refused(|c| c.noise_per_range = f64::NAN).0, "noise_per_range");
     assert_eq!(refused(|c| c.recentre_m = 0.0).0, "recentre_m");
     assert_eq!(refused(|c| c.gap_radius_m = f64::INFINITY).0, "gap_radius_m");
+    assert_eq!(refused(|c| c.own_body.max_m[1] = f64::NAN).0, "own_body.max_m");
     assert!(ElevationConfig::scaled_to(0.33).validate().is_ok());
     assert_eq!(ElevationConfig::scaled_to(3.4), ElevationConfig::default());
 }

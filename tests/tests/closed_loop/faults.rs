@@ -1,8 +1,9 @@
 //! Sensors that fail: the drive survives, or comes to a controlled stop that says why.
 
+use bench::closed_loop::ClosedLoop;
 use bicycle::{Decision, HoldReason, StopReason};
-use scenarios::{Outcome, SensorFault};
-use terrain::TerrainClass;
+use scenarios::{Outcome, RangeSensorConfig, SensorFault};
+use terrain::{BodyBox, TerrainClass};
 
 use crate::course::{Course, Driven, ground};
 
@@ -54,6 +55,34 @@ fn empty_scans_stop_the_vehicle_until_it_sees_again() {
         assert_stops(&driven, StopReason::StaleScan, 0.8);
         assert_eq!(driven.outcome, Outcome::Goal);
     }
+}
+
+/// A bonnet in sight of the sensor above the roof.
+const BONNET: BodyBox = BodyBox { min_m: [1.6, -0.7, -0.1], max_m: [2.4, 0.7, 0.5] };
+
+#[test]
+fn sensor_that_sees_only_the_vehicle_or_the_distance_is_blind() {
+    // On the bonnet, and a kilometre away.
+    for place_m in [[2.0, 0.0, 0.4], [1000.0, 0.0, 0.0]] {
+        let driven = flat_with(SensorFault::ReturnsFrom(place_m), 4.5);
+        assert_stops(&driven, StopReason::StaleScan, 0.8);
+        assert_eq!(driven.outcome, Outcome::Goal);
+        assert!(driven.closed.navigator.scans().blind > 0);
+    }
+}
+
+#[test]
+fn bonnet_of_the_vehicle_is_no_ground() {
+    let mut course = Course::flat(6.0);
+    course.episode.range_sensor =
+        course.episode.range_sensor.map(|sensor| RangeSensorConfig { own_body: BONNET, ..sensor });
+    let driven = course.drive();
+    let tally = driven.closed.navigator.scans();
+    assert!(tally.points_on_own_body > 500, "the sensor sees the bonnet: {tally:?}");
+    assert_eq!((driven.outcome, driven.stops().len()), (Outcome::Goal, 0), "{:?}", driven.stops());
+    let known = driven.closed.navigator.surface().values().iter().filter(|cell| cell.is_known());
+    assert!(known.clone().all(|cell| cell.height_m.abs() < 0.2), "the ground is flat");
+    assert!(known.count() > 1000);
 }
 
 #[test]
@@ -137,11 +166,7 @@ fn map_follows_a_localisation_that_corrects_itself() {
         assert_eq!(closed.episode.outcome(), None, "no jump was noticed");
         closed.cycle().unwrap();
     }
-    let surface = closed.navigator.surface();
-    let cells =
-        surface.values().iter().enumerate().filter(|(_, cell)| cell.class() == TerrainClass::Obstacle);
-    let places: Vec<_> =
-        cells.map(|(index, _)| surface.geometry().centre_m(surface.geometry().cell(index))).collect();
+    let places = obstacles_m(&closed);
     assert!(!places.is_empty(), "the block was seen");
     let n = places.len() as f64;
     let off_m = [0, 1].map(|axis| {
@@ -151,4 +176,69 @@ fn map_follows_a_localisation_that_corrects_itself() {
     // A cell is 0.3 m: half of one for rounding the shift. Left where it was, or kept twice, the block is off by 0.4 m
     // and more.
     assert!(off_m[0].hypot(off_m[1]) < 0.25, "{off_m:?} m off: {places:?}");
+}
+
+#[test]
+fn map_follows_a_localisation_that_corrects_its_heading() {
+    // About the place where the vehicle is then, so that only the yaw steps.
+    let (about_m, turn_rad) = ([6.0, 0.0], 0.5);
+    let fault = SensorFault::PoseTurn(about_m, turn_rad);
+    let is_block = |x_m: f64, y_m: f64| (x_m - BLOCK_M[0]).abs().max((y_m - BLOCK_M[1]).abs()) < 0.4;
+    let course = Course::along_x(ground(|_, _| 0.0, is_block), 8.0).with_fault(fault, FROM_S, f64::INFINITY);
+    let mut closed = course.begin();
+    while closed.navigator.n_jumps() == 0 {
+        assert_eq!(closed.episode.outcome(), None, "no jump was noticed");
+        closed.cycle().unwrap();
+    }
+    let places = obstacles_m(&closed);
+    assert!(!places.is_empty(), "the block was seen");
+    let mean_m =
+        [0, 1].map(|axis| places.iter().map(|place_m| place_m[axis]).sum::<f64>() / places.len() as f64);
+    let ([dx_m, dy_m], (sin, cos)) = ([BLOCK_M[0] - about_m[0], BLOCK_M[1] - about_m[1]], turn_rad.sin_cos());
+    let expected_m = [about_m[0] + cos * dx_m - sin * dy_m, about_m[1] + sin * dx_m + cos * dy_m];
+    let off_m = (mean_m[0] - expected_m[0]).hypot(mean_m[1] - expected_m[1]);
+    // It moved by 2 m; a cell is 0.3 m.
+    assert!(off_m < 0.3, "{off_m} m off: {places:?}");
+    // It goes on to where the goal is said to be.
+    for _ in 0..20 {
+        let decision = closed.cycle().unwrap().decision;
+        assert!(matches!(decision, Decision::Drive(_)), "{decision:?}");
+    }
+    assert_eq!(closed.navigator.n_jumps(), 1);
+}
+
+#[test]
+fn between_a_jump_and_the_next_scan_the_vehicle_drives_on_the_ground_it_knew() {
+    // A wall beside the way: where the vehicle is said to be after the jump, the map of before has it stand in the wall.
+    let is_wall = |x_m: f64, y_m: f64| x_m > 5.0 && (1.7..2.4).contains(&y_m);
+    let course = || Course::along_x(ground(|_, _| 0.0, is_wall), 8.0);
+    for sensor in [SensorFault::PoseJump([0.0, 1.2]), SensorFault::PoseTurn([6.0, 0.0], 1.2)] {
+        // Scans come in even cycles.
+        let mut jumped = course().with_fault(sensor, FROM_S + CYCLE_S, f64::INFINITY).begin();
+        let mut steady = course().begin();
+        let [with, without] = loop {
+            let cycles = [jumped.cycle().unwrap(), steady.cycle().unwrap()];
+            if jumped.navigator.n_jumps() > 0 {
+                break cycles;
+            }
+            assert_eq!(jumped.episode.outcome(), None, "no jump was noticed");
+        };
+        assert_eq!(with.map_ms, None, "before the next scan");
+        let (Decision::Drive(with), Decision::Drive(without)) = (with.decision, without.decision) else {
+            panic!("{sensor:?}: {with:?}, and without the jump {without:?}");
+        };
+        let off = [with.speed_mps - without.speed_mps, with.steering_rad - without.steering_rad];
+        assert!(
+            off.iter().all(|value| value.abs() < 0.1),
+            "{sensor:?}: {with:?}, and without the jump {without:?}"
+        );
+    }
+}
+
+/// Centres of the cells that show an obstacle [m].
+fn obstacles_m(closed: &ClosedLoop) -> Vec<[f64; 2]> {
+    let surface = closed.navigator.surface();
+    let cells =
+        surface.values().iter().enumerate().filter(|(_, cell)| cell.class() == TerrainClass::Obstacle);
+    cells.map(|(index, _)| surface.geometry().centre_m(surface.geometry().cell(index))).collect()
 }

@@ -2,7 +2,7 @@
 
 use bicycle::Model;
 use navigator::{Assessor, Belief};
-use runtime::channel::{Bus, ODOMETRY, RISK, Refusal};
+use runtime::channel::{Bus, Inlet, ODOMETRY, RISK};
 use runtime::mapping::{LEARNED, send_risk};
 use runtime::message::{Grid, OdometryRecord, RiskHeader, Stamp, SurfaceHeader};
 use runtime::payload::{RiskParts, cell_numbers, risk_views};
@@ -36,7 +36,7 @@ fn a_risk_map_is_written_once_and_read_where_it_was_written() {
     marked[777].pitch_rad = 0.25;
     outlet.send(loan, 1).unwrap();
     let message = inlet.newest().unwrap();
-    let (view, _) = risk_views(message.user_header(), message.payload()).unwrap();
+    let (view, _) = risk_views(message.header(), message.payload()).unwrap();
     assert_eq!(
         view.risks.as_ptr().cast(),
         message.payload().as_ptr(),
@@ -74,7 +74,7 @@ fn a_risk_map_is_sent_and_read_without_memory_of_its_own() {
         allocation_counter::measure(|| {
             send_risk(&mut maker, outlet, 1).unwrap();
             let message = inlet.newest().unwrap();
-            let (map, time_to_goal) = risk_views(message.user_header(), message.payload()).unwrap();
+            let (map, time_to_goal) = risk_views(message.header(), message.payload()).unwrap();
             let place = message.payload().as_ptr_range();
             assert!(
                 place.contains(&map.risks.as_ptr().cast()) && place.contains(&map.ground.as_ptr().cast())
@@ -108,27 +108,58 @@ fn messages_that_were_dropped_are_counted() {
     assert_eq!((inlet.counts().lost, inlet.counts().received), (5, 1 + ODOMETRY.depth as u64));
 }
 
+fn at(x_m: f64) -> OdometryRecord {
+    OdometryRecord { position_m: [x_m, 0.0, 0.0], ..OdometryRecord::default() }
+}
+
+/// Where the messages that have come say to be.
+fn heard(inlet: &mut Inlet<Stamp, OdometryRecord>) -> Vec<f64> {
+    let mut heard = Vec::new();
+    inlet.poll(|_, records| heard.push(records[0].position_m[0]));
+    heard
+}
+
+/// The first reader looks while only the first publisher has spoken; the second reader comes when both have, and is told
+/// by the second publisher first.
 #[test]
-fn a_second_publisher_is_not_heard_while_the_first_is() {
+fn two_readers_follow_the_same_publisher_whatever_they_heard_first() {
     let run = Run::new();
     let (first, second) = (Bus::join(&run.name).unwrap(), Bus::join(&run.name).unwrap());
-    let mut inlet = first.inlet(&ODOMETRY).unwrap();
-    let [mut one, mut other] = [&first, &second].map(|bus| bus.outlet(&ODOMETRY, 1).unwrap());
-    let record = |x_m: f64| OdometryRecord { position_m: [x_m, 0.0, 0.0], ..OdometryRecord::default() };
-    let mut heard = || {
-        let mut heard = Vec::new();
-        inlet.poll(|_, records| heard.push(records[0].position_m[0]));
-        heard
-    };
-    for at_ns in 1..=3 {
-        one.send_one(Stamp::default(), record(1.0), at_ns).unwrap();
-        assert_eq!(heard(), [1.0]);
-        other.send_one(Stamp::default(), record(2.0), at_ns).unwrap();
-        assert!(heard().is_empty(), "whoever came first");
+    let mut early = first.inlet(&ODOMETRY).unwrap();
+    let mut one = first.outlet(&ODOMETRY, 1).unwrap();
+    let mut other = second.outlet(&ODOMETRY, 1);
+    one.send_one(Stamp::default(), at(1.0), 1).unwrap();
+    let mut followed = vec![heard(&mut early)];
+    let mut late = second.inlet(&ODOMETRY).unwrap();
+    if let Ok(other) = &mut other {
+        other.send_one(Stamp::default(), at(2.0), 2).unwrap();
     }
+    followed.push(heard(&mut late));
+    one.send_one(Stamp::default(), at(1.0), 3).unwrap();
+    followed.extend([heard(&mut early), heard(&mut late)]);
+    assert_eq!(followed, [vec![1.0], vec![], vec![1.0], vec![1.0]], "the one that has the channel");
+    let told = other.err().expect("the channel has its publisher").to_string();
+    assert!(told.contains("channel odometry: expected to be its only publisher"), "{told}");
+
+    // What has the channel next is heard by both at once.
     drop(one);
-    std::thread::sleep(std::time::Duration::from_nanos(ODOMETRY.silence_ns + 1_000_000));
-    other.send_one(Stamp::default(), record(2.0), 4).unwrap();
-    assert_eq!(heard(), [2.0], "silence gives the channel to the next");
-    assert_eq!(inlet.counts().of(Refusal::OtherPublisher), 3);
+    let mut next = second.outlet(&ODOMETRY, 1).unwrap();
+    next.send_one(Stamp::default(), at(3.0), 4).unwrap();
+    assert_eq!([heard(&mut early), heard(&mut late)], [[3.0], [3.0]]);
+}
+
+#[test]
+fn a_publisher_whose_memory_cannot_be_reached_is_counted_as_a_failure() {
+    let run = Run::new();
+    let (here, there) = (Bus::join(&run.name).unwrap(), Bus::join(&run.name).unwrap());
+    let files = |run: &Run| std::collections::BTreeSet::from_iter(run.shared_memory());
+    let mut inlet = here.inlet(&ODOMETRY).unwrap();
+    let before = files(&run);
+    let mut outlet = there.outlet(&ODOMETRY, 1).unwrap();
+    for file in files(&run).difference(&before) {
+        std::fs::remove_file(file).unwrap();
+    }
+    outlet.send_one(Stamp::default(), OdometryRecord::default(), 1).unwrap();
+    inlet.poll(|_, _| panic!("nobody can have heard that"));
+    assert!(inlet.counts().failed > 0, "{:?}", inlet.counts());
 }

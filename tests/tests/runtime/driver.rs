@@ -5,6 +5,7 @@ use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 
 use bicycle::Odometry;
+use navigator::Jump;
 use runtime::channel::{Bus, COMMAND, Inlet, MISSION, ODOMETRY, Outlet, RunName, SCAN};
 use runtime::clock::{nanoseconds, now_ns, sleep_until};
 use runtime::message::{CommandRecord, MissionRecord, OdometryRecord, PointRecord, ScanHeader, Stamp};
@@ -13,19 +14,37 @@ use runtime::watchdog::Watchdog;
 use scenarios::Episode;
 use terrain::Scan;
 
-use crate::fixture::{episode_config, machine, task};
+use crate::fixture::{ages, episode_config, machine, task};
 
 /// What is wrong with what it sends.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Misbehaviour {
     /// The localisation has corrected itself by so much, east and north [m].
     pub offset_m: [f64; 2],
+    /// And its heading by so much, about the map's origin [rad].
+    pub turn_rad: f64,
+    /// Odometry comes ten times a second, in cycles in which no scan does.
+    pub is_sparse: bool,
     /// Its clock is ahead by so much [ns].
     pub ahead_ns: i64,
     /// The localisation repeats its last word.
     pub is_frozen: bool,
     /// The yaw rate is no number.
     pub is_not_a_number: bool,
+    /// What becomes of the mission.
+    pub mission: MissionFate,
+}
+
+/// What becomes of a mission.
+#[derive(Clone, Copy, Debug, Default)]
+pub enum MissionFate {
+    /// It is said again once a second.
+    #[default]
+    UnderWay,
+    /// Nobody says anything more.
+    Lost,
+    /// It is said to be over.
+    Over,
 }
 
 /// The driver, on a thread of its own; it ends with this.
@@ -88,7 +107,7 @@ impl Robot {
         Self {
             episode,
             began_ns: now_ns(),
-            watchdog: Watchdog::new(vehicle.limits, 300_000_000),
+            watchdog: Watchdog::new(vehicle.limits, ages()),
             told: Odometry::default(),
             commands: bus.inlet(&COMMAND).unwrap(),
             odometry: bus.outlet(&ODOMETRY, 1).unwrap(),
@@ -107,20 +126,22 @@ impl Robot {
         let observation = self.episode.observe().clone();
         if !behaviour.is_frozen {
             self.told = observation.odometry;
-            for (axis, offset_m) in behaviour.offset_m.into_iter().enumerate() {
-                self.told.position_m[axis] += offset_m;
-            }
+            let [east_m, north_m] = behaviour.offset_m;
+            let correction = Jump { step_m: [east_m, north_m, 0.0], yaw_rad: behaviour.turn_rad };
+            self.told = correction.odometry(&self.told);
         }
         let mut record = OdometryRecord::from(&self.told);
         if behaviour.is_not_a_number {
             record.yaw_rate_radps = f64::NAN;
         }
-        self.odometry.send_one(Stamp::default(), record, stamped_ns).unwrap();
+        if !behaviour.is_sparse || self.episode.n_cycles() % 5 == 3 {
+            self.odometry.send_one(Stamp::default(), record, stamped_ns).unwrap();
+        }
         if let Some(scan) = &observation.scan {
             self.send_scan(scan, stamped_ns);
         }
         if self.episode.n_cycles().is_multiple_of(50) {
-            self.send_mission(now_ns);
+            self.send_mission(now_ns, behaviour.mission);
         }
         self.follow_commands();
     }
@@ -132,19 +153,20 @@ impl Robot {
         self.scans.send(loan, at_ns).unwrap();
     }
 
-    fn send_mission(&mut self, at_ns: u64) {
+    fn send_mission(&mut self, at_ns: u64, fate: MissionFate) {
+        let outcome = match fate {
+            MissionFate::UnderWay => 0,
+            MissionFate::Over => 7,
+            MissionFate::Lost => return,
+        };
         let goal_m = self.episode.task().goal_m;
-        let mission = MissionRecord { goal_m, tolerance_m: 1.0, ..MissionRecord::default() };
+        let mission = MissionRecord { goal_m, tolerance_m: 1.0, outcome, ..MissionRecord::default() };
         self.missions.send_one(Stamp::default(), mission, at_ns).unwrap();
     }
 
     fn follow_commands(&mut self) {
         let watchdog = &mut self.watchdog;
-        self.commands.poll(|stamp, commands| {
-            if let Some(decision) = commands[0].decision() {
-                watchdog.admit(decision, stamp.published_at_ns);
-            }
-        });
+        self.commands.poll(|stamp, commands| watchdog.admit(&commands[0], stamp.published_at_ns));
         self.episode.apply(&self.watchdog.decision(now_ns())).unwrap();
     }
 }

@@ -7,13 +7,14 @@ use std::time::{Duration, Instant};
 
 use bicycle::{Model, Vehicle};
 use navigator::{Belief, Config};
+use runtime::ages::{AgeLimits, Periods};
 use runtime::channel::{Bus, RunName};
 use runtime::control::{self, ControlSetup};
 use runtime::learning::{self, LearningSetup};
 use runtime::mapping::{self, MappingSetup};
 use runtime::plant::{self, PlantSetup};
 use runtime::recorder::{self, RecorderSetup};
-use runtime::setup::{MachineSetup, RecordedSetup};
+use runtime::setup::{ClockAnchor, MachineSetup, RecordedSetup};
 use runtime::status::Role;
 use rustix::process::{Pid, Signal, kill_process, set_parent_process_death_signal};
 use scenarios::{EpisodeConfig, RockFieldConfig, Task};
@@ -24,6 +25,7 @@ const RUN: &str = "SUREFOOT_TEST_RUN";
 const FOLDER: &str = "SUREFOOT_TEST_FOLDER";
 const FILE_BYTES: &str = "SUREFOOT_TEST_FILE_BYTES";
 const FILE_TIME: &str = "SUREFOOT_TEST_FILE_TIME";
+const QUOTA: &str = "SUREFOOT_TEST_QUOTA";
 /// What recorders have to say goes into a file of this name.
 const SAID: &str = "said";
 /// A file of this name tells the processes to end.
@@ -55,17 +57,23 @@ pub fn machine() -> (Vehicle, Config) {
     (vehicle, config)
 }
 
-/// When a recorder under test begins a new file, and how large its disk is.
+/// Limits on ages as they are with the usual periods.
+pub fn ages() -> AgeLimits {
+    AgeLimits::new(&Periods::default(), &machine().1.guard, None).unwrap()
+}
+
+/// When a recorder under test begins a new file or ends, and how large its disk is.
 #[derive(Clone, Copy, Debug)]
 pub struct RecorderLimits {
     pub file_bytes_max: u64,
     pub file_time_max_s: f64,
+    pub quota_bytes: u64,
     pub disk_bytes: Option<u64>,
 }
 
 impl Default for RecorderLimits {
     fn default() -> Self {
-        Self { file_bytes_max: 1 << 30, file_time_max_s: 600.0, disk_bytes: None }
+        Self { file_bytes_max: 1 << 30, file_time_max_s: 600.0, quota_bytes: 1 << 30, disk_bytes: None }
     }
 }
 
@@ -108,6 +116,7 @@ impl Run {
             .env(FOLDER, self.folder.path())
             .env(FILE_BYTES, limits.file_bytes_max.to_string())
             .env(FILE_TIME, limits.file_time_max_s.to_string())
+            .env(QUOTA, limits.quota_bytes.to_string())
             .stdout(Stdio::null())
             .spawn()
             .unwrap();
@@ -217,8 +226,8 @@ fn be(role: Role, run: &RunName, folder: &Path, is_over: &dyn Fn() -> bool) {
             plant::run(&bus, plant_setup(&vehicle), is_over).unwrap();
         }
         Role::Mapping => {
-            mapping::run(&bus, &MappingSetup { vehicle: &vehicle, config, level, model: &model }, is_over)
-                .unwrap();
+            let setup = MappingSetup { vehicle: &vehicle, config, level, model: &model, ages: ages() };
+            mapping::run(&bus, &setup, is_over).unwrap();
         }
         Role::Learning => {
             let belief = Belief::Physics;
@@ -226,7 +235,8 @@ fn be(role: Role, run: &RunName, folder: &Path, is_over: &dyn Fn() -> bool) {
             learning::run(&bus, &setup, is_over).unwrap();
         }
         Role::Control => {
-            control::run(&bus, ControlSetup { model, config, seed: SEED, period_s: 0.1 }, is_over).unwrap();
+            let setup = ControlSetup { model, config, seed: SEED, period_s: 0.1, ages: ages() };
+            control::run(&bus, setup, is_over).unwrap();
         }
         Role::Recorder => {
             let setup = RecorderSetup {
@@ -234,6 +244,8 @@ fn be(role: Role, run: &RunName, folder: &Path, is_over: &dyn Fn() -> bool) {
                 setup: recorded_setup(),
                 file_bytes_max: told(FILE_BYTES),
                 file_time_max_s: told(FILE_TIME),
+                quota_bytes: told(QUOTA),
+                sync_interval_s: 0.5,
             };
             let said = folder.join(SAID);
             let mut say = |line: &str| std::fs::write(&said, format!("{line}\n")).unwrap();
@@ -248,6 +260,8 @@ pub fn recorded_setup() -> RecordedSetup {
     let vehicle_name = vehicle.name.clone();
     let [vehicle_toml, model_toml, config_toml] = MachineSetup { vehicle, model, config }.texts().unwrap();
     RecordedSetup {
+        format: RecordedSetup::FORMAT,
+        clock: ClockAnchor::now(),
         vehicle_name,
         vehicle_toml,
         model_toml,
@@ -256,6 +270,7 @@ pub fn recorded_setup() -> RecordedSetup {
         checkpoint_sha256: String::new(),
         alpha: ALPHA,
         seed: SEED.to_string(),
+        ages: ages(),
         revision: String::new(),
     }
 }
@@ -275,5 +290,12 @@ pub fn episode_config(vehicle: &Vehicle) -> EpisodeConfig {
 }
 
 fn plant_setup(vehicle: &Vehicle) -> PlantSetup<'_> {
-    PlantSetup { task: task(), vehicle, episode: episode_config(vehicle), seed: SEED, command_age_max_s: 0.3 }
+    PlantSetup {
+        task: task(),
+        vehicle,
+        episode: episode_config(vehicle),
+        seed: SEED,
+        periods: Periods::default(),
+        ages: ages(),
+    }
 }

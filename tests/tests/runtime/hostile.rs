@@ -86,7 +86,8 @@ fn broken_commands_never_come_through() {
         assert_eq!(counts.of(*refusal), before + 1, "{n}: {refusal:?}");
         assert_eq!(counts.received, 0, "{n}");
     }
-    // None of that made it the channel's publisher: a good one is heard at once.
+    // Nothing of that is remembered: the next publisher is heard at once.
+    drop(hostile);
     let mut outlet = bus.outlet(&COMMAND, 1).unwrap();
     outlet.send_one(Stamp::default(), drive, now_ns()).unwrap();
     assert_eq!(polled(&mut inlet).received, 1);
@@ -107,6 +108,27 @@ fn what_is_older_than_what_was_taken_does_not_count_again() {
         hostile.send(stamp, &[drive]);
         let counts = polled(&mut inlet);
         assert_eq!((counts.received, counts.of(Refusal::OutOfOrder)), (received, out_of_order), "{stamp:?}");
+    }
+}
+
+/// Each reader takes the latest publisher for the channel's, and none of before is heard again, whatever it sends.
+#[test]
+fn a_publisher_that_another_has_followed_is_heard_no_more() {
+    let run = Run::new();
+    let bus = Bus::join(&run.name).unwrap();
+    let mut readers = [bus.inlet(&COMMAND).unwrap(), bus.inlet(&COMMAND).unwrap()];
+    let drive = CommandRecord { speed_mps: 1.0, decision: 1, ..CommandRecord::default() };
+    for (epoch_ns, sequence, received, others) in [(5, 1, 1, 0), (3, 9, 1, 1), (5, 9, 1, 2), (7, 1, 2, 2)] {
+        let hostile = Hostile::new(&run.name, &COMMAND, 1);
+        hostile.send(Stamp { epoch_ns, ..stamp(sequence) }, &[drive]);
+        for inlet in &mut readers {
+            let counts = polled(inlet);
+            assert_eq!(
+                (counts.received, counts.of(Refusal::OtherPublisher)),
+                (received, others),
+                "{epoch_ns}"
+            );
+        }
     }
 }
 
@@ -138,28 +160,37 @@ fn maps_with_huge_counts_and_wrong_lengths_never_come_through() {
             .send(SurfaceHeader { stamp: stamp(1), grid, ..SurfaceHeader::default() }, &[[0.0; 8]; 4]);
         assert!(surfaces.newest().is_none(), "{grid:?}");
     }
-    let odd = SurfaceHeader { stamp: stamp(1), grid, jump_m: [f64::NAN; 3], ..SurfaceHeader::default() };
-    hostile_surface.send(odd, &[[0.0; 8]; 4]);
-    assert!(surfaces.newest().is_none());
-    assert_eq!((surfaces.counts().of(Refusal::Malformed), surfaces.counts().of(Refusal::NonFinite)), (4, 1));
+    let header = SurfaceHeader { stamp: stamp(1), grid, ..SurfaceHeader::default() };
+    let odd = [
+        SurfaceHeader { jump_m: [f64::NAN; 3], ..header },
+        SurfaceHeader { jump_yaw_rad: f64::INFINITY, ..header },
+        SurfaceHeader { shift_yaw_rad: f64::NAN, ..header },
+    ];
+    for header in odd {
+        hostile_surface.send(header, &[[0.0; 8]; 4]);
+        assert!(surfaces.newest().is_none(), "{header:?}");
+    }
+    let nowhere = OdometryRecord { position_m: [1e19, 0.0, 0.0], ..OdometryRecord::default() };
+    hostile_surface.send(SurfaceHeader { odometry: nowhere, ..header }, &[[0.0; 8]; 4]);
+    assert!(surfaces.newest().is_none(), "a position that no window can be placed at");
+    assert_eq!((surfaces.counts().of(Refusal::Malformed), surfaces.counts().of(Refusal::NonFinite)), (5, 3));
 }
 
 #[test]
-fn a_flood_keeps_nobody_from_being_heard() {
+fn a_flood_hides_nothing_that_is_whole() {
     let run = Run::new();
     let bus = Bus::join(&run.name).unwrap();
     let mut inlet = bus.inlet(&ODOMETRY).unwrap();
-    // The flood comes first, so that the channel's publisher is behind it wherever order counts.
     let hostile = Hostile::new(&run.name, &ODOMETRY, 1);
-    let mut outlet = bus.outlet(&ODOMETRY, 1).unwrap();
     let mut heard = 0;
     for cycle in 1..=20u64 {
         for n in 0..500 {
             let flood = Stamp { layout_version: 99, ..stamp(500 * cycle + n) };
             hostile.send(flood, &[OdometryRecord::default()]);
         }
-        outlet.send_one(Stamp::default(), OdometryRecord::default(), cycle).unwrap();
-        inlet.poll(|stamp, _| heard += u64::from(stamp.valid_at_ns == cycle));
+        // In the midst of its flood, what is whole counts.
+        hostile.send(stamp(cycle), &[OdometryRecord::default()]);
+        inlet.poll(|stamp, _| heard += u64::from(stamp.sequence == cycle));
     }
     assert_eq!(heard, 20);
     assert_eq!(inlet.counts().lost, 0);

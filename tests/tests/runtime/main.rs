@@ -11,8 +11,10 @@ mod fixture;
 mod hostile;
 mod layouts;
 mod measurements;
+mod missions;
 mod onlookers;
 mod recordings;
+mod rewritten;
 mod supervision;
 mod witness;
 

@@ -5,10 +5,16 @@ use std::net::TcpStream;
 use std::sync::atomic::{AtomicBool, AtomicU16, Ordering};
 use std::time::Duration;
 
-use runtime::channel::{Bus, ODOMETRY};
+use bicycle::Decision;
+use runtime::channel::{
+    Bus, CHECKPOINT, COMMAND, ChannelError, DECISION, Inlet, MISSION, ODOMETRY, RISK, RISK_PHYSICS, SCAN,
+    STUCK, SURFACE,
+};
 use runtime::clock;
 use runtime::live;
-use runtime::message::{OdometryRecord, Stamp};
+use runtime::message::{DecisionRecord, OdometryRecord, Stamp};
+use runtime::status::Role;
+use runtime::supervisor::{RestartPolicy, Supervisor};
 
 use crate::fixture::{Run, eventually};
 
@@ -67,6 +73,63 @@ impl Client {
         frame.extend(text.as_bytes());
         self.stream.write_all(&frame).unwrap();
     }
+}
+
+/// Somebody who reads everything.
+struct ThirdParty {
+    decisions: Inlet<Stamp, DecisionRecord>,
+    _others: Box<dyn std::any::Any>,
+}
+
+impl ThirdParty {
+    fn join(run: &Run) -> Result<Self, ChannelError> {
+        let bus = Bus::join(&run.name)?;
+        let decisions = bus.inlet(&DECISION)?;
+        let small = (bus.inlet(&ODOMETRY)?, bus.inlet(&COMMAND)?, bus.inlet(&STUCK)?, bus.inlet(&MISSION)?);
+        let maps = (bus.inlet(&SURFACE)?, bus.inlet(&RISK)?, bus.inlet(&RISK_PHYSICS)?);
+        let rest = (bus.inlet(&SCAN)?, bus.inlet(&CHECKPOINT)?);
+        let statuses: Vec<_> =
+            Role::ALL.iter().map(|role| bus.inlet(&role.status())).collect::<Result<_, _>>()?;
+        Ok(Self { decisions, _others: Box::new((bus, small, maps, rest, statuses)) })
+    }
+}
+
+/// The guests come first: whoever found no room would be one of the run's own.
+#[test]
+fn all_roles_the_live_view_and_two_third_parties_have_room() {
+    let mut run = Run::new();
+    let mut guests = [ThirdParty::join(&run).unwrap(), ThirdParty::join(&run).unwrap()];
+    let bus = Bus::join(&run.name).unwrap();
+    let never = |_| std::process::Command::new("false");
+    let _supervisor = Supervisor::new(&bus, &Role::ALL, RestartPolicy::default(), &never).unwrap();
+    // Learning with --learn reads these, too.
+    let _school = (bus.inlet(&ODOMETRY).unwrap(), bus.inlet(&COMMAND).unwrap());
+    run.start_all(&Role::ALL);
+    let (is_over, port) = (AtomicBool::new(false), AtomicU16::new(0));
+    std::thread::scope(|scope| {
+        let live = scope.spawn(|| {
+            let bus = Bus::join(&run.name).unwrap();
+            let is_over = || is_over.load(Ordering::Relaxed);
+            live::run(&bus, ("127.0.0.1", 0), &is_over, &mut |at| port.store(at, Ordering::Relaxed)).unwrap();
+        });
+        let mut has_driven = [false; 2];
+        let found = eventually(LIMIT_S, || {
+            for (guest, has_driven) in guests.iter_mut().zip(&mut has_driven) {
+                guest.decisions.poll(|_, records| {
+                    *has_driven |= matches!(records[0].command.decision(), Some(Decision::Drive(_)));
+                });
+            }
+            let is_all = has_driven == [true; 2] && port.load(Ordering::Relaxed) > 0;
+            (is_all && !run.recordings().is_empty()).then_some(())
+        });
+        let is_viewed = !live.is_finished();
+        is_over.store(true, Ordering::Relaxed);
+        assert!(found.is_some() && is_viewed, "somebody found no room");
+    });
+    // It is counted: whoever comes beyond that is told what to do.
+    let told = ThirdParty::join(&run).err().expect("every place is taken").to_string();
+    assert!(told.contains("expected at most 4 readers") && told.contains("--third-parties"), "{told}");
+    run.end();
 }
 
 #[test]

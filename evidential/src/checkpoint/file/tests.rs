@@ -34,6 +34,17 @@ fn checkpoint_survives_its_files_to_the_last_bit() {
 }
 
 #[test]
+fn a_sidecar_of_another_version_is_told_by_its_version_whatever_else_it_holds() {
+    let older = |s: &mut serde_json::Value| {
+        let fields = s.as_object_mut().unwrap();
+        fields.remove("density");
+        fields.insert("temperature".to_owned(), 1.5.into());
+        fields.insert("format".to_owned(), 0.into());
+    };
+    assert_eq!(refused(older), "format: expected 1, found 0");
+}
+
+#[test]
 fn other_format_bins_or_lengths_are_refused_with_expected_and_found() {
     assert_eq!(refused(|s| s["format"] = 2.into()), "format: expected 1, found 2");
     let told = refused(|s| s["traction_bins"][1] = 0.1.into());

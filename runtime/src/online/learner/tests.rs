@@ -62,7 +62,7 @@ fn drive(deviations: &[Deviation], seed: u64, time_s: f64) -> Vec<Stretch> {
         notebook.note_command(odometry.valid_at_ns, &bicycle::Decision::Drive(command));
         notebook.note_odometry(&odometry);
         if notebook.is_full() {
-            stretches.push(notebook.take(surface.clone(), [0.0; 2]));
+            stretches.push(notebook.take(surface.clone(), navigator::Jump::NONE));
         }
         episode.apply(&bicycle::Decision::Drive(command)).unwrap();
     }

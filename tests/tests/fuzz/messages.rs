@@ -1,0 +1,398 @@
+//! Every message that goes over a channel: its numbers are put at the edges of what they can be, its payload has other
+//! lengths, and what is admitted does the work that messages do.
+
+use std::sync::LazyLock;
+
+use bytemuck::{AnyBitPattern, NoUninit};
+use evidential::Checkpoint;
+use formats::DriveTopics;
+use foxglove::Context;
+use navigator::{Chart, Guard, GuardConfig, Surface, Surveyor};
+use rand::RngExt;
+use runtime::ages::{AgeLimits, Periods};
+use runtime::channel::{self, Channel, Element, Header};
+use runtime::layout::Scalar;
+use runtime::message::{
+    CheckpointHeader, CommandRecord, DecisionRecord, Grid, MissionRecord, OdometryRecord, RiskHeader,
+    ScanHeader, StatusRecord, StuckRecord, SurfaceHeader, layouts,
+};
+use runtime::payload::{RiskParts, risk_views, surface_map};
+use runtime::status::Role;
+use runtime::timing::Timing;
+use runtime::watchdog::Watchdog;
+use terrain::Pose;
+
+use crate::harness::{Fate, Reader, Rng};
+use crate::machine::{Drive, MACHINE, at_ns, goal, judge, pilot, stamped};
+use crate::mutate::{self, once_in};
+use crate::networks;
+
+/// Where the numbers of a record lie.
+pub fn places(record: &str) -> Vec<(usize, Scalar)> {
+    let all = layouts();
+    let layout = all.iter().find(|layout| layout.name == record).unwrap();
+    let mut places = Vec::new();
+    for field in &layout.fields {
+        match field.scalar {
+            Scalar::Record(inner) => {
+                let size = all.iter().find(|layout| layout.name == inner).unwrap().size;
+                for k in 0..field.count {
+                    places
+                        .extend(self::places(inner).iter().map(|(at, s)| (field.offset + k * size + at, *s)));
+                }
+            }
+            scalar => {
+                let width = if matches!(scalar, Scalar::F32 | Scalar::U32) { 4 } else { 8 };
+                places.extend((0..field.count).map(|k| (field.offset + k * width, scalar)));
+            }
+        }
+    }
+    places
+}
+
+/// A message that is as it should be, and what it is made of.
+#[derive(Clone)]
+pub struct Whole {
+    header: Vec<u8>,
+    header_places: Vec<(usize, Scalar)>,
+    payload: Vec<u8>,
+    element_bytes: usize,
+    element_places: Vec<(usize, Scalar)>,
+}
+
+impl Whole {
+    fn new<H: NoUninit, T: NoUninit>(
+        (header, name): (&H, &str),
+        payload: &[T],
+        element_places: Vec<(usize, Scalar)>,
+    ) -> Self {
+        Self {
+            header: bytemuck::bytes_of(header).to_vec(),
+            header_places: places(name),
+            payload: bytemuck::cast_slice(payload).to_vec(),
+            element_bytes: size_of::<T>(),
+            element_places,
+        }
+    }
+
+    /// A message of one record under a stamp.
+    fn one<T: NoUninit>(record: T, name: &str) -> Self {
+        Self::new((&stamped(1), "Stamp"), &[record], places(name))
+    }
+
+    /// The same under another header, with as many elements as that wants.
+    fn under(&self, header: &impl NoUninit, n_elements: usize) -> Self {
+        let payload = self.payload.iter().copied().cycle().take(n_elements * self.element_bytes).collect();
+        Self { header: bytemuck::bytes_of(header).to_vec(), payload, ..self.clone() }
+    }
+
+    /// Header, then payload, of which numbers or lengths are broken.
+    fn broken(&self, rng: &mut Rng) -> Vec<u8> {
+        let (mut header, mut payload) = (self.header.clone(), self.payload.clone());
+        mutate::scalars(rng, &mut header, &self.header_places);
+        let n_elements = payload.len() / self.element_bytes;
+        for _ in 0..rng.random_range(0..3) {
+            let Some(last) = n_elements.checked_sub(1) else { break };
+            let start = self.element_bytes * rng.random_range(0..=last);
+            mutate::scalars(rng, &mut payload[start..start + self.element_bytes], &self.element_places);
+        }
+        match rng.random_range(0..16) {
+            0 => payload.truncate(self.element_bytes * rng.random_range(0..=n_elements)),
+            1 => payload.extend(vec![0; self.element_bytes * rng.random_range(1..4)]),
+            2 => mutate::bytes(rng, &mut header),
+            3 => mutate::bytes(rng, &mut payload),
+            _ => {}
+        }
+        header.resize(self.header.len(), 0);
+        [header, payload].concat()
+    }
+}
+
+/// Header and payload out of bytes, as they would lie in shared memory.
+fn parts<H: AnyBitPattern, T: AnyBitPattern>(input: &[u8]) -> (H, Vec<T>) {
+    let (header, rest) = input.split_at(size_of::<H>());
+    let payload = rest.chunks_exact(size_of::<T>()).map(bytemuck::pod_read_unaligned).collect();
+    (bytemuck::pod_read_unaligned(header), payload)
+}
+
+/// Checks messages as every reader of the channel does, and has what is admitted used.
+fn reader<H: Header, T: Element>(
+    channel: Channel<H, T>,
+    mut use_it: impl FnMut(&H, &[T]) + 'static,
+) -> Reader {
+    Box::new(move |input| {
+        let (header, payload) = parts::<H, T>(input);
+        let fate = Fate::of(&(channel.check)(&header, &payload));
+        if fate == Fate::Taken {
+            use_it(&header, &payload);
+        }
+        fate
+    })
+}
+
+static ODOMETRY: LazyLock<Whole> =
+    LazyLock::new(|| Whole::one(OdometryRecord::from(&Drive::odometry(1)), "OdometryRecord"));
+
+pub fn odometry(rng: &mut Rng) -> Vec<u8> {
+    ODOMETRY.broken(rng)
+}
+
+/// Between two that are whole, so that what it leaves behind is seen.
+pub fn read_odometry() -> Reader {
+    let (drive, topics) = (Drive::get(), DriveTopics::new(&Context::new()));
+    reader(channel::ODOMETRY, move |stamp, records| {
+        let odometry = records[0].odometry(stamp.valid_at_ns);
+        let mut guard = Guard::new(GuardConfig::default());
+        let mut pilot = pilot();
+        for odometry in [Drive::odometry(0), odometry, Drive::odometry(2)] {
+            guard.admit_odometry(&odometry).ok();
+            pilot.admit(&odometry);
+        }
+        guard.check(at_ns(2)).ok();
+        let chart = drive.chart();
+        pilot.decide(at_ns(3), Some(Chart { odometry_at_ns: at_ns(1), ..chart }), &goal());
+        let [x_m, y_m, z_m] = odometry.position_m;
+        let [roll_rad, pitch_rad, yaw_rad] = odometry.attitude_rad;
+        topics.pose(stamp.valid_at_ns, &Pose { x_m, y_m, z_m, roll_rad, pitch_rad, yaw_rad });
+        topics.risk(stamp.valid_at_ns, &chart.map, yaw_rad);
+    })
+}
+
+static SCAN: LazyLock<Whole> = LazyLock::new(|| {
+    let drive = Drive::get();
+    Whole::new((&drive.scan.0, "ScanHeader"), &drive.scan.1, places("PointRecord"))
+});
+
+pub fn scan(rng: &mut Rng) -> Vec<u8> {
+    SCAN.broken(rng)
+}
+
+pub fn read_scan() -> Reader {
+    let (drive, topics) = (Drive::get(), DriveTopics::new(&Context::new()));
+    reader(channel::SCAN, move |header: &ScanHeader, points| {
+        let scan = header.scan(points);
+        topics.scan(header.stamp.valid_at_ns, &scan);
+        let (vehicle, config) = (&MACHINE.vehicle, &MACHINE.config);
+        let mut surveyor = Surveyor::new(vehicle, config.elevation, config.guard, Surface::Sensed).unwrap();
+        for scan in [&scan, &drive.scan()] {
+            surveyor.fuse(&Drive::odometry(1), scan).unwrap();
+        }
+    })
+}
+
+/// Numbers of an element of so many f32.
+fn floats(n: usize) -> Vec<(usize, Scalar)> {
+    (0..n).map(|k| (4 * k, Scalar::F32)).collect()
+}
+
+static SURFACE: LazyLock<Whole> = LazyLock::new(|| {
+    let drive = Drive::get();
+    Whole::new((&drive.surface.0, "SurfaceHeader"), &drive.surface.1, floats(8))
+});
+
+/// A window around the vehicle with sides that fit nothing else, down to a single cell.
+fn any_shape(rng: &mut Rng, grid: &mut Grid) {
+    [grid.n_cols, grid.n_rows] = [(); 2].map(|()| rng.random_range(1..12));
+    grid.origin = [grid.n_cols, grid.n_rows].map(|n| -(n as i64) / 2);
+}
+
+pub fn surface(rng: &mut Rng) -> Vec<u8> {
+    let mut header = Drive::get().surface.0;
+    if once_in(rng, 2) {
+        any_shape(rng, &mut header.grid);
+    }
+    SURFACE.under(&header, (header.grid.n_rows * header.grid.n_cols) as usize).broken(rng)
+}
+
+/// Between two that are whole.
+pub fn read_surface() -> Reader {
+    let (drive, topics) = (Drive::get(), DriveTopics::new(&Context::new()));
+    reader(channel::SURFACE, move |header: &SurfaceHeader, cells| {
+        let mut maker = judge();
+        maker.set_goal(goal().goal_m);
+        for (header, cells) in
+            [(&drive.surface.0, drive.surface.1.as_slice()), (header, cells), drive.surface()]
+        {
+            // A map of another resolution than the machine's ends the process with an error: it is not this machine's.
+            let Ok(Ok(())) = maker.update(header, cells) else { break };
+            Drive::risk_of(&mut maker).unwrap();
+        }
+        if let Some(map) = surface_map(header, cells) {
+            topics.elevation(header.stamp.valid_at_ns, &map);
+        }
+    })
+}
+
+static RISK: LazyLock<Whole> = LazyLock::new(|| {
+    let drive = Drive::get();
+    Whole::new((&drive.risk.0, "RiskHeader"), &drive.risk.1, floats(4))
+});
+
+pub fn risk(rng: &mut Rng) -> Vec<u8> {
+    let mut header = Drive::get().risk.0;
+    if once_in(rng, 2) {
+        any_shape(rng, &mut header.grid);
+        header.n_yaws = rng.random_range(1..4);
+    }
+    let parts = RiskParts::new(&header.grid.geometry().unwrap(), header.n_yaws as usize);
+    RISK.under(&header, parts.n_elements()).broken(rng)
+}
+
+pub fn read_risk() -> Reader {
+    let topics = DriveTopics::new(&Context::new());
+    reader(channel::RISK, move |header: &RiskHeader, elements| {
+        let (map, time_to_goal) = risk_views(header, elements).unwrap();
+        topics.risk(header.stamp.valid_at_ns, &map, 0.5);
+        let mut pilot = pilot();
+        for k in 0..3 {
+            pilot.admit(&Drive::odometry(k));
+            pilot.note_scan(header.stamp.valid_at_ns);
+            let chart = Chart { map, time_to_goal, odometry_at_ns: header.odometry_at_ns };
+            pilot.decide(at_ns(k), Some(chart), &goal());
+        }
+    })
+}
+
+static COMMAND: LazyLock<Whole> = LazyLock::new(|| {
+    let drive = CommandRecord {
+        speed_mps: 0.5,
+        steering_rad: 0.1,
+        decision: 1,
+        reason: 0,
+        odometry_at_ns: at_ns(0),
+        scan_at_ns: at_ns(0),
+    };
+    Whole::one(drive, "CommandRecord")
+});
+
+pub fn command(rng: &mut Rng) -> Vec<u8> {
+    COMMAND.broken(rng)
+}
+
+pub fn read_command() -> Reader {
+    let limits = MACHINE.vehicle.limits;
+    let ages = AgeLimits::new(&Periods::default(), &GuardConfig::default(), None).unwrap();
+    reader(channel::COMMAND, move |stamp, records: &[CommandRecord]| {
+        let decision = records[0].decision().unwrap();
+        let mut watchdog = Watchdog::new(limits, ages);
+        watchdog.admit(&records[0], stamp.published_at_ns);
+        if let bicycle::Decision::Drive(command) = watchdog.decision(at_ns(1)) {
+            let within = f64::from(command.speed_mps).abs() <= 1.001 * limits.speed_max_mps
+                && f64::from(command.steering_rad).abs() <= 1.001 * limits.steering_max_rad;
+            assert!(within, "beyond the limits: {command:?}");
+        }
+        let mut guard = Guard::new(GuardConfig::default());
+        if let bicycle::Decision::Drive(command) = decision {
+            guard.note_command(command.speed_mps);
+        }
+        for cycle in 0..3 {
+            guard.admit_odometry(&Drive::odometry(cycle)).ok();
+        }
+    })
+}
+
+static DECISION: LazyLock<Whole> =
+    LazyLock::new(|| Whole::one(Drive::get().decisions[0].1, "DecisionRecord"));
+
+pub fn decision(rng: &mut Rng) -> Vec<u8> {
+    DECISION.broken(rng)
+}
+
+pub fn read_decision() -> Reader {
+    let (first, whole) = Drive::get().decisions[0];
+    reader(channel::DECISION, move |stamp, records: &[DecisionRecord]| {
+        let mut timing = Timing::default();
+        for (stamp, record) in [(first, whole), (*stamp, records[0]), (first, whole)] {
+            timing.take(&stamp, &record);
+        }
+        timing.report();
+    })
+}
+
+static MISSION: LazyLock<Whole> = LazyLock::new(|| {
+    let mission = MissionRecord { goal_m: goal().goal_m, tolerance_m: 0.5, time_s: 1.0, outcome: 0 };
+    Whole::one(mission, "MissionRecord")
+});
+
+pub fn mission(rng: &mut Rng) -> Vec<u8> {
+    MISSION.broken(rng)
+}
+
+pub fn read_mission() -> Reader {
+    let drive = Drive::get();
+    reader(channel::MISSION, move |_, records: &[MissionRecord]| {
+        let MissionRecord { goal_m, tolerance_m, .. } = records[0];
+        let mut maker = judge();
+        maker.set_goal(goal_m);
+        let (header, cells) = drive.surface();
+        maker.update(header, cells).unwrap().unwrap();
+        let (header, elements) = Drive::risk_of(&mut maker).unwrap();
+        let Some((map, time_to_goal)) = risk_views(&header, &elements) else { return };
+        let mut pilot = pilot();
+        pilot.admit(&Drive::odometry(1));
+        let destination = navigator::Destination { goal_m, tolerance_m };
+        pilot.decide(
+            at_ns(1),
+            Some(Chart { map, time_to_goal, odometry_at_ns: header.odometry_at_ns }),
+            &destination,
+        );
+    })
+}
+
+static STUCK: LazyLock<Whole> =
+    LazyLock::new(|| Whole::one(StuckRecord { position_m: [2.0, 2.0], yaw_rad: 0.3 }, "StuckRecord"));
+
+pub fn stuck(rng: &mut Rng) -> Vec<u8> {
+    STUCK.broken(rng)
+}
+
+pub fn read_stuck() -> Reader {
+    let drive = Drive::get();
+    reader(channel::STUCK, move |stamp, records: &[StuckRecord]| {
+        let mut maker = judge();
+        maker.set_goal(goal().goal_m);
+        maker.note_stuck(stamp, &records[0]);
+        let (header, cells) = drive.surface();
+        maker.update(header, cells).unwrap().unwrap();
+        Drive::risk_of(&mut maker).unwrap();
+    })
+}
+
+static STATUS: LazyLock<Whole> = LazyLock::new(|| Whole::one(StatusRecord::default(), "StatusRecord"));
+
+pub fn status(rng: &mut Rng) -> Vec<u8> {
+    STATUS.broken(rng)
+}
+
+pub fn read_status() -> Reader {
+    reader(Role::Plant.status(), |_, _| ())
+}
+
+static LEARNED: LazyLock<Whole> = LazyLock::new(|| {
+    let (n_weight_bytes, payload) = networks::message_payload();
+    let header = CheckpointHeader { stamp: stamped(1), n_weight_bytes, ..CheckpointHeader::default() };
+    Whole::new((&header, "CheckpointHeader"), &payload, vec![])
+});
+
+pub fn learned(rng: &mut Rng) -> Vec<u8> {
+    let mut whole = bytemuck::pod_read_unaligned::<CheckpointHeader>(&LEARNED.header);
+    let mut payload = LEARNED.payload.clone();
+    match rng.random_range(0..4) {
+        0 => whole.n_weight_bytes = networks::said_length(rng, payload.len()),
+        1 => mutate::bytes(rng, &mut payload),
+        2 => payload = networks::checkpoint(rng),
+        _ => {}
+    }
+    let mut header = bytemuck::bytes_of(&whole).to_vec();
+    if once_in(rng, 2) {
+        mutate::scalars(rng, &mut header, &LEARNED.header_places);
+    }
+    [header, payload].concat()
+}
+
+pub fn read_learned() -> Reader {
+    reader(channel::CHECKPOINT, |header: &CheckpointHeader, payload| {
+        let (weights, sidecar) = payload.split_at(header.n_weight_bytes as usize);
+        drop(Checkpoint::from_bytes(weights, sidecar));
+    })
+}
