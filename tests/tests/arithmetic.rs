@@ -4,7 +4,7 @@
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::sync::{Arc, LazyLock};
 
 use bicycle::lanes::{Instructions, Isa};
 use bicycle::{Decision, Model, Odometry};
@@ -173,15 +173,35 @@ fn drive(isa: Isa) -> [u64; 3] {
     [hash(ground), hash(risks.chain(gradients)), hash(commands)]
 }
 
+/// The drive on each instruction set that the machine has, the widest first.
+static DRIVES: LazyLock<Vec<(Isa, [u64; 3])>> =
+    LazyLock::new(|| Instructions::all().map(|found| (found.isa(), drive(found.isa()))).collect());
+
 /// Maps differ in rounding, so one that was made with others would show.
 #[test]
 fn the_instruction_set_of_the_configuration_makes_the_map() {
-    let [ground, map, _] = drive(Isa::Portable);
-    for instructions in Instructions::all().filter(|found| found.isa() != Isa::Portable) {
-        let [its_ground, its_map, _] = drive(instructions.isa());
-        assert_eq!(its_ground, ground, "no kernel has a part in the ground");
-        assert_ne!(its_map, map, "{instructions:?}");
+    let (portable, wider) = DRIVES.split_last().unwrap();
+    assert_eq!(portable.0, Isa::Portable);
+    for (isa, [ground, map, _]) in wider {
+        assert_eq!(*ground, portable.1[0], "no kernel has a part in the ground");
+        assert_ne!(*map, portable.1[1], "{isa:?}");
     }
+}
+
+/// What [`drive`] gives on every machine that has the instruction set, whoever made its processor and whatever its
+/// system is. A change of the computation changes these numbers on purpose; another compiler, processor or platform
+/// must not.
+const EVERYWHERE: [(Isa, [u64; 3]); 3] = [
+    (Isa::Avx512, [0xaa65_bf16_4750_d5a3, 0x9eee_048b_9a04_46f1, 0x8903_41ee_8ec5_9bd8]),
+    (Isa::Avx2, [0xaa65_bf16_4750_d5a3, 0x9eee_048b_9a04_46f1, 0xc493_cfb5_ac01_7c0c]),
+    (Isa::Portable, [0xaa65_bf16_4750_d5a3, 0x7f33_2b95_2952_ed16, 0x9939_2e07_8b39_d649]),
+];
+
+#[test]
+fn a_drive_gives_the_same_numbers_on_every_machine() {
+    let here = |isa: &Isa| DRIVES.iter().any(|(of, _)| of == isa);
+    let expected: Vec<_> = EVERYWHERE.into_iter().filter(|(isa, _)| here(isa)).collect();
+    assert_eq!(*DRIVES, expected, "found {:#018x?}", *DRIVES);
 }
 
 /// The platform's own function, for the witness below: fails where that is not to be had.
