@@ -1,12 +1,17 @@
 //! Configuration in TOML: what is refused is named by file, line and field, with what was expected and what was found.
 
 use std::fmt::Display;
+use std::fs::File;
+use std::io::{ErrorKind, Read};
 use std::ops::Range;
 use std::path::Path;
 
 use serde::de::DeserializeOwned;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
+
+/// What a configuration file may hold, some ten times what the longest does.
+const LENGTH_MAX_BYTES: u64 = 1 << 18;
 
 /// A configuration file that cannot be used. Every message is one line.
 #[derive(Debug, thiserror::Error)]
@@ -18,6 +23,12 @@ pub enum ConfigError {
         file: String,
         /// What the system said.
         source: std::io::Error,
+    },
+    /// The file is longer than any configuration: parsed, a text may take hundreds of times its own memory.
+    #[error("{file}: expected at most {LENGTH_MAX_BYTES} bytes of configuration, found more")]
+    TooLong {
+        /// Path as given.
+        file: String,
     },
     /// The text is no TOML.
     #[error("{file}:{line}: expected TOML, found: {problem}")]
@@ -53,11 +64,12 @@ pub struct ConfigText {
 }
 
 impl ConfigText {
-    /// Reads a file. Errors: [`ConfigError::Unreadable`].
+    /// Reads a file. Errors: [`ConfigError::Unreadable`] and [`ConfigError::TooLong`].
     pub fn read(path: &Path) -> Result<Self, ConfigError> {
         let file = path.display().to_string();
-        match std::fs::read_to_string(path) {
-            Ok(text) => Ok(Self { file, text }),
+        match read_bounded(path) {
+            Ok(Some(text)) => Ok(Self { file, text }),
+            Ok(None) => Err(ConfigError::TooLong { file }),
             Err(source) => Err(ConfigError::Unreadable { file, source }),
         }
     }
@@ -70,22 +82,27 @@ impl ConfigText {
     /// The values of the file. `T` should deny unknown fields. Errors: [`ConfigError::Syntax`] and
     /// [`ConfigError::Field`] for an unknown or missing key or a value of the wrong type.
     pub fn parse<T: DeserializeOwned>(&self) -> Result<T, ConfigError> {
-        let document = DeTable::parse(&self.text).map_err(|error| ConfigError::Syntax {
-            file: self.file.clone(),
-            line: self.line(&error.span().unwrap_or_default()),
-            problem: one_line(error.message()),
-        })?;
-        toml::from_str(&self.text).map_err(|error| {
-            let span = error.span().unwrap_or_default();
-            let refusal = Refusal::from_message(error.message());
-            let place = path_of(document.get_ref(), &span);
-            let path = match refusal.key {
-                Some(key) if place.is_empty() => key,
-                Some(key) if place != key && !place.ends_with(&format!(".{key}")) => format!("{place}.{key}"),
-                _ => place,
-            };
-            self.field_error(&span, path, refusal.expected, refusal.found)
+        // Where a value stands is made out only once it is refused: two documents at a time hold twice the memory.
+        toml::from_str(&self.text).map_err(|error| match DeTable::parse(&self.text) {
+            Ok(document) => self.refused_value(&error, document.get_ref()),
+            Err(error) => ConfigError::Syntax {
+                file: self.file.clone(),
+                line: self.line(&error.span().unwrap_or_default()),
+                problem: one_line(error.message()),
+            },
         })
+    }
+
+    fn refused_value(&self, error: &toml::de::Error, document: &DeTable<'_>) -> ConfigError {
+        let span = error.span().unwrap_or_default();
+        let refusal = Refusal::from_message(error.message());
+        let place = path_of(document, &span);
+        let path = match refusal.key {
+            Some(key) if place.is_empty() => key,
+            Some(key) if place != key && !place.ends_with(&format!(".{key}")) => format!("{place}.{key}"),
+            _ => place,
+        };
+        self.field_error(&span, path, refusal.expected, refusal.found)
     }
 
     /// Whether the text is TOML with this key at its top level, to tell kinds of files apart.
@@ -114,6 +131,16 @@ impl ConfigText {
         let before = &self.text.as_bytes()[..span.start.min(self.text.len())];
         1 + before.iter().filter(|byte| **byte == b'\n').count()
     }
+}
+
+/// The text of a file; nothing if there is more than a configuration may hold.
+fn read_bounded(path: &Path) -> std::io::Result<Option<String>> {
+    let mut bytes = Vec::new();
+    File::open(path)?.take(LENGTH_MAX_BYTES + 1).read_to_end(&mut bytes)?;
+    if bytes.len() as u64 > LENGTH_MAX_BYTES {
+        return Ok(None);
+    }
+    String::from_utf8(bytes).map(Some).map_err(|error| std::io::Error::new(ErrorKind::InvalidData, error))
 }
 
 /// What serde's message says, taken apart.
@@ -275,6 +302,21 @@ mod tests {
         assert_eq!(message, "a.toml:4: inner.length_m: expected a number > 0, found -1");
         assert!(text.refuse("inner.list[1]", "x", "y").to_string().starts_with("a.toml:5: inner.list[1]:"));
         assert!(text.refuse("inner.absent", "x", "y").to_string().starts_with("a.toml:2: inner.absent:"));
+    }
+
+    #[test]
+    fn a_file_that_is_no_configuration_by_its_length_is_refused_before_it_is_parsed() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("long.toml");
+        let comment = |length: u64| "#".repeat(length as usize);
+        std::fs::write(&path, comment(LENGTH_MAX_BYTES)).unwrap();
+        ConfigText::read(&path).unwrap();
+        std::fs::write(&path, comment(LENGTH_MAX_BYTES + 1)).unwrap();
+        let message = ConfigText::read(&path).unwrap_err().to_string();
+        assert!(
+            message.ends_with("long.toml: expected at most 262144 bytes of configuration, found more"),
+            "{message}"
+        );
     }
 
     #[test]

@@ -33,10 +33,11 @@ pub enum Neighbourhood {
 pub struct CostToGoConfig {
     /// Directions of travel that the search knows.
     pub neighbourhood: Neighbourhood,
-    /// Speed on unknown cells over the vehicle's speed limit, in (0, 1]; whatever the risk map says of them, unless
+    /// Speed on unknown cells over the vehicle's speed limit, in [0.01, 1]; whatever the risk map says of them, unless
     /// the footprint touches an obstacle.
     pub unknown_speed_share: f64,
-    /// Speed beyond the window over the vehicle's speed limit, in (0, 1].
+    /// Speed beyond the window over the vehicle's speed limit, in [0.01, 1]: the smaller, the more memory the queue
+    /// takes.
     pub outside_speed_share: f64,
     /// How many times longer than at the speed limit a forbidden pose takes, in [1, 10000]. Finite, so that an
     /// enclosed vehicle still knows which way is out; ground too slippery for this speed counts as forbidden.
@@ -383,7 +384,8 @@ fn validate(config: &CostToGoConfig, limits: &Limits) -> Result<(), CostToGoErro
     let check = |field, found: f64, expected, allowed: bool| {
         if allowed { Ok(()) } else { Err(CostToGoError::Config { field, expected, found }) }
     };
-    let share = |field, found: f64| check(field, found, "a number in (0, 1]", found > 0.0 && found <= 1.0);
+    let share =
+        |field, found: f64| check(field, found, "a number from 0.01 to 1", (0.01..=1.0).contains(&found));
     let positive =
         |field, found: f64| check(field, found, "a finite number > 0", found > 0.0 && found.is_finite());
     share("unknown_speed_share", config.unknown_speed_share)?;

@@ -511,6 +511,7 @@ fn bad_input_is_refused_with_its_numbers() {
     for (config, field) in [
         (CostToGoConfig { unknown_speed_share: 0.0, ..good }, "unknown_speed_share"),
         (CostToGoConfig { outside_speed_share: 1.1, ..good }, "outside_speed_share"),
+        (CostToGoConfig { outside_speed_share: 1e-38, ..good }, "outside_speed_share"),
         (CostToGoConfig { outside_speed_share: f64::NAN, ..good }, "outside_speed_share"),
         (CostToGoConfig { forbidden_slowdown: 0.5, ..good }, "forbidden_slowdown"),
         (CostToGoConfig { forbidden_slowdown: f64::INFINITY, ..good }, "forbidden_slowdown"),

@@ -66,7 +66,8 @@ impl Config {
         let n = ((window_m / risk_m).ceil() as usize).min(128);
         // The ground under a footprint at the border must be inside the elevation window, and so must its drift.
         let margin_m = vehicle.geometry.length_m + 2.0 * risk_m;
-        let elevation_n = n + 2 * (margin_m / risk_m).ceil() as usize;
+        // A body beyond all measure asks for more cells than there are numbers; such a window is refused on validation.
+        let elevation_n = ((margin_m / risk_m).ceil() as usize).saturating_mul(2).saturating_add(n);
         let fitting = ElevationConfig::scaled_to(length_m);
         Self {
             elevation: ElevationConfig {

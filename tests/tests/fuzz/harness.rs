@@ -129,6 +129,12 @@ pub fn run(target: &Target, n_ordinary: u64) {
     }
 }
 
+/// Tries one input on the target of this name: the bytes that were held at once, or what went wrong.
+pub fn try_on(targets: &[Target], name: &str, input: &[u8]) -> Result<u64, String> {
+    let target = targets.iter().find(|target| target.name == name).unwrap();
+    judge(target, &mut (target.reader)(), input).map(|(_, held_bytes)| held_bytes)
+}
+
 /// What a target did to its inputs.
 #[derive(Default)]
 struct Tally {

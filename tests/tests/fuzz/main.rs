@@ -9,6 +9,7 @@
 
 mod archive;
 mod files;
+mod found;
 mod harness;
 mod image;
 mod machine;
@@ -26,6 +27,9 @@ const MB: u64 = 1 << 20;
 
 /// The table of targets, and a test of each: name, inputs of an ordinary run, memory that may be held for every byte of
 /// an input and always, what draws an input, and who reads it.
+///
+/// Where the input is TOML, every part of a dotted key, two bytes, is a table of its own; no such file may be longer than
+/// a configuration is.
 macro_rules! targets {
     ($($name:ident: $n_inputs:literal, $per_byte:expr, $always:expr, $input:path, $reader:path;)*) => {
         const TARGETS: &[Target] = &[$(Target {
@@ -55,11 +59,11 @@ targets! {
     png_scale: 8192, 256, 64 * KB, files::png_scale, files::read_png_scale;
     traction_map: 4096, 8 * KB, 64 * KB, files::traction_map, files::read_traction_map;
     scan_points: 8192, 8 * KB, 64 * KB, files::scan_points, files::read_scan_points;
-    vehicle: 4096, 256, 64 * KB, files::vehicle, files::read_vehicle;
-    model: 4096, 256, 64 * KB, files::model, files::read_model;
-    settings: 2048, 256, 64 * KB, files::settings, files::read_settings;
-    gap_case: 8192, 256, 64 * KB, files::gap_case, files::read_gap_case;
-    gap_vehicle: 4096, 256, 64 * KB, files::gap_vehicle, files::read_gap_vehicle;
+    vehicle: 4096, KB, 64 * KB, files::vehicle, files::read_vehicle;
+    model: 4096, KB, 64 * KB, files::model, files::read_model;
+    settings: 2048, KB, 64 * KB, files::settings, files::read_settings;
+    gap_case: 8192, KB, 64 * KB, files::gap_case, files::read_gap_case;
+    gap_vehicle: 4096, KB, 64 * KB, files::gap_vehicle, files::read_gap_vehicle;
     gap_grid: 8192, 64, 64 * KB, files::gap_grid, files::read_gap_grid;
     gap_labels: 8192, 64, 64 * KB, files::gap_labels, files::read_gap_labels;
     gap_seal: 8192, 64, 64 * KB, files::gap_seal, files::read_gap_seal;

@@ -168,6 +168,15 @@ pub fn pipeline(rng: &mut Rng) -> Vec<u8> {
     parts.join(SEPARATOR)
 }
 
+/// A whole input but for the length of the vehicle's body [m].
+pub fn with_body_length(length_m: &str) -> Vec<u8> {
+    let vehicle = toml::to_string(&MACHINE.vehicle).unwrap();
+    let own = format!("length_m = {:?}\n", MACHINE.vehicle.geometry.length_m);
+    assert!(vehicle.contains(&own), "{own}");
+    let vehicle = vehicle.replacen(&own, &format!("length_m = {length_m}\n"), 1);
+    [vehicle.into_bytes(), toml::to_string(&MACHINE.config).unwrap().into_bytes()].join(SEPARATOR)
+}
+
 /// Between the two texts of an input: a comment that mutation cannot make.
 const SEPARATOR: &[u8] = b"\n#-#-#\n";
 
