@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::sync::LazyLock;
 
 use formats::ConfigText;
-use navigator::{Assessor, Belief, Pilot, Surface, Surveyor};
+use navigator::{Assessor, Belief, Pilot, RiskMapConfig, Surface, Surveyor};
 use rand::RngExt;
 use runtime::ages::{AgeLimits, Periods};
 use runtime::layout::Scalar;
@@ -189,12 +189,20 @@ pub fn read_pipeline() -> Reader {
     })
 }
 
+/// Cells, and poses of the risk map, up to which windows are tried.
+const N_TRIED: usize = 1 << 18;
+
 fn made(vehicle: &str, settings: &str) -> Result<(), String> {
     let vehicle =
         formats::parse_vehicle(&ConfigText::new("v.toml", vehicle)).map_err(|error| error.to_string())?;
     let defaults = navigator::Config::for_vehicle(&vehicle);
     let mut config = formats::overlay(&ConfigText::new("s.toml", settings), &defaults)
         .map_err(|error| error.to_string())?;
+    let RiskMapConfig { n_rows, n_cols, n_yaws, .. } = config.risk_map;
+    let n_cells = config.elevation.n_rows.saturating_mul(config.elevation.n_cols);
+    if n_cells.max(n_rows.saturating_mul(n_cols).saturating_mul(n_yaws)) > N_TRIED {
+        return Err("a window so large takes the memory that it asks for".to_owned());
+    }
     // As many as the command line says, whatever the file does.
     config.controller.n_threads = 1;
     let model = bicycle::Model::of(&vehicle);
