@@ -56,7 +56,7 @@ targets! {
     elevation_npz: 8192, 8 * KB, 64 * KB, files::elevation_npz, files::read_elevation_npz;
     elevation_geotiff: 8192, 1536, 24 * MB, files::elevation_geotiff, files::read_elevation_geotiff;
     elevation_png: 8192, 8 * KB, 3 * MB, files::elevation_png, files::read_elevation_png;
-    png_scale: 8192, 256, 64 * KB, files::png_scale, files::read_png_scale;
+    png_scale: 8192, KB, 64 * KB, files::png_scale, files::read_png_scale;
     traction_map: 4096, 8 * KB, 64 * KB, files::traction_map, files::read_traction_map;
     scan_points: 8192, 8 * KB, 64 * KB, files::scan_points, files::read_scan_points;
     vehicle: 4096, KB, 64 * KB, files::vehicle, files::read_vehicle;
