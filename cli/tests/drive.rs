@@ -123,6 +123,18 @@ fn summary_holds_every_promised_field() {
     assert!(!json["revision"].as_str().unwrap().is_empty());
 }
 
+/// A gyroscope that is off by 1 rad/s: from one cycle to the next the heading turns 0.1 rad less than it says, give or take
+/// its noise, and more than that is a jump.
+#[test]
+fn summary_tells_how_often_the_localisation_jumped() {
+    let folder = tempfile::tempdir().unwrap();
+    let words = ["--seed", "5", "--time-limit", "2", "--method", "physics", "--deviation", "gyro_bias=1"];
+    drive(folder.path(), &words).output().unwrap();
+    let json: serde_json::Value =
+        serde_json::from_slice(&std::fs::read(folder.path().join("summary.json")).unwrap()).unwrap();
+    assert!(json["localisation_jumps"].as_u64().unwrap() >= 3, "{json}");
+}
+
 #[test]
 fn recording_carries_foxgloves_own_schemas() {
     let folder = tempfile::tempdir().unwrap();

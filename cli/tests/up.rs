@@ -227,6 +227,22 @@ fn a_drive_of_processes_is_recorded_and_made_again_and_what_is_cut_off_is_named(
     assert_lost_scans_are_named(&recording, folder.path());
 }
 
+/// A gyroscope that is off by 1 rad/s: from one message to the next the heading turns 0.1 rad less than it says, give or
+/// take its noise, and more than that is a jump.
+#[test]
+fn the_summary_of_processes_tells_how_often_the_localisation_jumped() {
+    let folder = tempfile::tempdir().unwrap();
+    let words = ["up", "--world", "arena", "--method", "physics", "--threads", "1", "--time-limit", "4"];
+    let mut drive = surefoot(&words);
+    drive
+        .args(["--odometry-rate", "10", "--deviation", "gyro_bias=1", "--run", &run_name("jumps"), "--out"])
+        .arg(folder.path());
+    let output = drive.output().unwrap();
+    assert_eq!(output.status.code(), Some(1), "{}", text(&output.stderr));
+    let summary = json(&folder.path().join("summary.json"));
+    assert!(summary["localisation_jumps"].as_u64().unwrap() >= 3, "{summary}");
+}
+
 /// A file that ends early says so, and gives what stands before.
 fn assert_cut(recording: &Path, folder: &Path) {
     let bytes = std::fs::read(recording).unwrap();

@@ -161,6 +161,7 @@ fn what_was_read_is_written_again() {
         file.other_columns.iter().map(|column| &column.name).collect::<Vec<_>>(),
         ["gear", "note, or none"]
     );
+    assert_eq!(file.other_columns[1].cells[142], "stone, 142");
     assert_eq!(range(&file.log, Column::X).2, 0);
     write_drive_log_csv(&folder.path(), &file).unwrap();
     let again = read_drive_log_csv(&folder.path()).unwrap();

@@ -41,9 +41,18 @@ impl Draft {
         }
     }
 
+    /// What was measured, four bins higher.
+    fn predicted(&self) -> Array3<f32> {
+        let n_bins = self.pmf.dim().0;
+        Array3::from_shape_fn(self.pmf.raw_dim(), |(bin, row, col)| {
+            self.pmf[[(bin + n_bins - 4) % n_bins, row, col]]
+        })
+    }
+
     fn bytes(&self) -> Vec<u8> {
         let mut bytes = Cursor::new(Vec::new());
         let mut npz = NpzWriter::new(&mut bytes);
+        let predicted = self.predicted();
         let mut fortran = Array3::<f64>::zeros(self.pmf.raw_dim().f());
         fortran.assign(&self.pmf.mapv(f64::from));
         macro_rules! add {
@@ -60,8 +69,8 @@ impl Draft {
         add!("unknown", &self.unknown);
         add!("measured_linear_pmf", &self.pmf);
         add!("measured_angular_pmf", &fortran);
-        add!("predicted_linear_pmf", &self.pmf);
-        add!("predicted_angular_pmf", &self.pmf);
+        add!("predicted_linear_pmf", &predicted);
+        add!("predicted_angular_pmf", &predicted);
         add!("predicted_normalised_density", &self.density);
         npz.finish().unwrap();
         bytes.into_inner()
@@ -84,8 +93,11 @@ fn every_cell_comes_back_where_it_was() {
     for index in map.known_cells() {
         let Cell { row, col } = geometry.cell(index);
         // The angular map was written in Fortran order.
-        for pmf in [&map.measured.linear, &map.measured.angular, &map.predicted.angular] {
+        for pmf in [&map.measured.linear, &map.measured.angular] {
             assert_eq!(pmf.values()[index].probabilities()[row + 3 * col], 1.0);
+        }
+        for pmf in [&map.predicted.linear, &map.predicted.angular] {
+            assert_eq!(pmf.values()[index].probabilities()[row + 3 * col + 4], 1.0);
         }
     }
     let unknown = Cell { row: 1, col: 2 };

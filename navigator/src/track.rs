@@ -160,8 +160,17 @@ mod tests {
 
     #[test]
     fn at_a_sample_its_own_bits_are_told() {
-        let at_ns = 780 * MILLISECOND_NS;
-        assert_eq!(track(1000, 20).at(at_ns), Whereabouts::Between(circling(at_ns)));
+        // Numbers that what lies between them does not come back to.
+        let sample = |k: u32| {
+            let speed_mps = [1e3, 1e-3][k as usize % 2] / f64::from(k);
+            let at_ns = u64::from(20 * k) * MILLISECOND_NS;
+            Odometry { wheel_speed_mps: speed_mps, velocity_mps: [speed_mps, 0.0], ..circling(at_ns) }
+        };
+        let mut track = Track::new(&GuardConfig::default());
+        (1..=50).for_each(|k| track.note(&sample(k)));
+        for k in 5..=50 {
+            assert_eq!(track.at(sample(k).valid_at_ns), Whereabouts::Between(sample(k)), "sample {k}");
+        }
     }
 
     #[test]

@@ -279,6 +279,11 @@ mod tests {
         assert_eq!(refused(RiskHeader { author: 3, ..header }, &payload), Refusal::Malformed);
         let huge = Grid { n_rows: u64::MAX, ..header.grid };
         assert_eq!(refused(RiskHeader { grid: huge, ..header }, &payload), Refusal::Malformed);
+        // Times are interpolated between rows: one alone is none, however right its length is.
+        let row = GridGeometry { resolution_m: 0.2, origin: [0, 0], n_rows: 1, n_cols: 5 };
+        let lone = RiskHeader { grid: Grid::from(&row), ..header };
+        let length = RiskParts::new(&row, 3).n_elements();
+        assert_eq!(refused(lone, &vec![[0.0; 4]; length]), Refusal::Malformed);
         let parts = RiskParts::new(map.geometry(), 3);
         let n_risks = parts.n_risks;
         for (place, k) in [(0, 0), (n_risks - 1, 3), (n_risks, 0), (payload.len() - 1, 1)] {
@@ -323,5 +328,27 @@ mod tests {
         assert_eq!(check_stuck(&stamp, &[lost]), Err(Refusal::NonFinite));
         let nowhere = MissionRecord { goal_m: [0.0, f64::NAN], ..MissionRecord::default() };
         assert_eq!(check_mission(&stamp, &[nowhere]), Err(Refusal::NonFinite));
+    }
+
+    #[test]
+    fn scans_from_nowhere_and_networks_shorter_than_they_say_are_refused() {
+        let scan = ScanHeader { origin_m: [0.0, 0.0, 1.5], ..ScanHeader::default() };
+        let broken = PointRecord { position_m: [f32::NAN; 3], ..PointRecord::default() };
+        assert_eq!(check_scan(&scan, &[broken]), Ok(()), "a point that is none is the map's to drop");
+        for value in [f32::NAN, f32::INFINITY] {
+            let nowhere = ScanHeader { origin_m: [0.0, value, 1.5], ..scan };
+            assert_eq!(check_scan(&nowhere, &[]), Err(Refusal::NonFinite));
+        }
+        let networks = CheckpointHeader { n_weight_bytes: 4, ..CheckpointHeader::default() };
+        assert_eq!(check_checkpoint(&networks, &[0; 5]), Ok(()));
+        assert_eq!(check_checkpoint(&networks, &[0; 3]), Err(Refusal::Malformed));
+        for place in [0, 1] {
+            let mut odd = networks;
+            odd.recent_emd2[place] = f64::NAN;
+            assert_eq!(check_checkpoint(&odd, &[0; 5]), Err(Refusal::NonFinite));
+            let mut odd = networks;
+            odd.original_emd2[place] = f64::INFINITY;
+            assert_eq!(check_checkpoint(&odd, &[0; 5]), Err(Refusal::NonFinite));
+        }
     }
 }

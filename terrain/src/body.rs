@@ -78,6 +78,8 @@ mod tests {
             let at = |t_m: f64| std::array::from_fn(|axis| origin[axis] + t_m * direction[axis]);
             let stepped_m = (0..12_000).map(|k| 1e-3 * f64::from(k)).find(|t_m| BOX.contains(at(*t_m)));
             let found_m = BOX.distance_along(origin, direction);
+            // Whatever is found lies on the box.
+            prop_assert!(found_m.is_none_or(|found_m| BOX.grown(1e-9).contains(at(found_m))), "{:?}", found_m);
             match (stepped_m, found_m) {
                 (Some(stepped_m), Some(found_m)) => prop_assert!((-1e-9..2e-3).contains(&(stepped_m - found_m))),
                 // A ray may cut a corner by less than a step.

@@ -84,6 +84,46 @@ fn no_source_on_the_way_from_scan_to_command_calls_the_platforms_functions() {
     assert_eq!(platform_calls("let a = b.sin() + f64::hypot(c, d); x.sin_cos_turns()"), ["sin", "hypot"]);
 }
 
+/// What makes instructions out of nothing, or asks the machine for them.
+const MAKES_INSTRUCTIONS: [&str; 8] = [
+    "Instructions::find",
+    "Instructions::widest",
+    "Instructions::all",
+    "Instructions::Portable",
+    "Isa::Auto",
+    "::try_new(",
+    "is_x86_feature_detected",
+    "target_feature",
+];
+/// Where that is allowed: where the sets are told apart, and where the configuration's is found, for the controller and
+/// for the maps.
+const MAY_MAKE_INSTRUCTIONS: [(&str, &[&str]); 5] = [
+    ("bicycle/src/lanes/instructions.rs", &MAKES_INSTRUCTIONS),
+    ("mppi/src/kernel.rs", &["Instructions::Portable"]),
+    ("mppi/src/config.rs", &["Instructions::find", "Isa::Auto"]),
+    ("mppi/src/controller.rs", &["Instructions::find"]),
+    ("navigator/src/assessor.rs", &["Instructions::find"]),
+];
+
+/// Whoever computes between scan and command is handed its instruction set.
+#[test]
+fn no_kernel_picks_its_own_instruction_set() {
+    let mut found = Vec::new();
+    for path in ON_THE_WAY.iter().flat_map(|place| sources(&root().join(place))) {
+        let name = path.strip_prefix(root()).unwrap().to_str().unwrap();
+        if name.ends_with("tests.rs") {
+            continue;
+        }
+        let allowed =
+            MAY_MAKE_INSTRUCTIONS.iter().find(|(place, _)| *place == name).map_or(&[][..], |(_, of)| *of);
+        let code = product(&path);
+        let makes =
+            MAKES_INSTRUCTIONS.iter().filter(|made| code.contains(**made) && !allowed.contains(*made));
+        found.extend(makes.map(|made| format!("{name}: {made}")));
+    }
+    assert!(found.is_empty(), "take the instructions that the configuration asks for: {found:?}");
+}
+
 /// A wave between 0 and 1 that needs no sine.
 fn wave(place: f64) -> f64 {
     let within = place - place.floor();

@@ -304,7 +304,8 @@ mod tests {
     #[test]
     #[cfg(target_os = "linux")]
     fn what_was_flushed_is_put_onto_the_disk_and_a_failure_of_that_is_reported() {
-        let (ours, _theirs) = UnixStream::pair().unwrap();
+        let (ours, mut theirs) = UnixStream::pair().unwrap();
+        let reader = std::thread::spawn(move || io::copy(&mut theirs, &mut io::sink()));
         let file = File::from(OwnedFd::from(ours));
         let mut recorder =
             DriveRecorder::into_file(Path::new("drive.mcap"), Ok(file), BTreeMap::new()).unwrap();
@@ -318,6 +319,8 @@ mod tests {
         });
         let told = told.unwrap().to_string();
         assert!(told.ends_with("a write failed: onto the disk: Invalid argument (os error 22)"), "{told}");
+        drop(recorder);
+        reader.join().unwrap().unwrap();
     }
 
     #[test]

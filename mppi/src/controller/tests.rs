@@ -55,17 +55,25 @@ fn what_is_held_is_what_the_model_does_not_know_to_be_cancelled() {
     }
 }
 
-/// Level ground with round obstacles, which are no finer than what rounding moves.
+/// Level ground with round obstacles, which are no finer than what rounding moves. Two of three are slopes beyond the
+/// limits with a steeper middle.
 fn obstacles(random: &mut Xoshiro256PlusPlus, n: usize) -> RiskMap {
     let mut map = RiskMap::constant(GridGeometry::centred(0.25, 160, 160, 0.0, 0.0), 16, Risk::NONE);
     let geometry = *map.geometry();
-    for _ in 0..n {
+    for kind in 0..n {
         let [x_m, y_m] = [0, 1].map(|_| random.random_range(-6.0..6.0_f64));
         let radius_m = random.random_range(0.5..1.5);
         for (index, risks) in map.arrays_mut().0.chunks_exact_mut(16).enumerate() {
             let centre_m = geometry.centre_m(geometry.cell(index));
             if (centre_m[0] - x_m).hypot(centre_m[1] - y_m) < radius_m {
-                risks.iter_mut().for_each(|risk| *risk = risk.blocked());
+                let is_middle = (centre_m[0] - x_m).hypot(centre_m[1] - y_m) < 0.5 * radius_m;
+                let tilt_rad = if is_middle { 0.8 } else { 0.6 };
+                let tilted = |risk: &Risk| match kind % 3 {
+                    0 => Risk { roll_rad: tilt_rad, ..*risk },
+                    1 => Risk { pitch_rad: tilt_rad, ..*risk },
+                    _ => risk.blocked(),
+                };
+                risks.iter_mut().for_each(|risk| *risk = tilted(risk));
             }
         }
     }

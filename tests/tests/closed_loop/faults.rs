@@ -1,7 +1,7 @@
 //! Sensors that fail: the drive survives, or comes to a controlled stop that says why.
 
 use bench::closed_loop::ClosedLoop;
-use bicycle::{Decision, HoldReason, StopReason};
+use bicycle::{Decision, HoldReason, State, StopReason};
 use scenarios::{Outcome, RangeSensorConfig, SensorFault};
 use terrain::{BodyBox, TerrainClass};
 
@@ -232,7 +232,21 @@ fn between_a_jump_and_the_next_scan_the_vehicle_drives_on_the_ground_it_knew() {
             off.iter().all(|value| value.abs() < 0.1),
             "{sensor:?}: {with:?}, and without the jump {without:?}"
         );
+        // One command differs little, wherever it is planned from: the plan starts where the vehicle stands on that map.
+        let [on_map, expected] = [&jumped, &steady].map(planned_from);
+        let off_m = (on_map.x_m - expected.x_m).hypot(on_map.y_m - expected.y_m);
+        let off_rad = (on_map.yaw_rad - expected.yaw_rad).abs();
+        assert!(
+            off_m < 0.1 && off_rad < 0.05,
+            "{sensor:?}: from {on_map:?}, and without the jump {expected:?}"
+        );
     }
+}
+
+/// Where the last plan starts, in the frame of the map that it was made on.
+fn planned_from(closed: &ClosedLoop) -> State {
+    let map = closed.navigator.risk_map().unwrap();
+    closed.navigator.controller().nominal_trajectory(map)[0]
 }
 
 /// Centres of the cells that show an obstacle [m].

@@ -26,6 +26,7 @@ const FOLDER: &str = "SUREFOOT_TEST_FOLDER";
 const FILE_BYTES: &str = "SUREFOOT_TEST_FILE_BYTES";
 const FILE_TIME: &str = "SUREFOOT_TEST_FILE_TIME";
 const QUOTA: &str = "SUREFOOT_TEST_QUOTA";
+const SYNC: &str = "SUREFOOT_TEST_SYNC";
 /// What recorders have to say goes into a file of this name.
 const SAID: &str = "said";
 /// A file of this name tells the processes to end.
@@ -69,11 +70,19 @@ pub struct RecorderLimits {
     pub file_time_max_s: f64,
     pub quota_bytes: u64,
     pub disk_bytes: Option<u64>,
+    /// Long, so that what the death of a recorder leaves is what it has flushed.
+    pub sync_interval_s: f64,
 }
 
 impl Default for RecorderLimits {
     fn default() -> Self {
-        Self { file_bytes_max: 1 << 30, file_time_max_s: 600.0, quota_bytes: 1 << 30, disk_bytes: None }
+        Self {
+            file_bytes_max: 1 << 30,
+            file_time_max_s: 600.0,
+            quota_bytes: 1 << 30,
+            disk_bytes: None,
+            sync_interval_s: 600.0,
+        }
     }
 }
 
@@ -108,6 +117,15 @@ impl Run {
         self.spawn(Role::Recorder, program, limits);
     }
 
+    /// Starts a recorder that asks for the disk twice a second and whose calls of the system's library go to another one
+    /// first.
+    pub fn start_recorder_with(&mut self, library: &Path) {
+        let mut program = Command::new(std::env::current_exe().unwrap());
+        program.env("LD_PRELOAD", library);
+        let limits = RecorderLimits { sync_interval_s: 0.5, ..RecorderLimits::default() };
+        self.spawn(Role::Recorder, program, &limits);
+    }
+
     fn spawn(&mut self, role: Role, mut program: Command, limits: &RecorderLimits) {
         let child = program
             .args(["--exact", "process_of_its_own", "--nocapture"])
@@ -117,6 +135,7 @@ impl Run {
             .env(FILE_BYTES, limits.file_bytes_max.to_string())
             .env(FILE_TIME, limits.file_time_max_s.to_string())
             .env(QUOTA, limits.quota_bytes.to_string())
+            .env(SYNC, limits.sync_interval_s.to_string())
             .stdout(Stdio::null())
             .spawn()
             .unwrap();
@@ -245,7 +264,7 @@ fn be(role: Role, run: &RunName, folder: &Path, is_over: &dyn Fn() -> bool) {
                 file_bytes_max: told(FILE_BYTES),
                 file_time_max_s: told(FILE_TIME),
                 quota_bytes: told(QUOTA),
-                sync_interval_s: 0.5,
+                sync_interval_s: told(SYNC),
             };
             let said = folder.join(SAID);
             let mut say = |line: &str| std::fs::write(&said, format!("{line}\n")).unwrap();
@@ -289,7 +308,7 @@ pub fn episode_config(vehicle: &Vehicle) -> EpisodeConfig {
     episode
 }
 
-fn plant_setup(vehicle: &Vehicle) -> PlantSetup<'_> {
+pub fn plant_setup(vehicle: &Vehicle) -> PlantSetup<'_> {
     PlantSetup {
         task: task(),
         vehicle,

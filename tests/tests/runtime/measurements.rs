@@ -1,16 +1,20 @@
 //! What the localisation, the sensors and their clock may do to the vehicle.
 
+use std::sync::atomic::{AtomicBool, Ordering};
+
 use bicycle::{Decision, StopReason};
 use navigator::Jump;
-use runtime::channel::{Bus, SURFACE};
+use runtime::channel::{Bus, ODOMETRY, SURFACE};
+use runtime::clock::now_ns;
 use runtime::mapping::JUMPED;
-use runtime::message::SurfaceHeader;
+use runtime::message::{Stamp, StatusRecord, SurfaceHeader};
 use runtime::payload::numbers_cell;
+use runtime::plant;
 use rustix::process::Signal;
 use terrain::Cell;
 
 use crate::driver::{Driver, Misbehaviour};
-use crate::fixture::{Run, eventually};
+use crate::fixture::{Run, eventually, machine, plant_setup};
 use crate::witness::Witness;
 use runtime::status::Role;
 
@@ -145,6 +149,38 @@ fn a_localisation_that_jumps_moves_the_map_and_not_the_vehicle() {
         witness.decided.iter().filter(on_old).any(drives)
     });
     assert!(has_driven, "never drove on the map of before a jump");
+}
+
+/// Mapping is played: what it says of jumps in its status is what the vehicle's process knows at the end of the drive.
+#[test]
+fn the_vehicle_knows_of_the_jumps_that_mapping_made_out() {
+    let run = Run::new();
+    let bus = Bus::join(&run.name).unwrap();
+    let mut mapping = bus.outlet(&Role::Mapping.status(), 1).unwrap();
+    let mut odometry = bus.inlet(&ODOMETRY).unwrap();
+    let is_over = AtomicBool::new(false);
+    let report = std::thread::scope(|scope| {
+        let vehicle = scope.spawn(|| {
+            let (vehicle, _) = machine();
+            let is_over = || is_over.load(Ordering::Relaxed);
+            plant::run(&Bus::join(&run.name).unwrap(), plant_setup(&vehicle), &is_over)
+        });
+        let mut drive = |n_cycles: u64| {
+            let mut n_heard = 0;
+            let heard = eventually(60.0, || {
+                odometry.poll(|_, _| n_heard += 1);
+                (n_heard >= n_cycles).then_some(())
+            });
+            assert!(heard.is_some(), "the vehicle does not measure");
+        };
+        drive(3);
+        let told = StatusRecord { figure: 3.0, ..StatusRecord::default() };
+        mapping.send_one(Stamp::default(), told, now_ns()).unwrap();
+        drive(5);
+        is_over.store(true, Ordering::Relaxed);
+        vehicle.join().unwrap().unwrap()
+    });
+    assert_eq!(report.n_jumps, 3);
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! Recorders that rotate, die and run out of disk while the vehicle drives.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime};
 
 use navigator::Belief;
@@ -9,7 +9,7 @@ use runtime::message::Source;
 use runtime::replay::{self, Knowledge, Records, ReplayReport};
 use runtime::status::Role;
 
-use crate::fixture::{RecorderLimits, Run};
+use crate::fixture::{RecorderLimits, Run, eventually};
 use crate::witness::Witness;
 
 const OTHERS: [Role; 4] = [Role::Plant, Role::Mapping, Role::Learning, Role::Control];
@@ -114,6 +114,40 @@ fn a_full_disk_ends_the_recording_and_not_the_drive() {
     assert!(report.n_decisions > 5, "{report:?}");
 }
 
+/// A library that stands in for the system's where a file is to be put onto its disk, and says that it cannot be.
+#[cfg(all(target_os = "linux", target_env = "gnu"))]
+fn library_of_a_broken_disk(folder: &Path) -> PathBuf {
+    let (source, library) = (folder.join("disk.rs"), folder.join("libdisk.so"));
+    std::fs::write(&source, "#[no_mangle] pub extern \"C\" fn fdatasync(_: i32) -> i32 { -1 }\n").unwrap();
+    let rustc = std::env::var_os("RUSTC").unwrap_or_else(|| "rustc".into());
+    let made = std::process::Command::new(rustc)
+        .args(["--edition", "2021", "--crate-type", "cdylib", "-A", "warnings", "-o"])
+        .args([&library, &source])
+        .status();
+    assert!(made.unwrap().success());
+    library
+}
+
+/// Whether the disk is asked cannot be seen from outside, but its refusal is.
+#[cfg(all(target_os = "linux", target_env = "gnu"))]
+#[test]
+fn what_is_recorded_is_put_onto_the_disk_while_the_drive_goes_on() {
+    let mut run = Run::new();
+    run.start_all(&OTHERS);
+    let mut witness = Witness::new(&run);
+    witness.until_driving("all processes up");
+    let library = library_of_a_broken_disk(run.folder.path());
+    run.start_recorder_with(&library);
+    witness.until("the disk was asked", |_| run.said_by_recorder().is_some());
+    let said = run.said_by_recorder().unwrap();
+    assert!(
+        said.contains("drive-000.mcap: the recording ends here, a write failed: onto the disk: "),
+        "{said}"
+    );
+    witness.until_driving("without a recording");
+    run.end();
+}
+
 #[test]
 fn a_quota_ends_the_recording_and_not_the_drive() {
     let mut run = Run::new();
@@ -152,6 +186,18 @@ fn a_quota_ends_the_recording_and_not_the_drive() {
     assert_eq!(records.ended_early, None);
     let report = made_again(&records);
     assert_eq!(report.first_difference, None, "{report:?}");
+}
+
+#[test]
+fn recordings_of_before_count_for_the_quota() {
+    let mut run = Run::new();
+    let earlier = run.folder.path().join("drive-000.mcap");
+    std::fs::write(&earlier, [7; 100_000]).unwrap();
+    run.start_recorder(&RecorderLimits { quota_bytes: 90_000, ..Default::default() });
+    let (_, said) = eventually(60.0, || run.said_by_recorder()).expect("nothing more may be recorded");
+    assert!(said.contains("expected recordings of at most 0.1 MB together, found 0.1 MB"), "{said}");
+    run.end();
+    assert_eq!(run.recordings(), [earlier]);
 }
 
 /// Nanoseconds of UTC since 1970.

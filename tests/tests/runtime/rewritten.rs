@@ -9,7 +9,7 @@ use std::time::Duration;
 
 use bicycle::Decision;
 use mppi::CostToGoView;
-use runtime::channel::{Bus, DECISION, Inlet, MISSION, ODOMETRY, Outlet, RISK, Refusal};
+use runtime::channel::{Bus, Channel, DECISION, Inlet, MISSION, ODOMETRY, Outlet, RISK, Refusal};
 use runtime::clock::now_ns;
 use runtime::message::{
     CommandRecord, DecisionRecord, Grid, MissionRecord, OdometryRecord, RiskHeader, Stamp,
@@ -111,12 +111,16 @@ fn a_map_that_says_it_is_longer_than_its_publishers_memory_is_refused() {
     let run = Run::new();
     let bus = Bus::join(&run.name).unwrap();
     let mut inlet = bus.inlet(&RISK).unwrap();
+    // One to whom a message without elements would be right: scans have none at times.
+    let mut lenient = bus.inlet(&Channel { check: |_, _| Ok(()), ..RISK }).unwrap();
     let mut outlet = bus.outlet(&RISK, parts().n_elements()).unwrap();
     send_map(&mut outlet);
     let memory = Memory::of(&run).unwrap();
     memory.lengthen(memory.messages[0], 1 << 14, 1024);
     assert!(inlet.newest().is_none());
     assert_eq!(inlet.counts().of(Refusal::Malformed), 1);
+    lenient.poll(|_, elements| panic!("taken as one of {} elements", elements.len()));
+    assert_eq!(lenient.counts().of(Refusal::Malformed), 1);
 }
 
 #[test]
@@ -138,6 +142,38 @@ fn a_map_that_was_taken_keeps_its_header_and_its_length() {
     memory.write_word(n_at, parts().n_elements() as u64);
     let (map, _) = risk_views(message.header(), message.payload()).unwrap();
     assert_eq!((map.geometry, map.n_yaws), (GEOMETRY, N_YAWS));
+}
+
+/// The memory that [`check_and_write_over`] writes over.
+static CHECKED: Mutex<Option<Memory>> = Mutex::new(None);
+
+/// The check of the channel, with a publisher that writes over header, length and elements as soon as it has passed.
+fn check_and_write_over(header: &RiskHeader, elements: &[[f32; 4]]) -> Result<(), Refusal> {
+    let judged = (RISK.check)(header, elements);
+    if let Some(memory) = &*CHECKED.lock().unwrap() {
+        let [n_at, header_at] = memory.messages[0];
+        memory.write(header_at, &vec![0xff; size_of::<RiskHeader>() + 16 * elements.len()]);
+        memory.write_word(n_at, u64::MAX);
+    }
+    judged
+}
+
+#[test]
+fn what_is_taken_by_polling_is_what_was_checked() {
+    let run = Run::new();
+    let bus = Bus::join(&run.name).unwrap();
+    let mut inlet = bus.inlet(&Channel { check: check_and_write_over, ..RISK }).unwrap();
+    let mut outlet = bus.outlet(&RISK, parts().n_elements()).unwrap();
+    send_map(&mut outlet);
+    *CHECKED.lock().unwrap() = Memory::of(&run);
+    let mut n_taken = 0;
+    inlet.poll(|header, elements| {
+        assert_eq!((header.n_yaws, header.content_hash), (N_YAWS as u64, MARK));
+        assert_eq!((RISK.check)(header, elements), Ok(()));
+        n_taken += 1;
+    });
+    assert_eq!(n_taken, 1);
+    assert!(Memory::of(&run).is_none(), "nothing was written over");
 }
 
 /// Numbers that are as good as any, the same in every run of the test.

@@ -47,6 +47,9 @@ fn rows_go_east_and_columns_north() {
     assert_eq!((ground.n_nodes, ground.origin_m, ground.resolution_m), ([2, 3], [-1.0, 2.0], 0.5));
     // Node one step east and two north.
     assert_eq!((ground.height_m[3 + 2], ground.class[3 + 2]), (3.0, 1));
+    // One step north, and one east: neither is where the other order has it.
+    assert_eq!((ground.height_m[1], ground.class[1]), (0.5, 1));
+    assert_eq!((ground.height_m[3], ground.class[3]), (2.0, 0));
 }
 
 #[test]
