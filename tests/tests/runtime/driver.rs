@@ -130,7 +130,7 @@ impl Robot {
             let correction = Jump { step_m: [east_m, north_m, 0.0], yaw_rad: behaviour.turn_rad };
             self.told = correction.odometry(&self.told);
         }
-        let mut record = OdometryRecord::from(&self.told);
+        let mut record = OdometryRecord::from(&self.told).with_applied(self.watchdog.applied());
         if behaviour.is_not_a_number {
             record.yaw_rate_radps = f64::NAN;
         }
@@ -167,6 +167,6 @@ impl Robot {
     fn follow_commands(&mut self) {
         let watchdog = &mut self.watchdog;
         self.commands.poll(|stamp, commands| watchdog.admit(&commands[0], stamp.published_at_ns));
-        self.episode.apply(&self.watchdog.decision(now_ns())).unwrap();
+        self.episode.apply(&self.watchdog.carry_out(now_ns())).unwrap();
     }
 }
