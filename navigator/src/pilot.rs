@@ -6,6 +6,7 @@ use bicycle::{Command, Decision, HoldReason, Model, Odometry, SensorModel, State
 use mppi::{Controller, CostToGoView, Input, Objective, Terminal};
 use traversability::RiskMapView;
 
+use crate::applied::{Applied, AppliedBy};
 use crate::frame::Frame;
 use crate::guard::{Admitted, Guard};
 use crate::risk::StuckPose;
@@ -154,11 +155,17 @@ impl Pilot {
         }
     }
 
-    /// What the vehicle was really told after the last decision, where that is not what the decision says; see
-    /// [`Controller::note_sent`].
-    pub fn note_sent(&mut self, sent: Command) {
-        self.controller.note_sent(sent);
-        self.guard.note_command(sent.speed_mps);
+    /// Takes in what the actuators were told last, as the vehicle says with the odometry that [`Pilot::admit`] is to be
+    /// shown next. Delays are replayed from it and the next plan starts from it, see [`Controller::note_sent`].
+    pub fn note_applied(&mut self, applied: &Applied) {
+        let Applied { command, since_ns, by } = *applied;
+        self.guard.note_command(command.speed_mps);
+        let Some(decided_at_ns) = self.decided_at_ns else { return };
+        let after_s = since_ns.wrapping_sub(decided_at_ns).cast_signed() as f64 * 1e-9;
+        match by {
+            AppliedBy::Vehicle => self.controller.note_sent(command, after_s),
+            AppliedBy::Command => self.controller.note_followed(command, after_s),
+        }
     }
 
     /// What the controller needs to be asked, or what to do without asking it.

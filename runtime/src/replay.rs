@@ -14,6 +14,7 @@ use evidential::Checkpoint;
 use navigator::{Belief, Chart, NavigatorError, Pilot};
 use traversability::CvarLevel;
 
+use crate::control;
 use crate::message::{CommandRecord, DecisionRecord, Source};
 use crate::mission::{Mission, NOWHERE, with_reason};
 use crate::payload::risk_views;
@@ -256,7 +257,7 @@ impl Life<'_> {
             let Some((stamp, odometry)) = records.odometry.get(&Key { epoch_ns, sequence }) else {
                 return Some(format!("odometry {sequence}"));
             };
-            self.pilot.admit(&odometry.odometry(stamp.valid_at_ns));
+            control::show(&mut self.pilot, stamp, odometry);
         }
         None
     }
