@@ -218,6 +218,19 @@ impl Controller {
         }
     }
 
+    /// The frame that states, maps and goals are told in moved: a pose of before, east, north [m] and yaw [rad], lies where
+    /// `carry` takes it. What the controller remembers of places moves along.
+    pub fn carry(&mut self, carry: impl Fn([f64; 3]) -> [f64; 3]) {
+        self.watch.carry(|[x_m, y_m]| {
+            let [x_m, y_m, _] = carry([x_m, y_m, 0.0]);
+            [x_m, y_m]
+        });
+        self.before = self.before.map(|before| {
+            let [x_m, y_m, yaw_rad] = carry([before.x_m, before.y_m, before.yaw_rad]);
+            State { x_m, y_m, yaw_rad, ..before }
+        });
+    }
+
     fn send(&mut self, decision: &Decision) {
         let last = self.ledger.last().unwrap_or_default();
         self.ledger.send(decision.command(last));

@@ -38,6 +38,8 @@ pub struct Pilot {
     frame: Frame,
     sensors: SensorModel,
     controller: Controller,
+    /// Of the chart that the controller was asked on last, in whose frame it remembers places [ns].
+    chart_at_ns: Option<u64>,
     odometry: Option<Odometry>,
     fault: Option<StopReason>,
     decided_at_ns: Option<u64>,
@@ -57,6 +59,7 @@ impl Pilot {
             frame: Frame::default(),
             sensors: SensorModel::of(&model.effects),
             controller: Controller::new(config.controller.clone(), model, seed)?,
+            chart_at_ns: None,
             odometry: None,
             fault: None,
             decided_at_ns: None,
@@ -149,6 +152,7 @@ impl Pilot {
             }
             Admitted::ClockSetBack => {
                 self.frame.forget();
+                self.chart_at_ns = None;
                 None
             }
             Admitted::Onward | Admitted::Again => None,
@@ -175,6 +179,10 @@ impl Pilot {
     }
 
     fn ask(&mut self, chart: &Chart<'_>, odometry: &Odometry, destination: &Destination) -> Decision {
+        let before_ns = self.chart_at_ns.replace(chart.odometry_at_ns);
+        if let Some(jump) = before_ns.and_then(|at_ns| self.frame.from_to(at_ns, chart.odometry_at_ns)) {
+            self.controller.carry(|pose| jump.pose(pose));
+        }
         let (state, goal_m) = self.on_chart(odometry, chart.odometry_at_ns, destination.goal_m);
         let was_recovering = self.controller.diagnostics().is_recovering;
         let decision = self.controller.decide(&Input {

@@ -84,8 +84,12 @@ impl Drive {
     }
 
     fn decide(&mut self) -> Decision {
+        self.decide_on_chart_of(u64::MAX)
+    }
+
+    fn decide_on_chart_of(&mut self, odometry_at_ns: u64) -> Decision {
         let (map, time_to_goal) = (self.map.view(), self.field.view());
-        let chart = Chart { map, time_to_goal, odometry_at_ns: u64::MAX };
+        let chart = Chart { map, time_to_goal, odometry_at_ns };
         let destination = Destination { goal_m: self.goal_m, tolerance_m: 0.5 };
         let decision = self.pilot.decide(self.cycle * CYCLE_NS, Some(chart), &destination);
         self.cycle += 1;
@@ -166,4 +170,25 @@ fn a_stop_of_the_vehicles_own_is_known_with_its_time() {
     let towards_mps = (f64::from(last.speed_mps) - SPEED_MPS).clamp(-step_mps, step_mps);
     let expected_mps = SPEED_MPS + towards_mps - 2.0 * step_mps;
     assert!((start.speed_mps - expected_mps).abs() < 1e-6, "{start:?} {last:?}");
+}
+
+/// The vehicle stands, however it is told to drive, and is found to be stuck: it backs up. Meanwhile the localisation
+/// corrects itself by 3 m, and the next map lies in the new frame. It goes on backing up, to behind where it stands.
+#[test]
+fn backing_up_goes_on_after_a_jump_of_the_localisation() {
+    let mut drive = Drive::new();
+    drive.state.speed_mps = 0.0;
+    let decide = |drive: &mut Drive, chart_at_ns: u64| {
+        // As sensors see it: never twice at the same place.
+        drive.state.y_m += if drive.cycle.is_multiple_of(2) { 1e-3 } else { -1e-3 };
+        drive.measure();
+        drive.decide_on_chart_of(chart_at_ns);
+        drive.pilot.controller().diagnostics().is_recovering
+    };
+    let n_cycles = (0..100).find(|_| decide(&mut drive, 0)).unwrap();
+    assert!(n_cycles > 10, "{n_cycles}");
+    drive.state.x_m += 3.0;
+    assert!(decide(&mut drive, 0), "on the map of before it stands where it stood");
+    let new_ns = drive.cycle * CYCLE_NS;
+    assert!((0..5).all(|_| decide(&mut drive, new_ns)), "on the map of after it does, too");
 }
