@@ -46,6 +46,11 @@ fn show(report: &ReplayReport) {
         "{} of {} decisions made again to the last bit, from {} maps of the ground and {} risk maps",
         report.n_identical, report.n_decisions, report.n_surfaces, report.n_risk_maps
     );
+    println!("localisation of {} maps of the ground made out again from the odometry", report.n_localised);
+    if report.n_unverified > 0 {
+        println!("  not verified: that of {}, for want of", report.n_unverified);
+        report.unverified.iter().for_each(|why| println!("    {why}"));
+    }
     for missing in &report.missing {
         println!("  not recorded: {missing}");
     }

@@ -123,6 +123,7 @@ fn supervise(arguments: &UpArguments) -> anyhow::Result<()> {
         }
         lines.iter().for_each(|line| println!("  {line}"));
     });
+    supervisor.unended().iter().for_each(|why| crate::report(why));
     keep(&supervisor.report(), &arguments.drive.out)?;
     match end {
         RunEnd::Plant(0) => {

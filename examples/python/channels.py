@@ -33,7 +33,7 @@ CHANNELS = {
     "odometry": (layout.Stamp, layout.OdometryRecord, 32, 5),
     "scan": (layout.ScanHeader, layout.PointRecord, 2, 2),
     "risk": (layout.RiskHeader, Quad, 1, 4),
-    "command": (layout.Stamp, layout.CommandRecord, 4, 5),
+    "command": (layout.Stamp, layout.CommandRecord, 4, 4),
     "mission": (layout.Stamp, layout.MissionRecord, 2, 6),
 }
 

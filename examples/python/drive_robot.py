@@ -6,8 +6,8 @@
     surefoot up --role control --run py --vehicle rc_car --method physics &
     python3 drive_robot.py --run py
 
-It tells where it is, what a ring of range rays sees and where to go, reads commands and risk maps, and stops when what
-the last command was decided on is too old.
+It tells where it is and what its actuators were told, what a ring of range rays sees and where to go, reads commands and
+risk maps, and stops when what the last command was decided on is too old.
 Prints one line of JSON and ends with 0 when it has come to its goal, else with 1.
 """
 
@@ -49,7 +49,7 @@ class Robot:
         self.y_m += step_s * self.speed_mps * math.sin(self.yaw_rad)
         self.yaw_rad += step_s * self.yaw_rate_radps
 
-    def odometry(self) -> layout.OdometryRecord:
+    def odometry(self, applied: dict) -> layout.OdometryRecord:
         return layout.OdometryRecord(
             position_m=(self.x_m, self.y_m, WHEEL_RADIUS_M),
             attitude_rad=(0.0, 0.0, self.yaw_rad),
@@ -57,6 +57,7 @@ class Robot:
             yaw_rate_radps=self.yaw_rate_radps,
             wheel_speed_mps=self.speed_mps,
             steering_rad=self.steering_rad,
+            **applied,
         )
 
     def scan(self):
@@ -117,7 +118,7 @@ def drive(run: str) -> dict:
     for cycle in range(int(TIME_LIMIT_S * 1e9) // PERIOD_NS):
         at_ns = began_ns + cycle * PERIOD_NS
         sleep_until(at_ns)
-        odometry.send(at_ns, (layout.OdometryRecord * 1)(robot.odometry()))
+        odometry.send(at_ns, (layout.OdometryRecord * 1)(robot.odometry(watchdog.applied())))
         if cycle % CYCLES_PER_SCAN == 0:
             scans.send(at_ns, robot.scan(), origin_m=(ctypes.c_float * 3)(*SENSOR_M))
         if cycle % 50 == 0:
@@ -129,8 +130,7 @@ def drive(run: str) -> dict:
             n_commands += 1
         if risks.newest() is not None:
             n_maps += 1
-        speed_mps, steering_rad = watchdog.command(now_ns()) or (0.0, robot.steering_rad)
-        robot.advance(speed_mps, steering_rad, PERIOD_NS * 1e-9)
+        robot.advance(*watchdog.carry_out(now_ns()), PERIOD_NS * 1e-9)
         nearest_m = min(nearest_m, math.dist((robot.x_m, robot.y_m), ROCK_M))
         left_m = math.dist((robot.x_m, robot.y_m), GOAL_M)
         if left_m <= TOLERANCE_M:

@@ -20,6 +20,7 @@ import time
 
 import surefoot_layout as layout
 from channels import Bus, Outlet, now_ns, run_name
+from watchdog import BY_COMMAND, BY_VEHICLE
 
 NEEDED = ("t", "x", "y", "yaw", "vx", "wz")
 DRIVE = 1
@@ -89,6 +90,17 @@ def command(row: dict, at_ns: int):
     return layout.CommandRecord(speed_mps=speed_mps, steering_rad=steering_rad, decision=DRIVE, reason=0, **times)
 
 
+def applied(record, told, at_ns: int) -> None:
+    """Says what the actuators were told: the log's command, or, of a drive without, what they did."""
+    record.applied_since_ns = at_ns
+    if told is None:
+        record.applied_speed_mps, record.applied_steering_rad = record.wheel_speed_mps, record.steering_rad
+        record.applied_by = BY_VEHICLE
+    else:
+        record.applied_speed_mps, record.applied_steering_rad = told.speed_mps, told.steering_rad
+        record.applied_by = BY_COMMAND
+
+
 def replay(path: str, run: str, speed: float, seconds_max: float) -> dict:
     """Tells the log's rows when they are due."""
     rows = rows_of(path, seconds_max)
@@ -109,6 +121,7 @@ def replay(path: str, run: str, speed: float, seconds_max: float) -> dict:
             continue
         if told is not None:
             commands.send(due_ns, (layout.CommandRecord * 1)(told))
+        applied(record, told, due_ns)
         poses.send(due_ns, (layout.OdometryRecord * 1)(record))
     return {
         "poses": poses.n_sent,

@@ -200,12 +200,35 @@ impl Controller {
         self.watch.reset();
     }
 
-    /// What the vehicle was really told in the last cycle, where that is not what its decision says: whoever stands
-    /// between controller and vehicle has changed it. Numbers that are not finite are no command and change nothing.
-    pub fn note_sent(&mut self, sent: Command) {
-        if sent.speed_mps.is_finite() && sent.steering_rad.is_finite() {
-            self.ledger.correct(sent);
+    /// What the vehicle was really told from `after_s` after the last cycle on, or before it where that is negative, whatever
+    /// has been decided since: whoever stands between controller and vehicle has changed it. While it does something else
+    /// than it is told it is not stuck. Numbers that are not finite are no command and change nothing.
+    pub fn note_sent(&mut self, sent: Command, after_s: f64) {
+        if is_finite(sent, after_s) {
+            self.ledger.replace(after_s, sent);
+            self.watch.reset();
         }
+    }
+
+    /// What the vehicle says that it has been following since `after_s` after the last cycle, where it is not what was
+    /// decided last before: it follows again, or one before was lost. What was decided later is still on its way.
+    pub fn note_followed(&mut self, followed: Command, after_s: f64) {
+        if is_finite(followed, after_s) {
+            self.ledger.resume(after_s, followed);
+        }
+    }
+
+    /// The frame that states, maps and goals are told in moved: a pose of before, east, north [m] and yaw [rad], lies where
+    /// `carry` takes it. What the controller remembers of places moves along.
+    pub fn carry(&mut self, carry: impl Fn([f64; 3]) -> [f64; 3]) {
+        self.watch.carry(|[x_m, y_m]| {
+            let [x_m, y_m, _] = carry([x_m, y_m, 0.0]);
+            [x_m, y_m]
+        });
+        self.before = self.before.map(|before| {
+            let [x_m, y_m, yaw_rad] = carry([before.x_m, before.y_m, before.yaw_rad]);
+            State { x_m, y_m, yaw_rad, ..before }
+        });
     }
 
     fn send(&mut self, decision: &Decision) {
@@ -331,6 +354,10 @@ impl Controller {
         let stop_s = speed_mps / self.model.limits.acceleration_max_mps2 + self.lag_s[0];
         ((stop_s / self.config.step_s).ceil() as usize + 1).min(self.config.n_steps)
     }
+}
+
+fn is_finite(command: Command, after_s: f64) -> bool {
+    command.speed_mps.is_finite() && command.steering_rad.is_finite() && after_s.is_finite()
 }
 
 /// The limit of lateral acceleration, or what is safe on tyres whose grip the model knows, if that is less [m/s2].

@@ -42,21 +42,42 @@ impl Ledger {
 
     /// A command is sent now.
     pub(crate) fn send(&mut self, command: Command) {
-        if self.sent.back().is_some_and(|last| self.now_s - last.at_s < self.apart_s) {
-            return self.correct(command);
+        self.put(self.now_s, command);
+    }
+
+    /// From `after_s` after now on something else went out than what was noted as sent since. Before the first command
+    /// nothing is known.
+    pub(crate) fn replace(&mut self, after_s: f64, command: Command) {
+        let at_s = self.now_s + after_s;
+        while self.sent.back().is_some_and(|last| last.at_s >= at_s) {
+            self.sent.pop_back();
+        }
+        self.change(at_s, command);
+    }
+
+    /// From `after_s` after now on this went out, unless another was sent later.
+    pub(crate) fn resume(&mut self, after_s: f64, command: Command) {
+        let at_s = self.now_s + after_s;
+        if self.sent.back().is_none_or(|last| last.at_s <= at_s) {
+            self.change(at_s, command);
+        }
+    }
+
+    fn change(&mut self, at_s: f64, command: Command) {
+        if self.last() != Some(command) {
+            self.put(at_s, command);
+        }
+    }
+
+    fn put(&mut self, at_s: f64, command: Command) {
+        if let Some(last) = self.sent.back_mut().filter(|last| at_s - last.at_s < self.apart_s) {
+            last.command = command;
+            return;
         }
         if self.sent.len() == self.n_most {
             self.sent.pop_front();
         }
-        self.sent.push_back(Sent { at_s: self.now_s, command });
-    }
-
-    /// The last command went out as another.
-    pub(crate) fn correct(&mut self, command: Command) {
-        match self.sent.back_mut() {
-            Some(last) => last.command = command,
-            None => self.sent.push_back(Sent { at_s: self.now_s, command }),
-        }
+        self.sent.push_back(Sent { at_s, command });
     }
 
     /// The last command.
@@ -95,9 +116,31 @@ mod tests {
         assert_eq!(ledger.at(0.25), Some(command(1.0)));
         assert_eq!(ledger.at(9.0), Some(command(1.0)));
         assert_eq!(ledger.last(), Some(command(3.0)));
-        ledger.correct(command(0.0));
-        assert_eq!(ledger.at(0.05), Some(command(0.0)), "what really went out");
-        assert_eq!(ledger.at(0.15), Some(command(2.0)));
+    }
+
+    #[test]
+    fn what_went_out_instead_is_in_force_from_its_time_until_another_is_sent() {
+        let mut ledger = Ledger::new(3.0, 0.02);
+        let sent = |ledger: &Ledger, age_s: f64| ledger.at(age_s).map(|command| command.speed_mps);
+        for speed_mps in [1.0, 2.0, 3.0] {
+            ledger.pass(0.1);
+            ledger.send(command(speed_mps));
+        }
+        // 3 was sent now, 2 before 0.1 s. It was stopped 0.05 s ago: 3 has never gone out.
+        ledger.replace(-0.05, command(0.0));
+        assert_eq!([0.04, 0.06, 0.16].map(|age_s| sent(&ledger, age_s)), [Some(0.0), Some(2.0), Some(1.0)]);
+        // And for 0.04 s from now on something else; then what was commanded again.
+        ledger.replace(0.0, command(0.5));
+        ledger.resume(0.04, command(3.0));
+        ledger.pass(0.1);
+        let ages_s = [0.05, 0.07, 0.11, 0.16];
+        assert_eq!(ages_s.map(|age_s| sent(&ledger, age_s)), [Some(3.0), Some(0.5), Some(0.0), Some(2.0)]);
+        ledger.send(command(4.0));
+        ledger.resume(-0.06, command(3.0));
+        assert_eq!(ledger.last(), Some(command(4.0)), "another was sent later");
+        // From before the first on: nothing else has ever gone out.
+        ledger.replace(-9.0, command(0.0));
+        assert_eq!(ages_s.map(|age_s| sent(&ledger, age_s)), [Some(0.0); 4]);
     }
 
     /// Against a list that forgets nothing, at rates from the fastest to one a second, without growing.

@@ -35,6 +35,14 @@ impl Watch {
         (self.mode, self.anchor_m, self.waited_s) = (Mode::Onward, None, 0.0);
     }
 
+    /// The frame moved: places of before lie where `carry` takes them.
+    pub(crate) fn carry(&mut self, carry: impl Fn([f64; 2]) -> [f64; 2]) {
+        self.anchor_m = self.anchor_m.map(&carry);
+        if let Mode::BackUp { target_m } = &mut self.mode {
+            *target_m = carry(*target_m);
+        }
+    }
+
     /// Looks at a vehicle that is meant to move.
     pub(crate) fn observe(&mut self, state: &State, elapsed_s: f64) -> Mode {
         let here_m = [state.x_m, state.y_m];
@@ -106,6 +114,20 @@ mod tests {
         assert!((target_m[0] - 2.0).abs() < 1e-12 && (target_m[1] + 1.0).abs() < 1e-12);
         let moved = State { y_m: -1.01, ..standing };
         assert_eq!(watch.observe(&moved, 0.1), Mode::Onward);
+    }
+
+    /// To the north by 100 m and a quarter turn to the left, in the midst of it: nothing else changes.
+    #[test]
+    fn backing_up_goes_on_behind_the_vehicle_in_a_frame_that_moved() {
+        let mut watch = Watch::new(CONFIG);
+        for _ in 0..32 {
+            watch.observe(&at(2.0), 0.1);
+        }
+        watch.carry(|[x_m, y_m]| [-y_m, x_m + 100.0]);
+        let carried = State { y_m: 102.0, yaw_rad: std::f64::consts::FRAC_PI_2, ..State::default() };
+        let Mode::BackUp { target_m } = watch.observe(&carried, 0.1) else { panic!("not yet there") };
+        assert!(target_m[0].abs() < 1e-12 && (target_m[1] - 101.0).abs() < 1e-12, "{target_m:?}");
+        assert_eq!(watch.observe(&State { y_m: 100.99, ..carried }, 0.1), Mode::Onward);
     }
 
     #[test]

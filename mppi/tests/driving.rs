@@ -326,7 +326,7 @@ fn a_long_delay_is_replayed_whole_at_a_high_rate() {
         let Decision::Drive(_) = controller.decide(&input) else { panic!("level ground") };
         // Told something of its own instead: a speed that rises and falls, and differs in every cycle.
         let speed_mps = 1.0 + (0.02 * cycle as f32).sin();
-        controller.note_sent(Command { speed_mps, steering_rad: 0.0 });
+        controller.note_sent(Command { speed_mps, steering_rad: 0.0 }, 0.0);
         sent.push(f64::from(speed_mps));
     }
     let input = Input {

@@ -37,8 +37,20 @@ impl Frame {
 
     /// How the frame has moved since this time; `None` when it has not.
     pub fn since(&self, at_ns: u64) -> Option<Jump> {
-        let later = self.jumps.iter().filter(|(jumped_at_ns, _)| *jumped_at_ns > at_ns);
-        later.map(|(_, jump)| *jump).reduce(|all, next| all.then(&next))
+        self.between(at_ns, u64::MAX)
+    }
+
+    /// How a frame of one time lies in that of another; `None` where both are the same.
+    pub fn from_to(&self, from_ns: u64, to_ns: u64) -> Option<Jump> {
+        if to_ns < from_ns {
+            return self.between(to_ns, from_ns).map(|jump| jump.inverse());
+        }
+        self.between(from_ns, to_ns)
+    }
+
+    fn between(&self, from_ns: u64, to_ns: u64) -> Option<Jump> {
+        let within = self.jumps.iter().filter(|(at_ns, _)| *at_ns > from_ns && *at_ns <= to_ns);
+        within.map(|(_, jump)| *jump).reduce(|all, next| all.then(&next))
     }
 }
 
@@ -56,6 +68,10 @@ mod tests {
         assert_eq!(frame.since(99), Some(first.then(&second)), "before both");
         assert_eq!(frame.since(100), Some(second), "in the frame of the first");
         assert_eq!(frame.since(200), None, "in the frame of now");
+        assert_eq!(frame.from_to(99, 100), Some(first));
+        assert_eq!(frame.from_to(100, 250), Some(second));
+        assert_eq!(frame.from_to(250, 99), Some(first.then(&second).inverse()), "and back");
+        assert_eq!(frame.from_to(100, 199), None);
         frame.forget();
         assert_eq!(frame.since(0), None);
     }

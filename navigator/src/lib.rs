@@ -9,6 +9,7 @@
 //! [`Config::for_vehicle`] fits all settings to a machine, a [`Belief`] says how the ground is judged, a [`Guard`] what
 //! may enter. `examples/own_surface.rs` drives the three on a map of one's own.
 
+mod applied;
 mod assessor;
 mod author;
 mod config;
@@ -21,6 +22,7 @@ mod risk;
 mod surveyor;
 mod track;
 
+pub use applied::{Applied, AppliedBy};
 pub use assessor::Assessor;
 pub use config::{Config, RiskMapConfig};
 pub use guard::{Admitted, Guard, GuardConfig};

@@ -6,6 +6,7 @@ use bicycle::{Command, Decision, HoldReason, Model, Odometry, SensorModel, State
 use mppi::{Controller, CostToGoView, Input, Objective, Terminal};
 use traversability::RiskMapView;
 
+use crate::applied::{Applied, AppliedBy};
 use crate::frame::Frame;
 use crate::guard::{Admitted, Guard};
 use crate::risk::StuckPose;
@@ -37,6 +38,8 @@ pub struct Pilot {
     frame: Frame,
     sensors: SensorModel,
     controller: Controller,
+    /// Of the chart that the controller was asked on last, in whose frame it remembers places [ns].
+    chart_at_ns: Option<u64>,
     odometry: Option<Odometry>,
     fault: Option<StopReason>,
     decided_at_ns: Option<u64>,
@@ -56,6 +59,7 @@ impl Pilot {
             frame: Frame::default(),
             sensors: SensorModel::of(&model.effects),
             controller: Controller::new(config.controller.clone(), model, seed)?,
+            chart_at_ns: None,
             odometry: None,
             fault: None,
             decided_at_ns: None,
@@ -148,17 +152,24 @@ impl Pilot {
             }
             Admitted::ClockSetBack => {
                 self.frame.forget();
+                self.chart_at_ns = None;
                 None
             }
             Admitted::Onward | Admitted::Again => None,
         }
     }
 
-    /// What the vehicle was really told after the last decision, where that is not what the decision says; see
-    /// [`Controller::note_sent`].
-    pub fn note_sent(&mut self, sent: Command) {
-        self.controller.note_sent(sent);
-        self.guard.note_command(sent.speed_mps);
+    /// Takes in what the actuators were told last, as the vehicle says with the odometry that [`Pilot::admit`] is to be
+    /// shown next. Delays are replayed from it and the next plan starts from it, see [`Controller::note_sent`].
+    pub fn note_applied(&mut self, applied: &Applied) {
+        let Applied { command, since_ns, by } = *applied;
+        self.guard.note_command(command.speed_mps);
+        let Some(decided_at_ns) = self.decided_at_ns else { return };
+        let after_s = since_ns.wrapping_sub(decided_at_ns).cast_signed() as f64 * 1e-9;
+        match by {
+            AppliedBy::Vehicle => self.controller.note_sent(command, after_s),
+            AppliedBy::Command => self.controller.note_followed(command, after_s),
+        }
     }
 
     /// What the controller needs to be asked, or what to do without asking it.
@@ -168,6 +179,10 @@ impl Pilot {
     }
 
     fn ask(&mut self, chart: &Chart<'_>, odometry: &Odometry, destination: &Destination) -> Decision {
+        let before_ns = self.chart_at_ns.replace(chart.odometry_at_ns);
+        if let Some(jump) = before_ns.and_then(|at_ns| self.frame.from_to(at_ns, chart.odometry_at_ns)) {
+            self.controller.carry(|pose| jump.pose(pose));
+        }
         let (state, goal_m) = self.on_chart(odometry, chart.odometry_at_ns, destination.goal_m);
         let was_recovering = self.controller.diagnostics().is_recovering;
         let decision = self.controller.decide(&Input {

@@ -36,7 +36,8 @@ const LEARNING_SILENCE_S: f64 = 0.4;
 
 impl Periods {
     /// What a guard lets pass at these periods: two odometry messages may be lost and four scans, and a map may have been
-    /// made of the scan before the last and be driven on for two periods of control.
+    /// made of the scan before the last and be driven on for two periods of control. A scan waits until the odometry after
+    /// it must have come, and where it has not, is placed by the one before it.
     pub fn guard(&self) -> GuardConfig {
         let usual = GuardConfig::default();
         let scan_age_max_s = (5.0 * self.scan_s).max(2.0 * (self.scan_s + self.control_s));
@@ -44,6 +45,8 @@ impl Periods {
             odometry_age_max_s: usual.odometry_age_max_s.max(3.0 * self.odometry_s),
             frozen_max_s: usual.frozen_max_s.max(5.0 * self.odometry_s),
             scan_age_max_s: usual.scan_age_max_s.max(scan_age_max_s),
+            odometry_wait_max_s: usual.odometry_wait_max_s.max(self.odometry_s + DELAY_S),
+            extrapolation_max_s: usual.extrapolation_max_s.max(self.odometry_s),
             ..usual
         }
     }
@@ -109,6 +112,7 @@ impl AgeLimits {
         let odometry = || format!("odometry every {odometry_s} s");
         require("guard.odometry_age_max_s", guard.odometry_age_max_s, 2.0 * odometry_s, odometry())?;
         require("guard.frozen_max_s", guard.frozen_max_s, 2.0 * odometry_s, odometry())?;
+        require("guard.odometry_wait_max_s", guard.odometry_wait_max_s, odometry_s, odometry())?;
         let scans = || format!("scans every {scan_s} s and decisions every {control_s} s");
         // Physics speaks after the silence of learning, of the next scan, and must have been heard by then.
         let least_s = (silence_s + scan_s).max(scan_s + control_s);
@@ -128,6 +132,8 @@ impl AgeLimits {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use bicycle::Odometry;
+    use navigator::{Config, Surface, Surveyor, Whereabouts};
 
     fn limits(periods: &Periods, command_age_max_s: Option<f64>) -> Result<AgeLimits, AgeLimitError> {
         AgeLimits::new(periods, &periods.guard(), command_age_max_s)
@@ -163,6 +169,8 @@ mod tests {
                     // A command of before the last deadline, of the odometry before the last.
                     holds(found.command_ns, odometry_s + 2.0 * control_s);
                     holds(clock::nanoseconds(guard.odometry_age_max_s), 2.0 * odometry_s);
+                    // A scan from just after the last odometry, with what the next one takes on its way.
+                    holds(clock::nanoseconds(guard.odometry_wait_max_s), odometry_s + 0.9 * DELAY_S);
                     // A command of before the last deadline, of the scan before the last.
                     holds(found.scan_ns, 2.0 * scan_s + control_s);
                     holds(found.learned_ns, 2.0 * scan_s);
@@ -173,6 +181,37 @@ mod tests {
                 }
             }
         }
+    }
+
+    /// Odometry five times a second: a scan is placed wherever it falls, by the odometry after it, or where that one is
+    /// lost, by the one before.
+    #[test]
+    fn scans_are_placed_at_low_rates() {
+        let guard = Periods { odometry_s: 0.2, scan_s: 0.4, ..Periods::default() }.guard();
+        let vehicle = formats::read_vehicle("rc_car").unwrap();
+        let elevation = Config::for_vehicle(&vehicle).elevation;
+        let mut surveyor = Surveyor::new(&vehicle, elevation, guard, Surface::Sensed).unwrap();
+        let ns = |at_ms: u64| 1_000_000 * at_ms;
+        // 1 m/s eastwards.
+        let measured = |at_ms: u64| Odometry {
+            valid_at_ns: ns(at_ms),
+            position_m: [1e-3 * at_ms as f64, 0.0, 0.0],
+            velocity_mps: [1.0, 0.0],
+            ..Odometry::default()
+        };
+        let is_there =
+            |there: &Odometry, at_ms: u64| (there.position_m[0] - 1e-3 * at_ms as f64).abs() < 1e-9;
+        [1000, 1200].map(|at_ms| assert_eq!(surveyor.admit(&measured(at_ms)), Ok(None)));
+        for at_ms in [1201, 1399] {
+            let ahead = surveyor.place(ns(at_ms));
+            assert!(
+                matches!(&ahead, Ok(Whereabouts::Ahead(Some(there))) if is_there(there, at_ms)),
+                "{ahead:?}"
+            );
+        }
+        assert_eq!(surveyor.admit(&measured(1400)), Ok(None));
+        let between = surveyor.place(ns(1399));
+        assert!(matches!(&between, Ok(Whereabouts::Between(there)) if is_there(there, 1399)), "{between:?}");
     }
 
     #[test]

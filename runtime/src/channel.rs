@@ -14,7 +14,7 @@ use crate::message::{
     ScanHeader, Stamp, StatusRecord, StuckRecord, SurfaceHeader,
 };
 use crate::payload;
-pub use bus::{Bus, RunName, RunNameError};
+pub use bus::{Bus, Cleared, RunName, RunNameError};
 pub(crate) use inlet::FUTURE_NS;
 pub use inlet::{Counts, Inlet, Message, Refusal};
 pub use outlet::{Loan, Outlet};
@@ -86,7 +86,7 @@ pub const RISK_PHYSICS: Channel<RiskHeader, [f32; 4]> =
     Channel { name: "risk_physics", n_readers: 3, ..RISK };
 /// What the vehicle shall do: control.
 pub const COMMAND: Channel<Stamp, CommandRecord> =
-    Channel { name: "command", depth: 4, n_readers: 5, check: payload::check_command };
+    Channel { name: "command", depth: 4, n_readers: 4, check: payload::check_command };
 /// What each decision was made from: control.
 pub const DECISION: Channel<Stamp, DecisionRecord> =
     Channel { name: "decision", depth: 16, n_readers: 2, check: payload::check_anything };
@@ -143,6 +143,17 @@ pub enum ChannelError {
     Taken {
         /// Its name.
         channel: &'static str,
+    },
+    /// Its publisher may have died, and what it left behind cannot be cleared away.
+    #[error(
+        "channel {channel}: expected to clear away what dead processes left behind, found that of {n_failed} that could \
+         not be removed; remove the folder of the run"
+    )]
+    Left {
+        /// Its name.
+        channel: &'static str,
+        /// Dead processes whose files are still there.
+        n_failed: u64,
     },
     /// Every place of a reader is taken.
     #[error(

@@ -120,7 +120,7 @@ impl Inputs {
         *n_taken = 0;
         self.odometry.poll(|stamp, records| {
             let Some(record) = records.first() else { return };
-            pilot.admit(&record.odometry(stamp.valid_at_ns));
+            show(pilot, stamp, record);
             *last = Some(*stamp);
             *n_taken += 1;
         });
@@ -139,6 +139,12 @@ impl Inputs {
             self.physics.held.as_ref()
         }
     }
+}
+
+/// Shows a pilot what the vehicle says of itself: control and its replay.
+pub(crate) fn show(pilot: &mut Pilot, stamp: &Stamp, record: &OdometryRecord) {
+    pilot.note_applied(&record.applied());
+    pilot.admit(&record.odometry(stamp.valid_at_ns));
 }
 
 impl Control {

@@ -15,6 +15,7 @@ mod choice;
 pub mod clock;
 pub mod control;
 mod error;
+mod intake;
 pub mod layout;
 pub mod learning;
 pub mod live;

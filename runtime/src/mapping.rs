@@ -2,20 +2,19 @@
 
 use std::collections::VecDeque;
 
-use bicycle::{Decision, Model, Odometry, SensorModel, Vehicle};
+use bicycle::{Model, Odometry, SensorModel, Vehicle};
 use navigator::{Assessor, Belief, Config, Jump, Surface, Surveyor, Whereabouts};
 use terrain::Scan;
 use traversability::CvarLevel;
 
 use crate::RuntimeError;
 use crate::ages::AgeLimits;
-use crate::channel::{
-    Bus, COMMAND, Inlet, MISSION, ODOMETRY, Outlet, RISK, RISK_PHYSICS, SCAN, STUCK, SURFACE,
-};
+use crate::channel::{Bus, Inlet, MISSION, ODOMETRY, Outlet, RISK, RISK_PHYSICS, SCAN, STUCK, SURFACE};
 use crate::clock;
+use crate::intake::Intake;
 use crate::message::{
-    CommandRecord, Grid, MissionRecord, OdometryRecord, PointRecord, RiskHeader, ScanHeader, Source, Stamp,
-    StuckRecord, SurfaceHeader,
+    Grid, MissionRecord, OdometryRecord, PointRecord, RiskHeader, ScanHeader, Source, Stamp, StuckRecord,
+    SurfaceHeader,
 };
 use crate::payload::{self, RiskParts};
 use crate::risk_maker::RiskMaker;
@@ -63,10 +62,8 @@ struct Mapping {
     surveyor: Surveyor,
     waiting: VecDeque<Waiting>,
     wait_max_ns: u64,
-    /// Of the newest odometry that was taken in: jumps up to it are in the map.
-    frame_at_ns: u64,
+    intake: Intake,
     odometry: Inlet<Stamp, OdometryRecord>,
-    commands: Inlet<Stamp, CommandRecord>,
     scans: Inlet<ScanHeader, PointRecord>,
     surfaces: Outlet<SurfaceHeader, [f32; 8]>,
     fallback: Fallback,
@@ -104,9 +101,8 @@ impl Mapping {
                 .with_sensors(SensorModel::of(&model.effects)),
             waiting: VecDeque::with_capacity(WAITING_MAX),
             wait_max_ns: clock::nanoseconds(config.guard.odometry_wait_max_s),
-            frame_at_ns: 0,
+            intake: Intake::default(),
             odometry: bus.inlet(&ODOMETRY)?,
-            commands: bus.inlet(&COMMAND)?,
             scans: bus.inlet(&SCAN)?,
             surfaces: bus.outlet(&SURFACE, n_cells)?,
             fallback: Fallback::new(bus, setup)?,
@@ -119,22 +115,10 @@ impl Mapping {
 
     /// Takes in what has come, and tells what became of it.
     fn look(&mut self) -> Result<(), RuntimeError> {
-        let surveyor = &mut self.surveyor;
-        self.commands.poll(|_, commands| {
-            let speed_mps = match commands.first().and_then(CommandRecord::decision) {
-                Some(Decision::Drive(command)) => command.speed_mps,
-                _ => 0.0,
-            };
-            surveyor.note_command(speed_mps);
-        });
         let mut odometry = Vec::new();
-        let last_odometry = &mut self.last_odometry;
-        self.odometry.poll(|stamp, records| {
-            *last_odometry = Some(*stamp);
-            odometry.extend(records.first().map(|record| record.odometry(stamp.valid_at_ns)));
-        });
-        for odometry in odometry {
-            self.follow(&odometry)?;
+        self.odometry.poll(|stamp, records| odometry.extend(records.first().map(|record| (*stamp, *record))));
+        for (stamp, record) in odometry {
+            self.follow(&stamp, &record)?;
         }
         let (waiting, n_unmapped) = (&mut self.waiting, &mut self.n_unmapped);
         self.scans.poll(|header, points| {
@@ -150,15 +134,13 @@ impl Mapping {
         self.report()
     }
 
-    fn follow(&mut self, odometry: &Odometry) -> Result<(), RuntimeError> {
-        let Ok(jump) = self.surveyor.admit(odometry) else { return Ok(()) };
-        self.frame_at_ns = odometry.valid_at_ns;
-        if let Some(jump) = jump {
-            self.surveyor.follow_jump(odometry, &jump)?;
-            let scan = self.last_scan;
-            self.tell(odometry, Event::Jumped(jump), scan)?;
-        }
-        Ok(())
+    fn follow(&mut self, stamp: &Stamp, record: &OdometryRecord) -> Result<(), RuntimeError> {
+        self.last_odometry = Some(*stamp);
+        let Ok(Some(jump)) = self.intake.show(&mut self.surveyor, stamp, record) else { return Ok(()) };
+        let odometry = record.odometry(stamp.valid_at_ns);
+        self.surveyor.follow_jump(&odometry, &jump)?;
+        let scan = self.last_scan;
+        self.tell(&odometry, Event::Jumped(jump), scan)
     }
 
     /// Fuses the scans for which it is known by now where they were taken, or for which nothing better will come.
@@ -204,21 +186,14 @@ impl Mapping {
             Event::Fused => (FUSED, Jump::NONE),
             Event::Jumped(jump) => (JUMPED, jump),
         };
-        let shift = self.surveyor.shift();
         let mut header = SurfaceHeader {
-            stamp: Stamp::default(),
             grid: Grid::from(surface.geometry()),
             scan: scan.map_or(Source::default(), |stamp| stamp.source()),
-            odometry: OdometryRecord::from(odometry),
-            odometry_at_ns: odometry.valid_at_ns,
-            frame_at_ns: self.frame_at_ns,
             event,
-            jump_m: jump.step_m,
-            jump_yaw_rad: jump.yaw_rad,
-            shift_m: shift.step_m,
-            shift_yaw_rad: shift.yaw_rad,
             content_hash: payload::content_hash(loan.payload()),
+            ..SurfaceHeader::default()
         };
+        self.intake.tell(&self.surveyor, odometry, &jump, &mut header);
         *loan.header_mut() = header;
         // A jump moves what was seen; it is no news of the ground.
         let valid_at_ns = scan.map_or(odometry.valid_at_ns, |stamp| stamp.valid_at_ns);
@@ -234,7 +209,7 @@ impl Mapping {
             |stamp: &Option<Stamp>| stamp.map_or(-1.0, |stamp| clock::age_s(now_ns, stamp.valid_at_ns));
         let age_s = [age_s(&self.last_odometry), age_s(&self.last_scan), -1.0, -1.0];
         let (n_missed, figure) = (self.n_unmapped, self.surveyor.n_jumps() as f64);
-        let counts = [self.odometry.counts(), self.scans.counts(), self.commands.counts()];
+        let counts = [self.odometry.counts(), self.scans.counts()];
         let health = Health { age_s, n_missed, figure, ..Health::default() };
         Ok(self.meter.report(now_ns, || counts.into_iter().fold(health, Health::with))?)
     }

@@ -9,7 +9,7 @@ pub(crate) use convert::drive_row;
 pub use convert::{HOLD_REASONS, STOP_REASONS};
 
 /// Version of everything in this file; messages of another are refused.
-pub const LAYOUT_VERSION: u32 = 3;
+pub const LAYOUT_VERSION: u32 = 4;
 
 record! {
     /// First field of every header: whose message it is, and of when.
@@ -68,6 +68,14 @@ record! {
         wheel_speed_mps: f64,
         /// Measured angle of the front wheels, left positive [rad].
         steering_rad: f64,
+        /// Forward speed that the actuators were told last before this was measured [m/s].
+        applied_speed_mps: f32,
+        /// Angle of the front wheels that they were told, left positive [rad].
+        applied_steering_rad: f32,
+        /// When they were first told so [ns].
+        applied_since_ns: u64,
+        /// Who decided it: 0 = the last command, 1 = the vehicle itself, be it its watchdog or an operator.
+        applied_by: u64,
     }
 }
 
@@ -102,12 +110,18 @@ record! {
         grid: Grid,
         /// The scan that was fused last.
         scan: Source,
-        /// Where the vehicle was when the scan was taken, or the odometry that showed the jump.
+        /// Where the vehicle was when the scan was taken, or the odometry that showed the jump; nothing of what was applied.
         odometry: OdometryRecord,
         /// When that was [ns].
         odometry_at_ns: u64,
         /// When the odometry was measured in whose frame the map lies: the newest that mapping had taken in [ns].
         frame_at_ns: u64,
+        /// The odometry that mapping took in last before this map, usable or not.
+        last_odometry: Source,
+        /// How many it took in since the map before.
+        n_odometry: u64,
+        /// XXH3 of these, each its stamp and its record, in the order in which they were taken in.
+        odometry_hash: u64,
         /// What happened since the last message: 1 = a scan was fused, 2 = the localisation jumped.
         event: u64,
         /// The jump, if that is what happened: p of before lies at R(jump_yaw_rad) p + jump_m [m].

@@ -167,9 +167,15 @@ pub(crate) fn check_anything<T>(_: &Stamp, payload: &[T]) -> Result<(), Refusal>
     check_one(payload).map(drop)
 }
 
-/// Numbers that are not finite pass here and stop the vehicle at the guard, which is sooner than by their absence.
-pub(crate) fn check_odometry(_: &Stamp, payload: &[OdometryRecord]) -> Result<(), Refusal> {
-    check_one(payload).map(drop)
+/// Measurements that are not finite pass here and stop the vehicle at the guard, which is sooner than by their absence.
+/// What was applied is no measurement: nobody would look at it again.
+pub(crate) fn check_odometry(stamp: &Stamp, payload: &[OdometryRecord]) -> Result<(), Refusal> {
+    let record = check_one(payload)?;
+    let latest_ns = stamp.published_at_ns.saturating_add(FUTURE_NS);
+    require(record.applied_since_ns <= latest_ns, Refusal::FromFuture)?;
+    let is_finite = record.applied_speed_mps.is_finite() && record.applied_steering_rad.is_finite();
+    require(is_finite, Refusal::NonFinite)?;
+    require(record.applied_by <= 1, Refusal::Malformed)
 }
 
 /// Some points may be no numbers, as sensors give them; the map drops these.

@@ -134,7 +134,7 @@ impl Plant {
         });
         let jumps = &mut self.jumps;
         self.mapping.poll(|stamp, told| told.iter().for_each(|status| jumps.note(stamp, status)));
-        let decision = self.watchdog.decision(clock::now_ns());
+        let decision = self.watchdog.carry_out(clock::now_ns());
         if decision == Decision::Stop(bicycle::StopReason::StaleCommand) {
             self.n_stopped_by_watchdog += 1;
         }
@@ -174,7 +174,8 @@ impl Plant {
     fn measure(&mut self) -> Result<(), RuntimeError> {
         let at_ns = self.at_ns();
         let Observation { odometry, scan, .. } = self.episode.observe();
-        self.odometry.send_one(Stamp::default(), OdometryRecord::from(odometry), at_ns)?;
+        let record = OdometryRecord::from(odometry).with_applied(self.watchdog.applied());
+        self.odometry.send_one(Stamp::default(), record, at_ns)?;
         let Some(scan) = scan else { return Ok(()) };
         let n_points = scan.points.len().min(self.scans.n_max());
         let mut loan = self.scans.write(n_points, |place| PointRecord::from(&scan.points[place]))?;

@@ -1,8 +1,10 @@
 //! Every decision of a recording, made again from what control said it used.
 
 mod choice;
+mod difference;
 mod maps;
 mod records;
+mod survey;
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -12,6 +14,7 @@ use evidential::Checkpoint;
 use navigator::{Belief, Chart, NavigatorError, Pilot};
 use traversability::CvarLevel;
 
+use crate::control;
 use crate::message::{CommandRecord, DecisionRecord, Source};
 use crate::mission::{Mission, NOWHERE, with_reason};
 use crate::payload::risk_views;
@@ -33,10 +36,17 @@ pub struct ReplayReport {
     pub n_surfaces: u64,
     /// Risk maps made again, with the recorded hash.
     pub n_risk_maps: u64,
+    /// Maps of the ground whose localisation was made out again from the odometry, to the same bits: the jump that it
+    /// shows, or where the scan was taken.
+    pub n_localised: u64,
+    /// Maps of the ground whose localisation could not be verified.
+    pub n_unverified: u64,
+    /// Why it could not, each reason once, with the first of the maps.
+    pub unverified: Vec<String>,
     /// The first difference, if there is any.
     pub first_difference: Option<String>,
     /// Where the recording contradicts itself, whatever was decided on it: decisions on another map than there was to
-    /// decide on.
+    /// decide on, maps of the ground of another jump or place than the odometry shows.
     pub contradictions: Vec<String>,
     /// What the recording lacks, each once.
     pub missing: Vec<String>,
@@ -149,8 +159,12 @@ pub fn replay(records: &Records, knowledge: &Knowledge) -> Result<ReplayReport, 
         let Some(life) = &mut life else { continue };
         life.decide(record, records, &mut maps, &mut report)?;
     }
+    let (missing, localisation) = maps.finish()?;
     (report.n_surfaces, report.n_risk_maps) = maps.n_made();
-    report.missing.extend(maps.into_missing());
+    report.missing.extend(missing);
+    report.contradictions.extend(localisation.contradictions);
+    (report.n_localised, report.n_unverified) = (localisation.n_verified, localisation.n_unverified);
+    report.unverified = localisation.unverified;
     Ok(report)
 }
 
@@ -243,7 +257,7 @@ impl Life<'_> {
             let Some((stamp, odometry)) = records.odometry.get(&Key { epoch_ns, sequence }) else {
                 return Some(format!("odometry {sequence}"));
             };
-            self.pilot.admit(&odometry.odometry(stamp.valid_at_ns));
+            control::show(&mut self.pilot, stamp, odometry);
         }
         None
     }

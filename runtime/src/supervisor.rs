@@ -2,6 +2,7 @@
 
 use std::process::{Child, Command, ExitStatus};
 
+use rustix::io::Errno;
 use rustix::process::{Pid, Signal, kill_process};
 use serde::Serialize;
 
@@ -87,6 +88,7 @@ pub struct Supervisor<'a> {
     timing: Timing,
     policy: RestartPolicy,
     command: &'a dyn Fn(Role) -> Command,
+    unended: Vec<String>,
 }
 
 impl<'a> Supervisor<'a> {
@@ -117,6 +119,7 @@ impl<'a> Supervisor<'a> {
             timing: Timing::default(),
             policy,
             command,
+            unended: Vec::new(),
         })
     }
 
@@ -147,6 +150,11 @@ impl<'a> Supervisor<'a> {
         self.end_all();
         self.listen();
         end
+    }
+
+    /// Processes that could not be told to end, and why: they may still run.
+    pub fn unended(&self) -> &[String] {
+        &self.unended
     }
 
     /// What the vehicle's process said last.
@@ -189,15 +197,18 @@ impl<'a> Supervisor<'a> {
 
     fn end_all(&mut self) {
         let until_ns = clock::now_ns() + PATIENCE_NS;
-        self.kept.iter_mut().for_each(|kept| kept.signal(Signal::TERM));
+        let Self { kept, unended, .. } = self;
+        unended.extend(kept.iter_mut().filter_map(|kept| kept.signal(Signal::TERM).err()));
         while self.kept.iter_mut().any(Kept::is_running) && clock::now_ns() < until_ns {
             clock::sleep_until(clock::now_ns() + POLL_NS / 4);
         }
         for kept in &mut self.kept {
-            kept.signal(Signal::KILL);
-            if let Some(child) = &mut kept.child {
+            match (kept.signal(Signal::KILL), &mut kept.child) {
+                // Who cannot be killed is not waited for.
+                (Err(why), _) => self.unended.push(why),
                 // It has been killed; how it ended is of no interest any more.
-                drop(child.wait());
+                (Ok(()), Some(child)) => drop(child.wait()),
+                (Ok(()), None) => {}
             }
         }
     }
@@ -258,17 +269,26 @@ impl Kept {
         }
     }
 
-    fn signal(&mut self, signal: Signal) {
+    /// Says why a signal could not be sent.
+    fn signal(&mut self, signal: Signal) -> Result<(), String> {
         let process = self.child.as_ref().and_then(|child| i32::try_from(child.id()).ok());
-        if let Some(process) = process.and_then(Pid::from_raw).filter(|_| self.is_running()) {
-            // It may end by itself just now, which is what is wanted.
-            kill_process(process, signal).unwrap_or_default();
-        }
+        let Some(process) = process.and_then(Pid::from_raw).filter(|_| self.is_running()) else {
+            return Ok(());
+        };
+        unsent(kill_process(process, signal)).map_or(Ok(()), |why| {
+            let (name, number) = (self.role.name(), process.as_raw_nonzero());
+            Err(format!("{name}: expected to send signal {signal:?} to process {number}, found: {why}"))
+        })
     }
 
     fn is_running(&mut self) -> bool {
         self.child.as_mut().is_some_and(|child| matches!(child.try_wait(), Ok(None)))
     }
+}
+
+/// Why a signal was not sent; one that has ended by itself just now is what is wanted.
+fn unsent(sent: Result<(), Errno>) -> Option<Errno> {
+    sent.err().filter(|why| *why != Errno::SRCH)
 }
 
 /// How one process is doing.
@@ -316,5 +336,16 @@ impl std::fmt::Display for StatusLine {
             Role::Recorder => write!(formatter, "  {:.1} MB", 1e-6 * status.figure),
             _ => Ok(()),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn signals_that_are_not_sent_are_told_but_to_those_that_have_ended() {
+        assert_eq!([Ok(()), Err(Errno::SRCH)].map(unsent), [None; 2]);
+        assert_eq!(unsent(Err(Errno::PERM)), Some(Errno::PERM));
     }
 }

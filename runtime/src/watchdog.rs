@@ -1,7 +1,8 @@
 //! The last word before the actuators: a command counts for as long as what it was decided on, and then the vehicle
 //! stops.
 
-use bicycle::{Decision, HoldReason, Limits, StopReason};
+use bicycle::{Command, Decision, HoldReason, Limits, StopReason};
+use navigator::{Applied, AppliedBy};
 
 use crate::ages::AgeLimits;
 use crate::message::CommandRecord;
@@ -12,7 +13,10 @@ pub struct Watchdog {
     limits: Limits,
     ages: AgeLimits,
     last: Option<Held>,
+    /// Whether a command has come since that the vehicle could not carry out.
+    has_refused: bool,
     n_refused: u64,
+    applied: Applied,
 }
 
 /// A command that is followed for now.
@@ -28,7 +32,8 @@ struct Held {
 impl Watchdog {
     /// A watchdog of a vehicle, for commands that were decided on nothing older.
     pub fn new(limits: Limits, ages: AgeLimits) -> Self {
-        Self { limits, ages, last: None, n_refused: 0 }
+        let applied = Applied { command: Command::default(), since_ns: 0, by: AppliedBy::Vehicle };
+        Self { limits, ages, last: None, has_refused: false, n_refused: 0, applied }
     }
 
     /// Takes over a command that was sent at this time; one that the vehicle cannot carry out counts as none.
@@ -38,8 +43,10 @@ impl Watchdog {
     pub fn admit(&mut self, command: &CommandRecord, sent_at_ns: u64) {
         let Some(decision) = command.decision().filter(|decision| self.is_possible(decision)) else {
             self.n_refused += 1;
+            self.has_refused = true;
             return;
         };
+        self.has_refused = false;
         let AgeLimits { command_ns, scan_ns, .. } = self.ages;
         let CommandRecord { odometry_at_ns, scan_at_ns, .. } = *command;
         let held = |of_ns: u64, until_ns: u64| Held { decision, of_ns, until_ns };
@@ -59,6 +66,23 @@ impl Watchdog {
             Some(held) if now_ns > held.until_ns => Decision::Stop(StopReason::StaleCommand),
             Some(held) => held.decision,
         }
+    }
+
+    /// The same, for whoever hands it to the actuators: from now on [`Watchdog::applied`] tells of it.
+    pub fn carry_out(&mut self, now_ns: u64) -> Decision {
+        let decision = self.decision(now_ns);
+        let command = decision.command(self.applied.command);
+        let follows = self.last.is_some_and(|held| now_ns <= held.until_ns) && !self.has_refused;
+        let by = if follows { AppliedBy::Command } else { AppliedBy::Vehicle };
+        if (command, by) != (self.applied.command, self.applied.by) {
+            self.applied = Applied { command, since_ns: now_ns, by };
+        }
+        decision
+    }
+
+    /// What the actuators were told last, to be said with what is measured next.
+    pub fn applied(&self) -> &Applied {
+        &self.applied
     }
 
     /// Age of what the last command was decided on [ns]; `None` before the first.
@@ -85,7 +109,7 @@ impl Watchdog {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use bicycle::Command;
+    use AppliedBy::{Command as Commanded, Vehicle};
 
     const COMMAND_NS: u64 = 300;
     const SCAN_NS: u64 = 1000;
@@ -161,6 +185,31 @@ mod tests {
         watchdog.admit(&command(hold, [0, 0]), 1000);
         assert_eq!(watchdog.decision(1000 + COMMAND_NS), hold);
         assert_eq!(watchdog.decision(1001 + COMMAND_NS), STALE, "nobody is in control any more");
+    }
+
+    #[test]
+    fn what_is_applied_is_told_with_who_decided_it_and_since_when() {
+        let mut watchdog = watchdog();
+        let mut applied = |now_ns: u64, commands: &[(Decision, u64)]| {
+            commands.iter().for_each(|(decision, at_ns)| {
+                watchdog.admit(&command(*decision, [*at_ns, *at_ns]), *at_ns);
+            });
+            watchdog.carry_out(now_ns);
+            let Applied { command: Command { speed_mps, steering_rad }, since_ns, by } = *watchdog.applied();
+            (speed_mps, steering_rad, since_ns, by)
+        };
+        assert_eq!(applied(990, &[]), (0.0, 0.0, 0, Vehicle), "nobody has commanded anything");
+        assert_eq!(applied(1010, &[(drive(1.0, 0.1), 1000)]), (1.0, 0.1, 1010, Commanded));
+        assert_eq!(applied(1110, &[(drive(1.0, 0.1), 1100)]), (1.0, 0.1, 1010, Commanded), "the same again");
+        assert_eq!(applied(1390, &[]), (1.0, 0.1, 1010, Commanded));
+        assert_eq!(applied(1410, &[]), (0.0, 0.1, 1410, Vehicle), "nobody goes on commanding");
+        assert_eq!(applied(1430, &[]), (0.0, 0.1, 1410, Vehicle));
+        let stop = Decision::Stop(StopReason::StaleScan);
+        assert_eq!(applied(1510, &[(stop, 1500)]), (0.0, 0.1, 1510, Commanded), "to stop is a command, too");
+        assert_eq!(applied(1610, &[(drive(0.5, 0.0), 1600)]), (0.5, 0.0, 1610, Commanded));
+        let wild = drive(9.0, 0.0);
+        assert_eq!(applied(1710, &[(wild, 1700)]), (0.5, 0.0, 1710, Vehicle), "not what came last");
+        assert_eq!(applied(1810, &[(drive(0.5, 0.0), 1800)]), (0.5, 0.0, 1810, Commanded));
     }
 
     #[test]

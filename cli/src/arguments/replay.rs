@@ -26,14 +26,16 @@ pub(super) const LONG_ABOUT: &str = "\
 Makes every decision of a recording again: the maps from the recorded scans and the networks, checked by their hashes, \
 and the commands from the maps and what control says it used. Every command must come out to the last bit; the first \
 that does not is told. Each decision must also have been made on the newest maps that there were, and on the one of them \
-that is to be driven on. What the recording lacks is told too, and what hangs on it is not counted as made again.";
+that is to be driven on. Jumps of the localisation and places of scans are made out again from the recorded odometry and \
+must be those of the maps. What the recording lacks is told too, and what hangs on it is not counted as made again.";
 
 const AFTER_HELP: &str = "\
 Example:
   surefoot replay surefoot-out/drive-000.mcap
 
 Exit codes:
-  0  every decision was made again to the last bit
+  0  every decision was made again to the last bit; where odometry was not recorded, maps whose localisation could not
+     be verified are counted and told
   1  one was not, or was made on another map than it had to be, or something that it needs was not recorded, or
-     there is none; one line says which
+     there is none, or a map tells of another jump or place than the odometry shows; one line says which
   2  bad usage or input; one line says what was expected and what was found";

@@ -84,8 +84,12 @@ impl Drive {
     }
 
     fn decide(&mut self) -> Decision {
+        self.decide_on_chart_of(u64::MAX)
+    }
+
+    fn decide_on_chart_of(&mut self, odometry_at_ns: u64) -> Decision {
         let (map, time_to_goal) = (self.map.view(), self.field.view());
-        let chart = Chart { map, time_to_goal, odometry_at_ns: u64::MAX };
+        let chart = Chart { map, time_to_goal, odometry_at_ns };
         let destination = Destination { goal_m: self.goal_m, tolerance_m: 0.5 };
         let decision = self.pilot.decide(self.cycle * CYCLE_NS, Some(chart), &destination);
         self.cycle += 1;
@@ -126,14 +130,65 @@ fn after_a_stop_of_the_guard_the_plan_starts_from_what_was_really_sent() {
 
 /// Somebody between controller and vehicle lets nothing through: the vehicle is told to stand whatever is decided.
 #[test]
-fn what_was_sent_instead_of_a_decision_is_what_the_next_plan_starts_from() {
+fn what_was_applied_instead_of_a_decision_is_what_the_next_plan_starts_from() {
     let mut drive = Drive::new();
     drive.state.speed_mps = 0.0;
-    for _ in 0..10 {
+    let standing = Applied { command: Command::default(), since_ns: 0, by: AppliedBy::Vehicle };
+    for _ in 0..40 {
+        drive.pilot.note_applied(&standing);
         drive.measure();
-        assert!(matches!(drive.decide(), Decision::Drive(_)));
-        drive.pilot.note_sent(Command::default());
+        let Decision::Drive(command) = drive.decide() else { panic!("level ground") };
         let start = drive.planned_from();
         assert!((start.x_m - drive.state.x_m).abs() < 1e-9 && start.speed_mps.abs() < 1e-9, "{start:?}");
+        // From rest in one step, whatever was decided before; and who is held is not stuck.
+        assert!((0.0..=BRAKES_MPS2 * CYCLE_S + 1e-6).contains(&f64::from(command.speed_mps)), "{command:?}");
+        assert!(!drive.pilot.controller().diagnostics().is_recovering);
     }
+    assert!(drive.pilot.take_stuck().is_none());
+}
+
+/// The watchdog stops it for half a second in which nothing is decided, and follows again what comes then.
+#[test]
+fn a_stop_of_the_vehicles_own_is_known_with_its_time() {
+    let mut drive = Drive::new();
+    let mut last = Command::default();
+    for _ in 0..10 {
+        drive.measure();
+        let Decision::Drive(command) = drive.decide() else { panic!("level ground") };
+        (drive.state.x_m, last) = (drive.state.x_m + SPEED_MPS * CYCLE_S, command);
+    }
+    drive.cycle += 5;
+    // It has been told to stop for 0.2 s: for the first tenth of what is on its way the last command is, then rest.
+    let stop = Command { speed_mps: 0.0, ..last };
+    let stopped_ns = drive.cycle * CYCLE_NS - 200_000_000;
+    drive.pilot.note_applied(&Applied { command: stop, since_ns: stopped_ns, by: AppliedBy::Vehicle });
+    drive.measure();
+    drive.decide();
+    let start = drive.planned_from();
+    // At 2 m/s2: a tenth towards the command, two to rest.
+    let step_mps = BRAKES_MPS2 * CYCLE_S;
+    let towards_mps = (f64::from(last.speed_mps) - SPEED_MPS).clamp(-step_mps, step_mps);
+    let expected_mps = SPEED_MPS + towards_mps - 2.0 * step_mps;
+    assert!((start.speed_mps - expected_mps).abs() < 1e-6, "{start:?} {last:?}");
+}
+
+/// The vehicle stands, however it is told to drive, and is found to be stuck: it backs up. Meanwhile the localisation
+/// corrects itself by 3 m, and the next map lies in the new frame. It goes on backing up, to behind where it stands.
+#[test]
+fn backing_up_goes_on_after_a_jump_of_the_localisation() {
+    let mut drive = Drive::new();
+    drive.state.speed_mps = 0.0;
+    let decide = |drive: &mut Drive, chart_at_ns: u64| {
+        // As sensors see it: never twice at the same place.
+        drive.state.y_m += if drive.cycle.is_multiple_of(2) { 1e-3 } else { -1e-3 };
+        drive.measure();
+        drive.decide_on_chart_of(chart_at_ns);
+        drive.pilot.controller().diagnostics().is_recovering
+    };
+    let n_cycles = (0..100).find(|_| decide(&mut drive, 0)).unwrap();
+    assert!(n_cycles > 10, "{n_cycles}");
+    drive.state.x_m += 3.0;
+    assert!(decide(&mut drive, 0), "on the map of before it stands where it stood");
+    let new_ns = drive.cycle * CYCLE_NS;
+    assert!((0..5).all(|_| decide(&mut drive, new_ns)), "on the map of after it does, too");
 }

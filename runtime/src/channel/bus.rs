@@ -79,6 +79,15 @@ pub struct Bus {
     n_third_parties: usize,
 }
 
+/// Of how many dead processes what they left behind was cleared away, and of how many it could not be.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Cleared {
+    /// Cleared away.
+    pub n_cleared: u64,
+    /// Still there.
+    pub n_failed: u64,
+}
+
 type Service<H, T> = PortFactory<ipc::Service, [T], H>;
 
 impl Bus {
@@ -133,7 +142,8 @@ impl Bus {
         Ok(Outlet::new(channel.name, publisher, failures, (clock::now_ns(), n_max)))
     }
 
-    /// Waits for the place of a publisher that may just have died.
+    /// Waits for the place of a publisher that may just have died. What is left of one that cannot be cleared away keeps
+    /// its place, and that is said: no living process has it then.
     fn await_place<H: Header, T: Element>(
         &self,
         channel: &'static str,
@@ -141,10 +151,11 @@ impl Bus {
     ) -> Result<(), ChannelError> {
         let until_ns = clock::now_ns() + HAND_OVER_NS;
         while service.dynamic_config().number_of_publishers() > 0 {
+            let Cleared { n_failed, .. } = self.clear_dead();
             if clock::now_ns() > until_ns {
-                return Err(taken(channel));
+                let left = ChannelError::Left { channel, n_failed };
+                return Err(if n_failed > 0 { left } else { taken(channel) });
             }
-            self.clear_dead();
             clock::sleep_until(clock::now_ns() + POLL_NS);
         }
         Ok(())
@@ -167,9 +178,11 @@ impl Bus {
         Ok(Inlet::new(channel, service, subscriber, failures))
     }
 
-    /// Clears away what dead processes of the run have left behind; returns of how many.
-    pub fn clear_dead(&self) -> u64 {
-        self.node.try_cleanup_dead_nodes().cleanups
+    /// Clears away what dead processes of the run have left behind. What fails may be another process that does the same
+    /// just now; what fails again and again is something that this user may not remove.
+    pub fn clear_dead(&self) -> Cleared {
+        let state = self.node.try_cleanup_dead_nodes();
+        Cleared { n_cleared: state.cleanups, n_failed: state.failed_cleanups }
     }
 
     fn service<H: Header, T: Element>(&self, channel: &Channel<H, T>) -> Result<Service<H, T>, ChannelError> {

@@ -1,7 +1,7 @@
 //! Between the messages and what the pipeline is made of.
 
 use bicycle::{Column, Command, Decision, DriveRow, HoldReason, Odometry, StopReason};
-use navigator::Jump;
+use navigator::{Applied, AppliedBy, Jump};
 use terrain::{GridGeometry, LATTICE_MAX, RangePoint, Scan, TerrainClass};
 
 use super::{CommandRecord, Grid, OdometryRecord, PointRecord, ScanHeader, Source, Stamp, SurfaceHeader};
@@ -95,15 +95,54 @@ impl From<&Odometry> for OdometryRecord {
             wheel_speed_mps,
             steering_rad,
         } = *odometry;
-        Self { position_m, attitude_rad, velocity_mps, yaw_rate_radps, wheel_speed_mps, steering_rad }
+        Self {
+            position_m,
+            attitude_rad,
+            velocity_mps,
+            yaw_rate_radps,
+            wheel_speed_mps,
+            steering_rad,
+            ..Self::default()
+        }
     }
 }
 
 impl OdometryRecord {
+    /// With what the actuators were told last.
+    pub fn with_applied(self, applied: &Applied) -> Self {
+        let Applied { command: Command { speed_mps, steering_rad }, since_ns, by } = *applied;
+        Self {
+            applied_speed_mps: speed_mps,
+            applied_steering_rad: steering_rad,
+            applied_since_ns: since_ns,
+            applied_by: match by {
+                AppliedBy::Command => 0,
+                AppliedBy::Vehicle => 1,
+            },
+            ..self
+        }
+    }
+
+    /// What the actuators were told last.
+    pub fn applied(&self) -> Applied {
+        Applied {
+            command: Command { speed_mps: self.applied_speed_mps, steering_rad: self.applied_steering_rad },
+            since_ns: self.applied_since_ns,
+            by: if self.applied_by == 0 { AppliedBy::Command } else { AppliedBy::Vehicle },
+        }
+    }
+
     /// As the pipeline takes it.
     pub fn odometry(&self, valid_at_ns: u64) -> Odometry {
-        let Self { position_m, attitude_rad, velocity_mps, yaw_rate_radps, wheel_speed_mps, steering_rad } =
-            *self;
+        let Self {
+            position_m,
+            attitude_rad,
+            velocity_mps,
+            yaw_rate_radps,
+            wheel_speed_mps,
+            steering_rad,
+            ..
+        } = *self;
         Odometry {
             valid_at_ns,
             position_m,
@@ -256,6 +295,11 @@ mod tests {
             wheel_speed_mps: 1.6,
             steering_rad: -0.2,
         };
-        assert_eq!(OdometryRecord::from(&odometry).odometry(5), odometry);
+        let command = Command { speed_mps: 1.25, steering_rad: -0.5 };
+        for by in [AppliedBy::Command, AppliedBy::Vehicle] {
+            let applied = Applied { command, since_ns: 3, by };
+            let record = OdometryRecord::from(&odometry).with_applied(&applied);
+            assert_eq!((record.odometry(5), record.applied()), (odometry, applied));
+        }
     }
 }

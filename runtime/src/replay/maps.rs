@@ -1,15 +1,16 @@
 //! Maps made again from scans, in the order in which they were made, and held against their hashes.
 
 use std::collections::BTreeMap;
+use std::ops::Bound;
 use std::sync::Arc;
 
-use bicycle::SensorModel;
-use navigator::{Assessor, Belief, NavigatorError, Surface, Surveyor};
+use navigator::{Assessor, Belief, NavigatorError};
 use traversability::CvarLevel;
 
 use super::records::{Key, Records};
+use super::survey::{Localisation, Survey};
 use super::{Knowledge, ReplayError};
-use crate::mapping::{FUSED, LEARNED, PHYSICS};
+use crate::mapping::{LEARNED, PHYSICS};
 use crate::message::{DecisionRecord, RiskHeader, SurfaceHeader};
 use crate::payload::{cell_numbers, content_hash};
 use crate::risk_maker::RiskMaker;
@@ -35,7 +36,8 @@ pub(super) struct Made {
 pub(super) struct Maps<'a> {
     records: &'a Records,
     machine: &'a MachineSetup,
-    surveyor: Option<(u64, Surveyor)>,
+    survey: Option<(u64, Survey)>,
+    localisation: Localisation,
     surface_at: Option<Key>,
     authors: [Author<'a>; 2],
     missing: Vec<String>,
@@ -74,7 +76,8 @@ impl<'a> Maps<'a> {
         Ok(Self {
             records,
             machine,
-            surveyor: None,
+            survey: None,
+            localisation: Localisation::default(),
             surface_at: None,
             authors: [
                 author(0, &knowledge.belief, knowledge.checkpoint, LEARNED),
@@ -90,8 +93,10 @@ impl<'a> Maps<'a> {
         (self.n_surfaces, self.authors.iter().map(|author| author.n_made).sum())
     }
 
-    pub fn into_missing(self) -> Vec<String> {
-        self.missing
+    /// Makes the maps that no decision asked for, too; returns what is missing, and what became of the localisation.
+    pub fn finish(&mut self) -> Result<(Vec<String>, Localisation), ReplayError> {
+        while self.step()? {}
+        Ok((std::mem::take(&mut self.missing), std::mem::take(&mut self.localisation)))
     }
 
     /// The risk map that a decision was made on.
@@ -119,8 +124,8 @@ impl<'a> Maps<'a> {
     fn step(&mut self) -> Result<bool, ReplayError> {
         let after = self.surface_at;
         let records = self.records;
-        let next = records.surfaces.iter().find(|(key, _)| after.is_none_or(|at| **key > at));
-        let Some((&key, header)) = next else { return Ok(false) };
+        let later = (after.map_or(Bound::Unbounded, Bound::Excluded), Bound::Unbounded);
+        let Some((&key, header)) = records.surfaces.range(later).next() else { return Ok(false) };
         if let Some(at) = after.filter(|at| at.epoch_ns == key.epoch_ns && at.sequence + 1 < key.sequence) {
             self.missing.push(format!("maps of the ground {} to {}", at.sequence + 1, key.sequence - 1));
         }
@@ -137,25 +142,15 @@ impl<'a> Maps<'a> {
         key: Key,
         header: &SurfaceHeader,
     ) -> Result<Result<Vec<[f32; 8]>, Unmade>, ReplayError> {
-        if self.surveyor.as_ref().is_none_or(|(epoch_ns, _)| *epoch_ns != key.epoch_ns) {
-            let MachineSetup { vehicle, model, config } = self.machine;
-            let surveyor = Surveyor::new(vehicle, config.elevation, config.guard, Surface::Sensed)?
-                .with_sensors(SensorModel::of(&model.effects));
-            self.surveyor = Some((key.epoch_ns, surveyor));
+        if self.survey.as_ref().is_none_or(|(epoch_ns, _)| *epoch_ns != key.epoch_ns) {
+            self.survey = Some((key.epoch_ns, Survey::new(self.machine)?));
         }
-        let Some((_, surveyor)) = &mut self.surveyor else { return Ok(Err(Unmade { what: String::new() })) };
-        let odometry = header.odometry.odometry(header.odometry_at_ns);
-        if header.event == FUSED {
-            let Some((scan, points)) = self.records.scans.get(&Key::from(header.scan)) else {
-                let what = format!("scan {}", header.scan.sequence);
-                self.missing.push(what.clone());
-                return Ok(Err(Unmade { what }));
-            };
-            surveyor.fuse(&odometry, &scan.scan(points))?;
-        } else {
-            surveyor.follow_jump(&odometry, &header.jump())?;
+        let Some((_, survey)) = &mut self.survey else { return Ok(Err(Unmade { what: String::new() })) };
+        if let Err(what) = survey.follow(header, self.records, &mut self.localisation)? {
+            self.missing.push(what.clone());
+            return Ok(Err(Unmade { what }));
         }
-        let cells: Vec<[f32; 8]> = surveyor.surface().values().iter().map(cell_numbers).collect();
+        let cells: Vec<[f32; 8]> = survey.surveyor().surface().values().iter().map(cell_numbers).collect();
         if content_hash(&cells) != header.content_hash {
             return Ok(Err(Unmade { what: format!("map of the ground {} differs", key.sequence) }));
         }

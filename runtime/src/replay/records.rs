@@ -34,7 +34,7 @@ impl From<Source> for Key {
 }
 
 /// The messages that decisions are made from.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub struct Records {
     /// What was run.
     pub setup: Option<RecordedSetup>,

@@ -4,8 +4,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 
-use bicycle::Odometry;
-use navigator::Jump;
+use bicycle::{Command, Decision, Odometry};
+use navigator::{Applied, AppliedBy, Jump};
 use runtime::channel::{Bus, COMMAND, Inlet, MISSION, ODOMETRY, Outlet, RunName, SCAN};
 use runtime::clock::{nanoseconds, now_ns, sleep_until};
 use runtime::message::{CommandRecord, MissionRecord, OdometryRecord, PointRecord, ScanHeader, Stamp};
@@ -31,6 +31,8 @@ pub struct Misbehaviour {
     pub is_frozen: bool,
     /// The yaw rate is no number.
     pub is_not_a_number: bool,
+    /// An operator holds it where it is, whatever is commanded.
+    pub is_held: bool,
     /// What becomes of the mission.
     pub mission: MissionFate,
 }
@@ -89,6 +91,7 @@ struct Robot {
     episode: Episode,
     began_ns: u64,
     watchdog: Watchdog,
+    applied: Applied,
     told: Odometry,
     commands: Inlet<Stamp, CommandRecord>,
     odometry: Outlet<Stamp, OdometryRecord>,
@@ -104,10 +107,12 @@ impl Robot {
         let mut config = episode_config(&vehicle);
         (config.control_hz, config.cycles_per_scan) = (50.0, 10);
         let episode = Episode::new(task(), &vehicle, config, 1).unwrap();
+        let watchdog = Watchdog::new(vehicle.limits, ages());
         Self {
             episode,
             began_ns: now_ns(),
-            watchdog: Watchdog::new(vehicle.limits, ages()),
+            applied: *watchdog.applied(),
+            watchdog,
             told: Odometry::default(),
             commands: bus.inlet(&COMMAND).unwrap(),
             odometry: bus.outlet(&ODOMETRY, 1).unwrap(),
@@ -130,7 +135,7 @@ impl Robot {
             let correction = Jump { step_m: [east_m, north_m, 0.0], yaw_rad: behaviour.turn_rad };
             self.told = correction.odometry(&self.told);
         }
-        let mut record = OdometryRecord::from(&self.told);
+        let mut record = OdometryRecord::from(&self.told).with_applied(&self.applied);
         if behaviour.is_not_a_number {
             record.yaw_rate_radps = f64::NAN;
         }
@@ -143,7 +148,7 @@ impl Robot {
         if self.episode.n_cycles().is_multiple_of(50) {
             self.send_mission(now_ns, behaviour.mission);
         }
-        self.follow_commands();
+        self.follow_commands(behaviour.is_held);
     }
 
     fn send_scan(&mut self, scan: &Scan, at_ns: u64) {
@@ -164,9 +169,18 @@ impl Robot {
         self.missions.send_one(Stamp::default(), mission, at_ns).unwrap();
     }
 
-    fn follow_commands(&mut self) {
+    fn follow_commands(&mut self, is_held: bool) {
         let watchdog = &mut self.watchdog;
         self.commands.poll(|stamp, commands| watchdog.admit(&commands[0], stamp.published_at_ns));
-        self.episode.apply(&self.watchdog.decision(now_ns())).unwrap();
+        let commanded = self.watchdog.carry_out(now_ns());
+        let held = Applied { since_ns: now_ns(), by: AppliedBy::Vehicle, command: Command::default() };
+        let (decision, applied) = match is_held {
+            true => (Decision::Drive(held.command), held),
+            false => (commanded, *self.watchdog.applied()),
+        };
+        if (applied.command, applied.by) != (self.applied.command, self.applied.by) {
+            self.applied = applied;
+        }
+        self.episode.apply(&decision).unwrap();
     }
 }

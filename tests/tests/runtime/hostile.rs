@@ -93,6 +93,30 @@ fn broken_commands_never_come_through() {
     assert_eq!(polled(&mut inlet).received, 1);
 }
 
+/// What was applied is looked at here and nowhere else.
+#[test]
+fn odometry_that_tells_no_command_as_applied_never_comes_through() {
+    let run = Run::new();
+    let bus = Bus::join(&run.name).unwrap();
+    let mut inlet = bus.inlet(&ODOMETRY).unwrap();
+    let hostile = Hostile::new(&run.name, &ODOMETRY, 1);
+    let well = OdometryRecord::default();
+    let broken = [
+        (OdometryRecord { applied_speed_mps: f32::NAN, ..well }, Refusal::NonFinite),
+        (OdometryRecord { applied_steering_rad: f32::NEG_INFINITY, ..well }, Refusal::NonFinite),
+        (OdometryRecord { applied_by: 2, ..well }, Refusal::Malformed),
+        (OdometryRecord { applied_since_ns: now_ns() + 3_600_000_000_000, ..well }, Refusal::FromFuture),
+    ];
+    for (n, (record, refusal)) in broken.iter().enumerate() {
+        let before = inlet.counts().of(*refusal);
+        hostile.send(stamp(n as u64 + 1), &[*record]);
+        let counts = polled(&mut inlet);
+        assert_eq!((counts.of(*refusal), counts.received), (before + 1, 0), "{n}: {refusal:?}");
+    }
+    hostile.send(stamp(9), &[OdometryRecord { applied_by: 1, ..well }]);
+    assert_eq!(polled(&mut inlet).received, 1);
+}
+
 #[test]
 fn what_is_older_than_what_was_taken_does_not_count_again() {
     let run = Run::new();

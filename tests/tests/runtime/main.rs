@@ -10,6 +10,7 @@ mod faults;
 mod fixture;
 mod hostile;
 mod layouts;
+mod localisation;
 mod measurements;
 mod missions;
 mod onlookers;

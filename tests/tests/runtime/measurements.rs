@@ -3,13 +3,14 @@
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use bicycle::{Decision, StopReason};
-use navigator::Jump;
+use navigator::{Belief, Jump};
 use runtime::channel::{Bus, ODOMETRY, SURFACE};
 use runtime::clock::now_ns;
 use runtime::mapping::JUMPED;
 use runtime::message::{Stamp, StatusRecord, SurfaceHeader};
 use runtime::payload::numbers_cell;
 use runtime::plant;
+use runtime::replay::{self, Knowledge};
 use rustix::process::Signal;
 use terrain::Cell;
 
@@ -196,4 +197,43 @@ fn scans_between_two_words_of_the_localisation_are_mapped() {
     witness.until("it goes on", |witness| witness.decided.len() >= 20);
     let stale = Some(Decision::Stop(StopReason::StaleScan));
     assert!(witness.decided.iter().all(|record| command_of(record) != stale), "scans were dropped");
+}
+
+/// Whoever holds the vehicle where it is, be it its watchdog or an operator, is known to control: it goes on from rest,
+/// cycle by cycle, as far as the actuators get in one step, and does not take the vehicle for stuck.
+#[test]
+fn control_goes_on_from_what_was_really_applied() {
+    let mut run = Run::new();
+    run.start(Role::Recorder);
+    run.start_all(&PLANNERS);
+    let driver = Driver::start(&run.name);
+    let mut witness = Witness::new(&run);
+    witness.until_driving("all is well");
+    driver.behave(Misbehaviour { is_held: true, ..Misbehaviour::default() });
+    witness.until_standing("an operator holds it");
+    witness.decided.clear();
+    // Longer than the patience of somebody who is stuck.
+    witness.until("it is held for a while", |witness| witness.decided.len() >= 40);
+    let (vehicle, config) = machine();
+    let step_mps = vehicle.limits.acceleration_max_mps2 * config.controller.step_s;
+    assert!(f64::from(40) * 0.1 > 1.5 * config.controller.recovery.patience_s);
+    // One for which no odometry came in time knows nothing yet of what became of the one before.
+    let informed: Vec<_> = witness.decided.iter().filter(|record| record.n_odometry > 0).collect();
+    assert!(informed.len() > 10, "{:?}", witness.decided);
+    for record in informed {
+        if let Some(Decision::Drive(command)) = command_of(record) {
+            let speed_mps = f64::from(command.speed_mps);
+            assert!((0.0..=1.001 * step_mps).contains(&speed_mps), "{record:?} after rest");
+        }
+    }
+    driver.behave(Misbehaviour::default());
+    witness.until_driving("nobody holds it any more");
+    drop(driver);
+    run.end();
+    let knowledge = Knowledge { belief: Belief::Physics, checkpoint: 0 };
+    let records = replay::read(&run.recordings()).unwrap();
+    assert!(records.stuck.is_empty(), "{:?}", records.stuck);
+    let report = replay::replay(&records, &knowledge).unwrap();
+    assert_eq!((report.first_difference.as_ref(), &report.contradictions), (None, &Vec::new()), "{report:?}");
+    assert!(report.n_identical > 40, "{report:?}");
 }
