@@ -4,7 +4,7 @@ use std::sync::LazyLock;
 
 use navigator::Belief;
 use runtime::mapping::{FUSED, JUMPED};
-use runtime::message::SurfaceHeader;
+use runtime::message::{OdometryRecord, SurfaceHeader};
 use runtime::replay::{self, Key, Knowledge, Records, ReplayReport};
 use runtime::status::Role;
 
@@ -131,9 +131,9 @@ fn a_scan_that_was_paired_with_another_odometry_is_found_out() {
 #[test]
 fn odometry_that_was_altered_is_found_out() {
     let fused = map_of(&RECORDED, FUSED, 1);
-    for change in
-        [|r: &mut runtime::message::OdometryRecord| r.position_m[0] += 1e-9, |r| r.applied_speed_mps += 1.0]
-    {
+    let changes: [fn(&mut OdometryRecord); 2] =
+        [|record| record.position_m[0] += 1e-9, |record| record.applied_speed_mps += 1.0];
+    for change in changes {
         let report = after(|records| {
             change(&mut records.odometry.get_mut(&Key::from(fused.last_odometry)).unwrap().1);
         });
