@@ -1,4 +1,4 @@
-/* Messages of Surefoot, layout version 3. Written from its types; do not edit. */
+/* Messages of Surefoot, layout version 4. Written from its types; do not edit. */
 #ifndef SUREFOOT_LAYOUT_H
 #define SUREFOOT_LAYOUT_H
 
@@ -6,7 +6,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#define SUREFOOT_LAYOUT_VERSION 3u
+#define SUREFOOT_LAYOUT_VERSION 4u
 
 /* First field of every header: whose message it is, and of when. Known to the channels as surefoot.Stamp. */
 typedef struct SurefootStamp {
@@ -73,14 +73,26 @@ typedef struct SurefootOdometryRecord {
     double wheel_speed_mps;
     /* Measured angle of the front wheels, left positive [rad]. */
     double steering_rad;
+    /* Forward speed that the actuators were told last before this was measured [m/s]. */
+    float applied_speed_mps;
+    /* Angle of the front wheels that they were told, left positive [rad]. */
+    float applied_steering_rad;
+    /* When they were first told so [ns]. */
+    uint64_t applied_since_ns;
+    /* Who decided it: 0 = the last command, 1 = the vehicle itself, be it its watchdog or an operator. */
+    uint64_t applied_by;
 } SurefootOdometryRecord;
-static_assert(sizeof(SurefootOdometryRecord) == 88, "OdometryRecord");
+static_assert(sizeof(SurefootOdometryRecord) == 112, "OdometryRecord");
 static_assert(offsetof(SurefootOdometryRecord, position_m) == 0, "OdometryRecord.position_m");
 static_assert(offsetof(SurefootOdometryRecord, attitude_rad) == 24, "OdometryRecord.attitude_rad");
 static_assert(offsetof(SurefootOdometryRecord, velocity_mps) == 48, "OdometryRecord.velocity_mps");
 static_assert(offsetof(SurefootOdometryRecord, yaw_rate_radps) == 64, "OdometryRecord.yaw_rate_radps");
 static_assert(offsetof(SurefootOdometryRecord, wheel_speed_mps) == 72, "OdometryRecord.wheel_speed_mps");
 static_assert(offsetof(SurefootOdometryRecord, steering_rad) == 80, "OdometryRecord.steering_rad");
+static_assert(offsetof(SurefootOdometryRecord, applied_speed_mps) == 88, "OdometryRecord.applied_speed_mps");
+static_assert(offsetof(SurefootOdometryRecord, applied_steering_rad) == 92, "OdometryRecord.applied_steering_rad");
+static_assert(offsetof(SurefootOdometryRecord, applied_since_ns) == 96, "OdometryRecord.applied_since_ns");
+static_assert(offsetof(SurefootOdometryRecord, applied_by) == 104, "OdometryRecord.applied_by");
 
 /* Header of a sweep of the range sensor; the payload is one PointRecord per return. Known to the channels as surefoot.ScanHeader. */
 typedef struct SurefootScanHeader {
@@ -115,12 +127,18 @@ typedef struct SurefootSurfaceHeader {
     SurefootGrid grid;
     /* The scan that was fused last. */
     SurefootSource scan;
-    /* Where the vehicle was when the scan was taken, or the odometry that showed the jump. */
+    /* Where the vehicle was when the scan was taken, or the odometry that showed the jump; nothing of what was applied. */
     SurefootOdometryRecord odometry;
     /* When that was [ns]. */
     uint64_t odometry_at_ns;
     /* When the odometry was measured in whose frame the map lies: the newest that mapping had taken in [ns]. */
     uint64_t frame_at_ns;
+    /* The odometry that mapping took in last before this map, usable or not. */
+    SurefootSource last_odometry;
+    /* How many it took in since the map before. */
+    uint64_t n_odometry;
+    /* XXH3 of these, each its stamp and its record, in the order in which they were taken in. */
+    uint64_t odometry_hash;
     /* What happened since the last message: 1 = a scan was fused, 2 = the localisation jumped. */
     uint64_t event;
     /* The jump, if that is what happened: p of before lies at R(jump_yaw_rad) p + jump_m [m]. */
@@ -134,19 +152,22 @@ typedef struct SurefootSurfaceHeader {
     /* XXH3 of the payload. */
     uint64_t content_hash;
 } SurefootSurfaceHeader;
-static_assert(sizeof(SurefootSurfaceHeader) == 280, "SurfaceHeader");
+static_assert(sizeof(SurefootSurfaceHeader) == 336, "SurfaceHeader");
 static_assert(offsetof(SurefootSurfaceHeader, stamp) == 0, "SurfaceHeader.stamp");
 static_assert(offsetof(SurefootSurfaceHeader, grid) == 40, "SurfaceHeader.grid");
 static_assert(offsetof(SurefootSurfaceHeader, scan) == 80, "SurfaceHeader.scan");
 static_assert(offsetof(SurefootSurfaceHeader, odometry) == 96, "SurfaceHeader.odometry");
-static_assert(offsetof(SurefootSurfaceHeader, odometry_at_ns) == 184, "SurfaceHeader.odometry_at_ns");
-static_assert(offsetof(SurefootSurfaceHeader, frame_at_ns) == 192, "SurfaceHeader.frame_at_ns");
-static_assert(offsetof(SurefootSurfaceHeader, event) == 200, "SurfaceHeader.event");
-static_assert(offsetof(SurefootSurfaceHeader, jump_m) == 208, "SurfaceHeader.jump_m");
-static_assert(offsetof(SurefootSurfaceHeader, jump_yaw_rad) == 232, "SurfaceHeader.jump_yaw_rad");
-static_assert(offsetof(SurefootSurfaceHeader, shift_m) == 240, "SurfaceHeader.shift_m");
-static_assert(offsetof(SurefootSurfaceHeader, shift_yaw_rad) == 264, "SurfaceHeader.shift_yaw_rad");
-static_assert(offsetof(SurefootSurfaceHeader, content_hash) == 272, "SurfaceHeader.content_hash");
+static_assert(offsetof(SurefootSurfaceHeader, odometry_at_ns) == 208, "SurfaceHeader.odometry_at_ns");
+static_assert(offsetof(SurefootSurfaceHeader, frame_at_ns) == 216, "SurfaceHeader.frame_at_ns");
+static_assert(offsetof(SurefootSurfaceHeader, last_odometry) == 224, "SurfaceHeader.last_odometry");
+static_assert(offsetof(SurefootSurfaceHeader, n_odometry) == 240, "SurfaceHeader.n_odometry");
+static_assert(offsetof(SurefootSurfaceHeader, odometry_hash) == 248, "SurfaceHeader.odometry_hash");
+static_assert(offsetof(SurefootSurfaceHeader, event) == 256, "SurfaceHeader.event");
+static_assert(offsetof(SurefootSurfaceHeader, jump_m) == 264, "SurfaceHeader.jump_m");
+static_assert(offsetof(SurefootSurfaceHeader, jump_yaw_rad) == 288, "SurfaceHeader.jump_yaw_rad");
+static_assert(offsetof(SurefootSurfaceHeader, shift_m) == 296, "SurfaceHeader.shift_m");
+static_assert(offsetof(SurefootSurfaceHeader, shift_yaw_rad) == 320, "SurfaceHeader.shift_yaw_rad");
+static_assert(offsetof(SurefootSurfaceHeader, content_hash) == 328, "SurfaceHeader.content_hash");
 
 /* Header of a risk map; the payload is risks, grounds and times to the goal, see docs/runtime.md. Known to the channels as surefoot.RiskHeader. */
 typedef struct SurefootRiskHeader {

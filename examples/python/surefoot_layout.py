@@ -1,8 +1,8 @@
-"""Messages of Surefoot, layout version 3. Written from its types; do not edit."""
+"""Messages of Surefoot, layout version 4. Written from its types; do not edit."""
 
 import ctypes
 
-LAYOUT_VERSION = 3
+LAYOUT_VERSION = 4
 
 
 class Stamp(ctypes.Structure):
@@ -99,6 +99,14 @@ class OdometryRecord(ctypes.Structure):
         ("wheel_speed_mps", ctypes.c_double),
         # Measured angle of the front wheels, left positive [rad].
         ("steering_rad", ctypes.c_double),
+        # Forward speed that the actuators were told last before this was measured [m/s].
+        ("applied_speed_mps", ctypes.c_float),
+        # Angle of the front wheels that they were told, left positive [rad].
+        ("applied_steering_rad", ctypes.c_float),
+        # When they were first told so [ns].
+        ("applied_since_ns", ctypes.c_uint64),
+        # Who decided it: 0 = the last command, 1 = the vehicle itself, be it its watchdog or an operator.
+        ("applied_by", ctypes.c_uint64),
     ]
 
     @staticmethod
@@ -106,13 +114,17 @@ class OdometryRecord(ctypes.Structure):
         return "surefoot.Odometry"
 
 
-assert ctypes.sizeof(OdometryRecord) == 88
+assert ctypes.sizeof(OdometryRecord) == 112
 assert OdometryRecord.position_m.offset == 0
 assert OdometryRecord.attitude_rad.offset == 24
 assert OdometryRecord.velocity_mps.offset == 48
 assert OdometryRecord.yaw_rate_radps.offset == 64
 assert OdometryRecord.wheel_speed_mps.offset == 72
 assert OdometryRecord.steering_rad.offset == 80
+assert OdometryRecord.applied_speed_mps.offset == 88
+assert OdometryRecord.applied_steering_rad.offset == 92
+assert OdometryRecord.applied_since_ns.offset == 96
+assert OdometryRecord.applied_by.offset == 104
 
 
 class ScanHeader(ctypes.Structure):
@@ -168,12 +180,18 @@ class SurfaceHeader(ctypes.Structure):
         ("grid", Grid),
         # The scan that was fused last.
         ("scan", Source),
-        # Where the vehicle was when the scan was taken, or the odometry that showed the jump.
+        # Where the vehicle was when the scan was taken, or the odometry that showed the jump; nothing of what was applied.
         ("odometry", OdometryRecord),
         # When that was [ns].
         ("odometry_at_ns", ctypes.c_uint64),
         # When the odometry was measured in whose frame the map lies: the newest that mapping had taken in [ns].
         ("frame_at_ns", ctypes.c_uint64),
+        # The odometry that mapping took in last before this map, usable or not.
+        ("last_odometry", Source),
+        # How many it took in since the map before.
+        ("n_odometry", ctypes.c_uint64),
+        # XXH3 of these, each its stamp and its record, in the order in which they were taken in.
+        ("odometry_hash", ctypes.c_uint64),
         # What happened since the last message: 1 = a scan was fused, 2 = the localisation jumped.
         ("event", ctypes.c_uint64),
         # The jump, if that is what happened: p of before lies at R(jump_yaw_rad) p + jump_m [m].
@@ -193,19 +211,22 @@ class SurfaceHeader(ctypes.Structure):
         return "surefoot.SurfaceHeader"
 
 
-assert ctypes.sizeof(SurfaceHeader) == 280
+assert ctypes.sizeof(SurfaceHeader) == 336
 assert SurfaceHeader.stamp.offset == 0
 assert SurfaceHeader.grid.offset == 40
 assert SurfaceHeader.scan.offset == 80
 assert SurfaceHeader.odometry.offset == 96
-assert SurfaceHeader.odometry_at_ns.offset == 184
-assert SurfaceHeader.frame_at_ns.offset == 192
-assert SurfaceHeader.event.offset == 200
-assert SurfaceHeader.jump_m.offset == 208
-assert SurfaceHeader.jump_yaw_rad.offset == 232
-assert SurfaceHeader.shift_m.offset == 240
-assert SurfaceHeader.shift_yaw_rad.offset == 264
-assert SurfaceHeader.content_hash.offset == 272
+assert SurfaceHeader.odometry_at_ns.offset == 208
+assert SurfaceHeader.frame_at_ns.offset == 216
+assert SurfaceHeader.last_odometry.offset == 224
+assert SurfaceHeader.n_odometry.offset == 240
+assert SurfaceHeader.odometry_hash.offset == 248
+assert SurfaceHeader.event.offset == 256
+assert SurfaceHeader.jump_m.offset == 264
+assert SurfaceHeader.jump_yaw_rad.offset == 288
+assert SurfaceHeader.shift_m.offset == 296
+assert SurfaceHeader.shift_yaw_rad.offset == 320
+assert SurfaceHeader.content_hash.offset == 328
 
 
 class RiskHeader(ctypes.Structure):

@@ -201,7 +201,9 @@ mod tests {
         };
         let is_there =
             |there: &Odometry, at_ms: u64| (there.position_m[0] - 1e-3 * at_ms as f64).abs() < 1e-9;
-        [1000, 1200].map(|at_ms| assert_eq!(surveyor.admit(&measured(at_ms)), Ok(None)));
+        for at_ms in [1000, 1200] {
+            assert_eq!(surveyor.admit(&measured(at_ms)), Ok(None));
+        }
         for at_ms in [1201, 1399] {
             let ahead = surveyor.place(ns(at_ms));
             assert!(
