@@ -78,7 +78,7 @@ impl Dense {
             match (registers::<S>(), output.len()) {
                 (Registers::Many, 5..) => tile.apply::<8, 3>(simd, 0, input, output),
                 (Registers::Many, _) => tile.apply::<4, 3>(simd, 0, input, output),
-                (Registers::Few, _) => tile.apply_in_halves::<3>(simd, input, output),
+                (Registers::Few, _) => tile.apply_in_halves::<2>(simd, input, output),
                 (Registers::OfOne, _) => tile.apply_in_halves::<8>(simd, input, output),
             }
         }
