@@ -2,13 +2,15 @@
 //!
 //! [`Scalar`] computes in f64 and is the reference; the packs compute in f32, one vehicle per lane.
 
+mod block;
 mod instructions;
 mod packs;
 mod polynomial;
 mod portable;
 mod scalar;
 
-pub use instructions::{Instructions, Isa, IsaAbsent};
+pub use block::{BLOCK, Block};
+pub use instructions::{Instructions, Isa, IsaAbsent, OnLanes};
 pub use portable::Portable;
 pub use scalar::Scalar;
 
@@ -38,6 +40,9 @@ impl Constant {
     }
 }
 
+/// Numbers that are read and written at a time: as many as the widest pack has.
+pub const SPAN: usize = 16;
+
 /// Arithmetic on packs of numbers. A value of this type proves that the machine has the instructions.
 ///
 /// `min` and `max` return their second operand when either is NaN, on every implementation.
@@ -51,6 +56,12 @@ pub trait Lanes: Copy + Send + Sync + 'static {
 
     /// The same number in every lane.
     fn constant(self, value: Constant) -> Self::Value;
+    /// The same number in every lane, one that was single from the start.
+    fn single(self, value: f32) -> Self::Value;
+    /// The pack of [`Lanes::WIDTH`] numbers from `offset` on, a multiple of it.
+    fn of_span(self, span: &[f32; SPAN], offset: usize) -> Self::Value;
+    /// Writes a pack from `offset` on, a multiple of [`Lanes::WIDTH`].
+    fn to_span(self, value: Self::Value, span: &mut [f32; SPAN], offset: usize);
     /// a + b.
     fn add(self, a: Self::Value, b: Self::Value) -> Self::Value;
     /// a - b.
@@ -65,6 +76,8 @@ pub trait Lanes: Copy + Send + Sync + 'static {
     fn min(self, a: Self::Value, b: Self::Value) -> Self::Value;
     /// Larger of both; `b` where either is NaN.
     fn max(self, a: Self::Value, b: Self::Value) -> Self::Value;
+    /// Magnitude.
+    fn magnitude(self, a: Self::Value) -> Self::Value;
     /// Square root, rounded once; of a negative number, 0; of NaN, NaN.
     fn sqrt(self, a: Self::Value) -> Self::Value;
     /// An angle in turns brought to [-1/2, 1/2] by whole turns; |a| < 4 million. Of what is not finite, NaN.
@@ -77,6 +90,8 @@ pub trait Lanes: Copy + Send + Sync + 'static {
     fn and(self, a: Self::Mask, b: Self::Mask) -> Self::Mask;
     /// Where either holds.
     fn or(self, a: Self::Mask, b: Self::Mask) -> Self::Mask;
+    /// Whether the mask holds in any lane.
+    fn any(self, mask: Self::Mask) -> bool;
     /// `yes` where the mask holds, `no` elsewhere.
     fn select(self, mask: Self::Mask, yes: Self::Value, no: Self::Value) -> Self::Value;
     /// a + b where the mask holds, a elsewhere.
@@ -90,6 +105,18 @@ pub trait Lanes: Copy + Send + Sync + 'static {
     #[inline(always)]
     fn real(self, value: f64) -> Real<Self> {
         Real(self, self.constant(Constant::new(value)))
+    }
+
+    /// A number in every lane that was single from the start.
+    #[inline(always)]
+    fn real_single(self, value: f32) -> Real<Self> {
+        Real(self, self.single(value))
+    }
+
+    /// See [`Lanes::of_span`].
+    #[inline(always)]
+    fn real_of_span(self, span: &[f32; SPAN], offset: usize) -> Real<Self> {
+        Real(self, self.of_span(span, offset))
     }
 }
 
@@ -140,7 +167,7 @@ impl<L: Lanes> Real<L> {
     /// Magnitude.
     #[inline(always)]
     pub fn abs(self) -> Self {
-        self.max(-self)
+        Self(self.0, self.0.magnitude(self.1))
     }
 
     /// See [`Lanes::wrap_turns`].

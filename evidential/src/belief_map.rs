@@ -133,15 +133,10 @@ impl Fusion {
             }
         }
     }
-
-    /// What the networks are weighed against: physics alone knows of unknown ground.
-    fn weighed<'a>(&'a self, physics: &'a PartialMoments, is_known: bool) -> &'a PartialMoments {
-        if is_known && self.prior != Prior::Physics { &self.uniform } else { physics }
-    }
 }
 
-/// Footprints that a thread works on at a time, about.
-const TASK_LANES: usize = 1024;
+/// Footprints that a thread takes at a time, at least: so many that a last block, which may not be full, is cheap.
+const TASK_LANES: usize = 960;
 
 impl BeliefMap {
     /// A map in the window `risk` for surfaces of the given resolution; [`Risk::OUTSIDE`] until it is updated.
@@ -260,7 +255,7 @@ impl BeliefMap {
         }
         let n_threads = rayon::current_num_threads();
         let (layers, workspace) = (&self.layers, self.layers.predictor.workspace());
-        self.scratches.resize_with(n_threads, || Scratch::new(workspace.clone(), layers.n_yaws));
+        self.scratches.resize_with(n_threads, || Scratch::new(workspace.clone()));
         let tasks = Mutex::new(tasks(&mut self.map, layers.n_yaws, dirty).into_iter());
         self.scratches.par_iter_mut().for_each(|scratch| {
             let next = || tasks.lock().unwrap_or_else(PoisonError::into_inner).next();
@@ -354,11 +349,9 @@ impl BeliefLayers {
         let window =
             GridGeometry { resolution_m, origin: [first(0), first(1)], n_rows: count(1), n_cols: count(0) };
         self.ground = self.ground.moved_to(window);
-        let n_phases = ratio.n_phases();
         for (index, stencil) in self.stencils.iter_mut().enumerate() {
-            let col_phase = (index / self.n_yaws % n_phases) as i64;
-            let col = risk.origin[0] + (col_phase - risk.origin[0]).rem_euclid(n_phases as i64);
-            stencil.lay_on(&self.ground, [ratio.base(col), ratio.base(risk.origin[1])]);
+            let col = ratio.like(index / self.n_yaws % ratio.n_phases(), risk.origin[0]);
+            stencil.lay_on(self.ground.planes(), [ratio.base(col), ratio.base(risk.origin[1])]);
         }
     }
 

@@ -12,11 +12,10 @@ mod tensors;
 #[cfg(test)]
 mod tests;
 
-use bicycle::lanes::Instructions;
+use bicycle::lanes::{BLOCK, Instructions};
 use pulp::Simd;
 use traversability::{N_BINS, Pmf};
 
-pub(crate) use lanes::{Lanes, N_LANES, register_of};
 pub(crate) use network::{BlockPrediction, Workspace};
 
 use crate::{Architecture, Checkpoint, CheckpointError};
@@ -115,10 +114,10 @@ impl Predictor {
     pub fn predict(&self, footprints: &[impl AsRef<[f32]>]) -> Result<Vec<Prediction>, PredictorError> {
         let mut workspace = self.workspace();
         let mut predictions = Vec::with_capacity(footprints.len());
-        for (index, block) in footprints.chunks(N_LANES).enumerate() {
+        for (index, block) in footprints.chunks(BLOCK).enumerate() {
             for (lane, features) in block.iter().enumerate() {
                 self.load(features.as_ref(), lane, &mut workspace)
-                    .map_err(|wrong| wrong.of_footprint(index * N_LANES + lane))?;
+                    .map_err(|wrong| wrong.of_footprint(index * BLOCK + lane))?;
             }
             self.apply(&mut workspace);
             predictions.extend((0..block.len()).map(|lane| self.prediction(&workspace.prediction, lane)));

@@ -1,12 +1,14 @@
 //! The surface made ready for wheels: padded, so that no footprint needs a bounds check; holes filled beside
-//! known ground, so that interpolation never meets one; counts summed along rows.
+//! known ground, so that interpolation never meets one.
 
 use std::ops::Range;
 
 use rayon::prelude::*;
-use terrain::{GridGeometry, GridMap, SurfaceCell, TerrainClass};
+use terrain::{GridGeometry, GridMap, SurfaceCell};
 
 use crate::ball::Ball;
+use crate::lane_ground::LaneGround;
+use crate::lattice::Ratio;
 use crate::lengths::Lengths;
 
 /// What wheels read of a cell, adjacent so that interpolation runs over all quantities at once.
@@ -30,6 +32,8 @@ impl Contact {
     pub const GRADIENT_NORTH: usize = 4;
     /// 1 where the ground is unknown, else 0.
     pub const UNKNOWN: usize = 5;
+    /// Number of the values; the rest fills up.
+    pub const N_VALUES: usize = 6;
 
     const NOWHERE: Self = {
         let mut values = [0.0; 8];
@@ -46,31 +50,8 @@ impl Contact {
 /// Largest standard deviation of a height that makes a difference [m]; keeps the arithmetic finite.
 const VARIANCE_MAX_M2: f32 = 100.0;
 
-/// Cells of a footprint by kind. Vegetation counts in shares of 255.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(crate) struct Counts {
-    pub vegetation_255: u32,
-    pub obstacles: u32,
-    pub unknown: u32,
-}
-
-/// Counts packed into one number, so that sums along a row are exact and cost one subtraction.
-type Packed = u64;
-
-fn packed(cell: &SurfaceCell) -> Packed {
-    let known = is_known(cell);
-    let vegetation = cell.class_probability[TerrainClass::Vegetation as usize].clamp(0.0, 1.0);
-    let vegetation_255 = if known { (vegetation * 255.0).round() as u64 } else { 0 };
-    let obstacle = u64::from(cell.class() == TerrainClass::Obstacle);
-    vegetation_255 | obstacle << 32 | u64::from(!known) << 48
-}
-
-fn unpacked(sum: Packed) -> Counts {
-    Counts { vegetation_255: sum as u32, obstacles: (sum >> 32) as u32 & 0xffff, unknown: (sum >> 48) as u32 }
-}
-
 /// Known with a height that is a number.
-fn is_known(cell: &SurfaceCell) -> bool {
+pub(crate) fn is_known(cell: &SurfaceCell) -> bool {
     cell.is_known() && cell.height_m.is_finite()
 }
 
@@ -87,8 +68,7 @@ pub(crate) struct ContactGround {
     /// What a belly may touch: level l holds the highest of the 2^l cells from each cell eastward, minus
     /// infinity where unknown [m].
     bumps_m: Vec<Vec<f32>>,
-    /// Sums of the cells before each column, one more than columns per row.
-    sums: Vec<Packed>,
+    lanes: LaneGround,
 }
 
 /// Cells of the padded ground.
@@ -101,7 +81,7 @@ struct Area {
 impl ContactGround {
     /// Ground of which nothing is known yet. The gradient is taken over about the diameter of a wheel, which
     /// does not feel what is smaller.
-    pub fn unknown(window: GridGeometry, lengths: &Lengths) -> Self {
+    pub fn unknown(window: GridGeometry, ratio: Ratio, lengths: &Lengths) -> Self {
         let cells = |length_m: f64| length_m / window.resolution_m;
         // A belly is longest along its diagonal.
         let widest_belly = cells(lengths.belly_diagonal_m()).ceil() as usize + 1;
@@ -113,7 +93,7 @@ impl ContactGround {
             contacts: vec![Contact::NOWHERE; window.n_cells()],
             rests_m: vec![f32::NEG_INFINITY; window.n_cells()],
             bumps_m: vec![vec![f32::NEG_INFINITY; window.n_cells()]; n_levels],
-            sums: vec![0; window.n_rows * (window.n_cols + 1)],
+            lanes: LaneGround::unknown(window, ratio, n_levels),
         }
     }
 
@@ -130,7 +110,7 @@ impl ContactGround {
     /// Bytes of its arrays.
     pub fn n_bytes(&self) -> usize {
         let bumps = self.bumps_m.iter().map(|level| size_of_val(&**level)).sum::<usize>();
-        size_of_val(&*self.contacts) + size_of_val(&*self.rests_m) + size_of_val(&*self.sums) + bumps
+        size_of_val(&*self.contacts) + size_of_val(&*self.rests_m) + bumps + self.lanes.n_bytes()
     }
 
     /// Position of a lattice cell, which must lie in the window.
@@ -153,23 +133,19 @@ impl ContactGround {
         self.rest_wheels(&area);
         self.read_contacts(surface, &area);
         self.fill_holes(&area);
+        self.lanes.count(surface, area.rows.clone(), area.cols.start);
+        self.lanes.read(area.rows, &self.contacts, &self.bumps_m);
     }
 
     fn read_heights(&mut self, surface: &GridMap<SurfaceCell>, area: &Area) {
         let (n_cols, [west, south]) = (self.window.n_cols, self.window.origin);
-        let heights = self.bumps_m[0].par_chunks_mut(n_cols).zip(self.sums.par_chunks_mut(n_cols + 1));
-        heights.enumerate().filter(|(row, _)| area.rows.contains(row)).for_each(
-            |(row, (heights_m, sums))| {
-                let cell = |col: usize| cell_at(surface, [west + col as i64, south + row as i64]);
-                for col in area.cols.clone() {
-                    let cell = cell(col);
-                    heights_m[col] = if is_known(cell) { cell.height_m } else { f32::NEG_INFINITY };
-                }
-                for col in area.cols.start..n_cols {
-                    sums[col + 1] = sums[col] + packed(cell(col));
-                }
-            },
-        );
+        let rows = self.bumps_m[0].par_chunks_mut(n_cols).enumerate();
+        rows.filter(|(row, _)| area.rows.contains(row)).for_each(|(row, heights_m)| {
+            for col in area.cols.clone() {
+                let cell = cell_at(surface, [west + col as i64, south + row as i64]);
+                heights_m[col] = if is_known(cell) { cell.height_m } else { f32::NEG_INFINITY };
+            }
+        });
     }
 
     fn rest_wheels(&mut self, area: &Area) {
@@ -245,29 +221,10 @@ impl ContactGround {
         &self.contacts
     }
 
-    /// Heights that a belly may touch, by [`ContactGround::index`] [m].
+    /// The same in layers, with what else is read for many poses at once.
     #[inline(always)]
-    pub fn bumps_m(&self) -> &[f32] {
-        &self.bumps_m[0]
-    }
-
-    /// Highest of some adjacent cells of a row, at most as many as the widest belly has [m].
-    #[inline(always)]
-    pub fn highest_m(&self, start: usize, n_cells: usize) -> f32 {
-        let level = n_cells.ilog2() as usize;
-        let stretches = &self.bumps_m[level];
-        stretches[start].max(stretches[start + n_cells - (1 << level)])
-    }
-
-    /// Counts over spans of adjacent cells, each given as row and column in the window and number of cells.
-    #[inline(always)]
-    pub fn counts(&self, spans: impl Iterator<Item = (usize, usize, usize)>) -> Counts {
-        let mut sum = 0;
-        for (row, col, n_cells) in spans {
-            let start = row * (self.window.n_cols + 1) + col;
-            sum += self.sums[start + n_cells] - self.sums[start];
-        }
-        unpacked(sum)
+    pub fn lanes(&self) -> &LaneGround {
+        &self.lanes
     }
 }
 

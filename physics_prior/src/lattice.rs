@@ -47,6 +47,11 @@ impl Ratio {
         ((2 * risk_index + 1) * self.numerator).div_euclid(2 * self.denominator)
     }
 
+    /// The first cell of the risk map from `first` on that has a position.
+    pub fn like(self, phase_index: usize, first: i64) -> i64 {
+        first + (phase_index as i64 - first).rem_euclid(self.denominator)
+    }
+
     /// How many surface cells the base advances over [`Ratio::n_phases`] risk cells.
     pub fn stride(self) -> i64 {
         self.numerator

@@ -32,11 +32,14 @@
 
 mod ball;
 mod belief;
+mod block_prior;
 mod config;
 mod ground;
+mod lane_ground;
 mod lattice;
 mod lengths;
 mod outcomes;
+mod planes;
 mod pose;
 mod poses;
 mod prior_field;
@@ -47,9 +50,11 @@ mod tails;
 mod triangle;
 
 pub use belief::PriorBelief;
+pub use block_prior::{BlockPrior, PoseLine};
 pub use config::{PriorConfig, PriorConfigError};
 pub use lattice::Ratio;
-pub use prior_field::{PosePrior, PriorField};
+pub use planes::{Planes, span};
+pub use prior_field::PriorField;
 pub use prior_map::{Assumption, PriorMap, PriorMapError};
 pub use skid_steer::{
     ANGULAR, COMPENSATION, HIDDEN, LINEAR, Quantiles, SkidSteerBelief, SkidSteerGround, SkidSteerPrior,

@@ -6,56 +6,41 @@
 //! `1 - s / s_max`, is the first half of that alone; here both halves are outcomes of equal probability,
 //! `linear (1 - s / s_max)` and `linear (1 + s / s_max)`, which ends at 1.
 
+use bicycle::lanes::{Lanes, Real};
 use traversability::{Bins, N_BINS};
 
 use crate::PriorConfig;
-use crate::ground::Contact;
 use crate::lengths::Lengths;
-use crate::pose::PoseGround;
-use crate::triangle::Triangles;
+use crate::pose::{PoseGround, WheelGround};
+use crate::triangle::{Triangle, Triangles};
 
 /// The part of equation 18 that is not spread out: outcomes of traction and of attitude. Probabilities include
 /// the weights of equation 18; per parameter they sum to one less the uniform share of traction.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Outcomes {
+pub(crate) struct Outcomes<L: Lanes> {
     /// Linear traction of each wheel on dirt.
-    pub linear_dirt: [[f32; 4]; 1],
+    pub linear_dirt: [[Real<L>; 4]; 1],
     /// Angular traction of each wheel on dirt where the slope works against the turn, and where it works for it.
-    pub angular_dirt: [[f32; 4]; 2],
+    pub angular_dirt: [[Real<L>; 4]; 2],
     /// Of a wheel's dirt; its outcomes share it evenly.
-    pub dirt_probability: [f32; 4],
+    pub dirt_probability: [Real<L>; 4],
     /// Traction, linear and angular, of each wheel on vegetation.
-    pub vegetation: [f32; 4],
-    pub vegetation_probability: [f32; 4],
+    pub vegetation: [Real<L>; 4],
+    pub vegetation_probability: [Real<L>; 4],
     /// Traction, linear and angular, on unknown ground.
-    pub unknown: f32,
-    pub unknown_probability: f32,
+    pub unknown: Real<L>,
+    pub unknown_probability: Real<L>,
     /// Angles of the wheel pairs, as sharp as the heights are known, and spread.
-    pub angles: [Triangles; 2],
+    pub angles: [Triangles<L, 2>; 4],
     /// Probability of the angles of unknown ground: roll, pitch.
-    pub unknown_angle_probability: [f32; 2],
-}
-
-impl Outcomes {
-    const NONE: Self = Self {
-        linear_dirt: [[0.0; 4]; 1],
-        angular_dirt: [[0.0; 4]; 2],
-        dirt_probability: [0.0; 4],
-        vegetation: [0.0; 4],
-        vegetation_probability: [0.0; 4],
-        unknown: 0.0,
-        unknown_probability: 0.0,
-        angles: [Triangles::NONE; 2],
-        unknown_angle_probability: [0.0; 2],
-    };
+    pub unknown_angle_probability: [Real<L>; 2],
 }
 
 /// The configuration in the form that the equations want.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Equations {
     pub uniform_weight: f32,
-    /// The angles of unknown ground.
-    pub unknown_attitude: Triangles,
+    /// Half the width of the triangle of angles of unknown ground, in attitude bins.
+    pub unknown_bins: f32,
     per_slope: [f32; 2],
     per_vegetation_m: f32,
     spread_bins: f32,
@@ -78,10 +63,9 @@ impl Equations {
         let belly_depth_m = (config.high_centred_clearances - 1.0) * f64::from(lengths.ground_clearance_m);
         // A vehicle without clearance loses everything at the first touch.
         let per_belly_depth_m = (1.0 / belly_depth_m.max(1e-6)) as f32;
-        let unknown_bins = config.unknown_attitude_rad as f32 / Bins::ATTITUDE_WIDTH_RAD;
         Self {
             uniform_weight: config.uniform_weight as f32,
-            unknown_attitude: Triangles::new([0.0; 4], [unknown_bins; 4], [0.25; 4]),
+            unknown_bins: config.unknown_attitude_rad as f32 / Bins::ATTITUDE_WIDTH_RAD,
             per_slope: slopes_rad.map(|slope_rad| (1.0 / libm::tan(slope_rad)) as f32),
             per_vegetation_m: (1.0 / config.vegetation_height_max_m) as f32,
             spread_bins: config.attitude_spread_rad as f32 / Bins::ATTITUDE_WIDTH_RAD,
@@ -92,64 +76,94 @@ impl Equations {
         }
     }
 
-    /// Whether too little of a footprint is known.
+    /// Where too little of a footprint is known.
     #[inline(always)]
-    pub fn is_unknown(&self, pose: &PoseGround) -> bool {
-        pose.unknown_share > self.unknown_share_max
+    pub fn is_unknown<L: Lanes>(&self, lanes: L, pose: &PoseGround<L>) -> L::Mask {
+        lanes.real_single(self.unknown_share_max).less(pose.unknown_share)
     }
 
     /// What may happen at a pose. A footprint of which too little is known counts as unknown under every wheel.
     #[inline(always)]
-    pub fn outcomes(&self, pose: &PoseGround) -> Outcomes {
-        let all_unknown = self.is_unknown(pose);
-        let freedom = (1.0 - pose.belly_depth_m * self.per_belly_depth_m).max(0.0);
-        let per_wheel = 0.25 * (1.0 - self.uniform_weight);
-        let mut outcomes = Outcomes { unknown: self.unknown_traction * freedom, ..Outcomes::NONE };
-        let mut known = [0.0; 4];
-        for wheel in 0..4 {
-            let contact = &pose.wheels[wheel].values;
-            known[wheel] = if all_unknown { 0.0 } else { 1.0 - contact[Contact::UNKNOWN] };
-            let [linear, angular] = self.per_slope.map(|per_slope| pose.slopes[wheel] * per_slope);
-            let speed = (1.0 - linear).max(0.0) * freedom;
-            outcomes.linear_dirt[0][wheel] = speed;
-            outcomes.angular_dirt[0][wheel] = speed * (1.0 - angular).max(0.0);
-            outcomes.angular_dirt[1][wheel] = (speed * (1.0 + angular)).min(1.0);
-            let on_vegetation = 1.0 - contact[Contact::VEGETATION] * self.per_vegetation_m;
-            outcomes.vegetation[wheel] = on_vegetation.clamp(0.0, 1.0) * freedom;
-            outcomes.dirt_probability[wheel] = per_wheel * known[wheel] * (1.0 - pose.vegetation_share);
-            outcomes.vegetation_probability[wheel] = per_wheel * known[wheel] * pose.vegetation_share;
-            outcomes.unknown_probability += per_wheel * (1.0 - known[wheel]);
+    pub fn outcomes<L: Lanes>(&self, lanes: L, pose: &PoseGround<L>) -> Outcomes<L> {
+        let (zero, one) = (lanes.real(0.0), lanes.real(1.0));
+        let all_unknown = self.is_unknown(lanes, pose);
+        let per_belly_depth_m = lanes.real_single(self.per_belly_depth_m);
+        let freedom = (one - pose.belly_depth_m * per_belly_depth_m).max(zero);
+        let per_wheel = lanes.real_single(0.25 * (1.0 - self.uniform_weight));
+        let [per_linear, per_angular] = self.per_slope;
+        let (per_linear, per_angular) = (lanes.real_single(per_linear), lanes.real_single(per_angular));
+        let per_vegetation_m = lanes.real_single(self.per_vegetation_m);
+        let mut known = [zero; 4];
+        let (mut linear_dirt, mut angular_dirt) = ([[zero; 4]; 1], [[zero; 4]; 2]);
+        let (mut dirt_probability, mut vegetation_probability) = ([zero; 4], [zero; 4]);
+        let (mut vegetation, mut unknown_probability) = ([zero; 4], zero);
+        for (wheel, ground) in pose.wheels.iter().enumerate() {
+            known[wheel] = zero.or_else(all_unknown, one - ground.unknown);
+            let (linear, angular) = (ground.slope * per_linear, ground.slope * per_angular);
+            let speed = (one - linear).max(zero) * freedom;
+            linear_dirt[0][wheel] = speed;
+            angular_dirt[0][wheel] = speed * (one - angular).max(zero);
+            angular_dirt[1][wheel] = (speed * (one + angular)).min(one);
+            let on_vegetation = one - ground.vegetation_m * per_vegetation_m;
+            vegetation[wheel] = on_vegetation.max(zero).min(one) * freedom;
+            let probability = per_wheel * known[wheel];
+            dirt_probability[wheel] = probability * (one - pose.vegetation_share);
+            vegetation_probability[wheel] = probability * pose.vegetation_share;
+            unknown_probability = unknown_probability + per_wheel * (one - known[wheel]);
         }
-        self.lean(&pose.wheels, known, &mut outcomes);
-        outcomes
+        let (angles, unknown_angle_probability) = self.lean(lanes, &pose.wheels, &known);
+        Outcomes {
+            linear_dirt,
+            angular_dirt,
+            dirt_probability,
+            vegetation,
+            vegetation_probability,
+            unknown: lanes.real_single(self.unknown_traction) * freedom,
+            unknown_probability,
+            angles,
+            unknown_angle_probability,
+        }
     }
 
     /// Equation 17 with the spread of equation 18 as a triangle around the estimate, which the variance of the
     /// heights widens; a pair over unknown ground has the angles of unknown ground.
     #[inline(always)]
-    fn lean(&self, wheels: &[Contact; 4], known: [f32; 4], outcomes: &mut Outcomes) {
-        let (mut tangent, mut deviation, mut share) = ([0.0; 4], [0.0; 4], [0.0; 4]);
+    fn lean<L: Lanes>(
+        &self,
+        lanes: L,
+        wheels: &[WheelGround<L>; 4],
+        known: &[Real<L>; 4],
+    ) -> ([Triangles<L, 2>; 4], [Real<L>; 2]) {
+        let (half, one) = (lanes.real(0.5), lanes.real(1.0));
+        let mut share = [half; 4];
+        let mut angles = [Triangles::nothing(lanes); 4];
         for (pair, [i, j]) in PAIRS.into_iter().enumerate() {
-            let (a, b) = (&wheels[i].values, &wheels[j].values);
-            tangent[pair] = (a[Contact::HEIGHT] - b[Contact::HEIGHT]).abs() * self.per_distance[pair];
-            deviation[pair] = (a[Contact::VARIANCE] + b[Contact::VARIANCE]).sqrt() * self.per_distance[pair];
-            share[pair] = 0.5 * known[i] * known[j];
+            share[pair] = half * known[i] * known[j];
+            angles[pair] = self.angle(lanes, [&wheels[i], &wheels[j]], pair, share[pair]);
         }
-        let mut angle = arc_tangent(tangent);
-        let (mut noise, mut spread) = ([0.0; 4], [0.0; 4]);
-        let (mut sharp_share, mut spread_share) = ([0.0; 4], [0.0; 4]);
-        for pair in 0..4 {
-            angle[pair] *= BINS_PER_RAD;
-            // d atan(t) = cos^2 dt, and a triangle of half-width w has the variance w^2 / 6.
-            let per_tangent = SQRT_6 * BINS_PER_RAD / (1.0 + tangent[pair] * tangent[pair]);
-            noise[pair] = (deviation[pair] * per_tangent).min(N_BINS as f32);
-            spread[pair] = (self.spread_bins * self.spread_bins + noise[pair] * noise[pair]).sqrt();
-            sharp_share[pair] = share[pair] * (1.0 - self.uniform_weight);
-            spread_share[pair] = share[pair] * self.uniform_weight;
-        }
-        outcomes.angles =
-            [Triangles::new(angle, noise, sharp_share), Triangles::new(angle, spread, spread_share)];
-        outcomes.unknown_angle_probability = [1.0 - share[0] - share[1], 1.0 - share[2] - share[3]];
+        (angles, [one - share[0] - share[1], one - share[2] - share[3]])
+    }
+
+    /// Angle of a wheel pair of a probability.
+    #[inline(always)]
+    fn angle<L: Lanes>(
+        &self,
+        lanes: L,
+        [a, b]: [&WheelGround<L>; 2],
+        pair: usize,
+        probability: Real<L>,
+    ) -> Triangles<L, 2> {
+        let real = |value: f32| lanes.real_single(value);
+        let per_distance = real(self.per_distance[pair]);
+        let tangent = (a.height_m - b.height_m).abs() * per_distance;
+        let deviation = (a.variance_m2 + b.variance_m2).sqrt() * per_distance;
+        // d atan(t) = cos^2 dt, and a triangle of half-width w has the variance w^2 / 6.
+        let per_tangent = real(SQRT_6 * BINS_PER_RAD) / (real(1.0) + tangent * tangent);
+        let noise = (deviation * per_tangent).min(real(N_BINS as f32));
+        let spread = (real(self.spread_bins * self.spread_bins) + noise * noise).sqrt();
+        let sharp = Triangle::new(lanes, noise, probability * real(1.0 - self.uniform_weight));
+        let spread = Triangle::new(lanes, spread, probability * real(self.uniform_weight));
+        Triangles { centre: arc_tangent(lanes, tangent) * real(BINS_PER_RAD), around: [sharp, spread] }
     }
 }
 
@@ -159,7 +173,7 @@ const SQRT_6: f32 = 2.449_489_7;
 /// Arc tangent of numbers that are not negative, error below 2e-8 before rounding (Abramowitz and Stegun,
 /// 4.4.49): unlike the library's it runs in lanes.
 #[inline(always)]
-fn arc_tangent(tangent: [f32; 4]) -> [f32; 4] {
+fn arc_tangent<L: Lanes>(lanes: L, tangent: Real<L>) -> Real<L> {
     const COEFFICIENTS: [f32; 9] = [
         0.002_866_225_7,
         -0.016_165_737,
@@ -171,32 +185,35 @@ fn arc_tangent(tangent: [f32; 4]) -> [f32; 4] {
         -0.333_331_45,
         1.0,
     ];
-    // atan(t) = pi/2 - atan(1/t).
-    let x = tangent.map(|t| if t > 1.0 { 1.0 / t } else { t });
-    let mut series = [0.0; 4];
-    for coefficient in COEFFICIENTS {
-        for lane in 0..4 {
-            series[lane] = series[lane] * (x[lane] * x[lane]) + coefficient;
-        }
+    let one = lanes.real(1.0);
+    let is_steep = one.less(tangent);
+    // atan(t) = pi/2 - atan(1/t); hardly any ground is that steep.
+    let x = if lanes.any(is_steep) { (one / tangent).or_else(is_steep, tangent) } else { tangent };
+    let squared = x * x;
+    let mut series = lanes.real_single(COEFFICIENTS[0]);
+    for coefficient in &COEFFICIENTS[1..] {
+        series = series * squared + lanes.real_single(*coefficient);
     }
-    let mut angle_rad = [0.0; 4];
-    for lane in 0..4 {
-        let near = x[lane] * series[lane];
-        angle_rad[lane] = if tangent[lane] > 1.0 { std::f32::consts::FRAC_PI_2 - near } else { near };
-    }
-    angle_rad
+    let near = x * series;
+    (lanes.real(std::f64::consts::FRAC_PI_2) - near).or_else(is_steep, near)
 }
 
 #[cfg(test)]
 mod tests {
+    use bicycle::lanes::Portable;
+
     use super::*;
+
+    fn arc_tangent(tangent: f32) -> f32 {
+        super::arc_tangent(Portable, Portable.real_single(tangent)).1[3]
+    }
 
     #[test]
     fn the_arc_tangent_agrees_with_the_library() {
         for step in 0..20_000 {
             let tangent = step as f32 * 1e-3;
-            assert!((arc_tangent([tangent; 4])[3] - tangent.atan()).abs() < 3e-7, "{tangent}");
+            assert!((arc_tangent(tangent) - tangent.atan()).abs() < 3e-7, "{tangent}");
         }
-        assert!((arc_tangent([f32::MAX; 4])[0] - std::f32::consts::FRAC_PI_2).abs() < 1e-6);
+        assert!((arc_tangent(f32::MAX) - std::f32::consts::FRAC_PI_2).abs() < 1e-6);
     }
 }

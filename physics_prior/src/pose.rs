@@ -1,139 +1,172 @@
-//! What the ground under one pose is like.
+//! What the ground under neighbouring poses of one yaw is like, one lane each.
+//!
+//! Here and in the equations, arithmetic stands in loops and not in `map`, whose closures the compiler would leave
+//! without the instructions of the lanes.
 
-use crate::ground::{Contact, ContactGround, Counts};
+use bicycle::lanes::{Lanes, Real};
+
+use crate::ground::Contact;
+use crate::lane_ground::{LaneGround, VEGETATION_SHARES};
 use crate::lengths::Lengths;
-use crate::stencil::{BellySpan, Span, Stencil};
+use crate::planes::span;
+use crate::stencil::{BellySpan, Stencil, WheelTap};
+
+/// The ground under a wheel.
+#[derive(Clone, Copy)]
+pub(crate) struct WheelGround<L: Lanes> {
+    pub height_m: Real<L>,
+    pub variance_m2: Real<L>,
+    pub vegetation_m: Real<L>,
+    /// |slope| along the heading [-].
+    pub slope: Real<L>,
+    /// Share of it that is unknown.
+    pub unknown: Real<L>,
+}
 
 /// The ground under a vehicle at one pose.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct PoseGround {
-    /// Interpolated ground under each wheel: front left, rear left, rear right, front right.
-    pub wheels: [Contact; 4],
-    /// |slope| along the heading under each wheel [-].
-    pub slopes: [f32; 4],
+pub(crate) struct PoseGround<L: Lanes> {
+    /// Front left, rear left, rear right, front right.
+    pub wheels: [WheelGround<L>; 4],
+    /// Number of obstacle cells that the footprint touches.
+    pub n_obstacles: Real<L>,
     /// Share of vegetation in the known part of the footprint.
-    pub vegetation_share: f32,
+    pub vegetation_share: Real<L>,
     /// Share of the footprint that is unknown.
-    pub unknown_share: f32,
+    pub unknown_share: Real<L>,
     /// How far the ground between the axles would reach into the body, 0 where it does not [m].
-    pub belly_depth_m: f32,
+    pub belly_depth_m: Real<L>,
 }
 
-/// A stencil laid on the ground at a base cell.
-#[derive(Clone, Copy)]
-pub(crate) struct Placed<'a> {
-    pub ground: &'a ContactGround,
+/// A stencil laid on the ground: the poses in a pack begin at `offset` of the span that begins at `first`, see
+/// [`Lanes::of_span`].
+pub(crate) struct Placed<'a, L: Lanes> {
+    pub lanes: L,
+    pub ground: &'a LaneGround,
     pub stencil: &'a Stencil,
-    /// Lattice indices of the base cell.
-    pub base: [i64; 2],
+    /// Position of the span's first base cell in the layers.
+    pub first: usize,
+    pub offset: usize,
 }
 
-impl Placed<'_> {
-    /// Counts over every cell that the footprint touches.
+impl<L: Lanes> Placed<'_, L> {
+    /// Number of obstacle cells that the footprints touch.
     #[inline(always)]
-    pub fn counts(&self) -> Counts {
-        let [west, south] = self.ground.window().origin;
-        let place = |span: &Span| {
-            let row = self.base[1] + span.start[1] - south;
-            let col = self.base[0] + span.start[0] - west;
-            (row as usize, col as usize, span.n_cells)
-        };
-        self.ground.counts(self.stencil.footprint.iter().map(place))
+    pub fn n_obstacles(&self) -> Real<L> {
+        self.count(&self.ground.obstacles)
     }
 
     /// Everything that the prior wants to know.
     #[inline(always)]
-    pub fn pose_ground(&self, counts: Counts, lengths: &Lengths) -> PoseGround {
-        let wheels = self.wheels();
-        let [east, north] = self.stencil.heading;
-        let mut slopes = [0.0; 4];
-        for (slope, wheel) in slopes.iter_mut().zip(&wheels) {
-            let gradient = &wheel.values;
-            *slope =
-                (gradient[Contact::GRADIENT_EAST] * east + gradient[Contact::GRADIENT_NORTH] * north).abs();
-        }
-        let n_known = self.stencil.n_footprint_cells - counts.unknown;
+    pub fn pose_ground(&self, lengths: &Lengths) -> PoseGround<L> {
+        let taps = &self.stencil.wheels;
+        let wheels = [self.wheel(&taps[0]), self.wheel(&taps[1]), self.wheel(&taps[2]), self.wheel(&taps[3])];
+        let n_cells = self.lanes.real_single(self.stencil.n_footprint_cells as f32);
+        let n_unknown = self.count(&self.ground.unknown);
+        let n_known = (n_cells - n_unknown).max(self.lanes.real(1.0));
+        let per_known = self.lanes.real_single(VEGETATION_SHARES) * n_known;
         PoseGround {
             wheels,
-            slopes,
-            vegetation_share: counts.vegetation_255 as f32 / (255.0 * n_known.max(1) as f32),
-            unknown_share: counts.unknown as f32 / self.stencil.n_footprint_cells as f32,
+            n_obstacles: self.n_obstacles(),
+            vegetation_share: self.count(&self.ground.vegetation) / per_known,
+            unknown_share: n_unknown / n_cells,
             belly_depth_m: self.belly_depth_m(&wheels, lengths),
         }
     }
 
     #[inline(always)]
-    fn wheels(&self) -> [Contact; 4] {
-        let contacts = self.ground.contacts();
-        let n_cols = self.ground.window().n_cols;
-        let mut wheels = [Contact { values: [0.0; 8] }; 4];
-        for (wheel, tap) in wheels.iter_mut().zip(&self.stencil.wheels) {
-            let south_west = self.index(tap.offset);
-            let (south, north) =
-                (&contacts[south_west..south_west + 2], &contacts[south_west + n_cols..][..2]);
-            let corners = [&south[0].values, &south[1].values, &north[0].values, &north[1].values];
-            for k in 0..8 {
-                wheel.values[k] = tap.weights[0] * corners[0][k]
-                    + tap.weights[1] * corners[1][k]
-                    + tap.weights[2] * corners[2][k]
-                    + tap.weights[3] * corners[3][k];
-            }
+    fn read(&self, layer: &[f32], delta: isize) -> Real<L> {
+        self.lanes.real_of_span(span(layer, self.first, delta), self.offset)
+    }
+
+    /// Sum over the footprint.
+    #[inline(always)]
+    fn count(&self, sums: &[f32]) -> Real<L> {
+        let mut count = self.lanes.real(0.0);
+        for [start, end] in self.stencil.footprint.iter().map(|span| span.deltas) {
+            count = count + (self.read(sums, end) - self.read(sums, start));
         }
-        wheels
+        count
+    }
+
+    #[inline(always)]
+    fn wheel(&self, tap: &WheelTap) -> WheelGround<L> {
+        let [east, north] = self.stencil.heading;
+        let along_east = self.interpolated(Contact::GRADIENT_EAST, tap) * self.lanes.real_single(east);
+        let along_north = self.interpolated(Contact::GRADIENT_NORTH, tap) * self.lanes.real_single(north);
+        WheelGround {
+            height_m: self.interpolated(Contact::HEIGHT, tap),
+            variance_m2: self.interpolated(Contact::VARIANCE, tap),
+            vegetation_m: self.interpolated(Contact::VEGETATION, tap),
+            slope: (along_east + along_north).abs(),
+            unknown: self.interpolated(Contact::UNKNOWN, tap),
+        }
+    }
+
+    #[inline(always)]
+    fn interpolated(&self, value: usize, tap: &WheelTap) -> Real<L> {
+        let layer = &self.ground.contacts[value];
+        let mut sum = self.lanes.real_single(tap.weights[0]) * self.read(layer, tap.deltas[0]);
+        for corner in 1..4 {
+            let weight = self.lanes.real_single(tap.weights[corner]);
+            sum = sum + weight * self.read(layer, tap.deltas[corner]);
+        }
+        sum
     }
 
     /// Largest height of the ground under the belly above the plane that fits the four wheel contacts best,
     /// raised by the clearance; not less than 0. A wheel over unknown ground has no height that a plane could
     /// rest on: nothing is said of the belly there.
     #[inline(always)]
-    fn belly_depth_m(&self, wheels: &[Contact; 4], lengths: &Lengths) -> f32 {
-        if wheels.iter().any(|wheel| wheel.values[Contact::UNKNOWN] > 0.0) {
-            return 0.0;
-        }
-        let height_m = |wheel: usize| wheels[wheel].values[Contact::HEIGHT];
-        let (front_left_m, rear_left_m, rear_right_m, front_right_m) =
-            (height_m(0), height_m(1), height_m(2), height_m(3));
-        let (wheelbase_m, track_m) = (lengths.wheels.wheelbase_m as f32, lengths.wheels.track_m as f32);
-        let rear_m = 0.5 * (rear_left_m + rear_right_m);
-        let per_forward = (0.5 * (front_left_m + front_right_m) - rear_m) / wheelbase_m;
-        let per_left = 0.5 * (front_left_m + rear_left_m - front_right_m - rear_right_m) / track_m;
-        let [cos, sin] = self.stencil.heading;
-        let step_m = self.ground.window().resolution_m as f32 * (per_forward * cos - per_left * sin);
-        let mut depth_m = 0.0;
-        for BellySpan { span, start_m: [forward_m, left_m] } in &self.stencil.belly {
+    fn belly_depth_m(&self, wheels: &[WheelGround<L>; 4], lengths: &Lengths) -> Real<L> {
+        let (lanes, single) = (self.lanes, |value: f32| self.lanes.real_single(value));
+        let (front_left_m, rear_left_m) = (wheels[0].height_m, wheels[1].height_m);
+        let (rear_right_m, front_right_m) = (wheels[2].height_m, wheels[3].height_m);
+        let half = lanes.real(0.5);
+        let rear_m = half * (rear_left_m + rear_right_m);
+        let per_wheelbase = single((1.0 / lengths.wheels.wheelbase_m) as f32);
+        let per_forward = (half * (front_left_m + front_right_m) - rear_m) * per_wheelbase;
+        let across_m = front_left_m + rear_left_m - front_right_m - rear_right_m;
+        let per_left = across_m * single((0.5 / lengths.wheels.track_m) as f32);
+        let (cos, sin) = (single(self.stencil.heading[0]), single(self.stencil.heading[1]));
+        let resolution_m = single(self.ground.planes().window().resolution_m as f32);
+        let step_m = resolution_m * (per_forward * cos - per_left * sin);
+        let mut depth_m = lanes.real(0.0);
+        for belly in &self.stencil.belly {
+            let (forward_m, left_m) = (single(belly.start_m[0]), single(belly.start_m[1]));
             let plane_m = rear_m + per_forward * forward_m + per_left * left_m;
-            let belly = Line { start_m: plane_m + lengths.ground_clearance_m, step_m };
-            depth_m = self.deepest_m(span, belly, depth_m);
+            let start_m = plane_m + single(lengths.ground_clearance_m);
+            depth_m = self.deepest_m(belly, Line { start_m, step_m }, depth_m);
         }
-        depth_m
+        let unknown = wheels[0].unknown + wheels[1].unknown + wheels[2].unknown + wheels[3].unknown;
+        lanes.real(0.0).or_else(lanes.real(0.0).less(unknown), depth_m)
     }
 
     /// The larger of `least_m` and what any cell of a span rises above a line along it.
     #[inline(always)]
-    fn deepest_m(&self, span: &Span, line: Line, least_m: f32) -> f32 {
-        let start = self.index(span.start);
-        let end_m = line.start_m + (span.n_cells - 1) as f32 * line.step_m;
+    fn deepest_m(&self, belly: &BellySpan, line: Line<L>, least_m: Real<L>) -> Real<L> {
+        let stretches_m = &self.ground.bumps_m[belly.level];
+        let highest_m = self.read(stretches_m, belly.stretches[0]);
+        let other_m = self.read(stretches_m, belly.stretches[1]);
+        let last = self.lanes.real_single((belly.span.n_cells - 1) as f32);
+        let end_m = line.start_m + last * line.step_m;
         // Most rows are settled by their highest cell.
-        if self.ground.highest_m(start, span.n_cells) - line.start_m.min(end_m) <= least_m {
+        let rises = least_m.less(highest_m.max(other_m) - line.start_m.min(end_m));
+        if !self.lanes.any(rises) {
             return least_m;
         }
         let mut deepest_m = least_m;
-        for (k, bump_m) in self.ground.bumps_m()[start..start + span.n_cells].iter().enumerate() {
-            let depth_m = bump_m - (line.start_m + k as f32 * line.step_m);
-            deepest_m = if depth_m > deepest_m { depth_m } else { deepest_m };
+        for (k, &delta) in belly.cells.iter().enumerate() {
+            let along_m = line.start_m + self.lanes.real_single(k as f32) * line.step_m;
+            deepest_m = (self.read(&self.ground.bumps_m[0], delta) - along_m).max(deepest_m);
         }
-        deepest_m
-    }
-
-    #[inline(always)]
-    fn index(&self, offset: [i64; 2]) -> usize {
-        self.ground.index([self.base[0] + offset[0], self.base[1] + offset[1]])
+        // A neighbour whose row was settled must not tell.
+        deepest_m.or_else(rises, least_m)
     }
 }
 
 /// Heights along a span: at its westmost cell and from cell to cell [m].
 #[derive(Clone, Copy)]
-struct Line {
-    start_m: f32,
-    step_m: f32,
+struct Line<L: Lanes> {
+    start_m: Real<L>,
+    step_m: Real<L>,
 }

@@ -1,16 +1,16 @@
 //! All poses of a risk map over the ground below.
 
-use bicycle::lanes::Instructions;
+use bicycle::lanes::{Block, Instructions, Lanes, OnLanes, Real, SPAN, Scalar};
 use terrain::{GridGeometry, GridMap, SurfaceCell, TerrainClass};
-use traversability::{Ground, GroundFlags, Risk};
+use traversability::{Bins, CvarLevel, Ground, GroundFlags, N_BINS};
 
 use crate::PriorBelief;
+use crate::block_prior::{BlockPrior, PoseLine};
 use crate::ground::{Contact, ContactGround};
 use crate::lattice::Ratio;
 use crate::lengths::Lengths;
 use crate::outcomes::Equations;
 use crate::pose::Placed;
-use crate::prior_field::PosePrior;
 use crate::stencil::{Reach, Stencil};
 use crate::tails::{Tails, distribution};
 
@@ -26,6 +26,7 @@ pub(crate) enum Judgement {
 pub(crate) struct Physics {
     pub equations: Equations,
     pub tails: Tails,
+    pub level: CvarLevel,
     pub evidence: f32,
 }
 
@@ -58,14 +59,26 @@ impl Poses {
         let reach = stencils.iter().map(Stencil::reach).fold(around, Reach::union);
         let reach = reach.grown(ContactGround::reach_of(&lengths, surface_resolution_m));
         let window = window(risk, ratio, reach, surface_resolution_m);
-        let ground = ContactGround::unknown(window, &lengths);
-        Self { judgement, ground, lengths, ratio, n_yaws, stencils, reach, instructions }
+        let ground = ContactGround::unknown(window, ratio, &lengths);
+        let mut poses = Self { judgement, ground, lengths, ratio, n_yaws, stencils, reach, instructions };
+        poses.lay_stencils(risk);
+        poses
     }
 
     /// Makes room for another window of the risk map; the ground must be read anew.
     pub fn move_to(&mut self, risk: &GridGeometry) {
         let window = window(risk, self.ratio, self.reach, self.ground.window().resolution_m);
-        self.ground = ContactGround::unknown(window, &self.lengths);
+        self.ground = ContactGround::unknown(window, self.ratio, &self.lengths);
+        self.lay_stencils(risk);
+    }
+
+    fn lay_stencils(&mut self, risk: &GridGeometry) {
+        let n_phases = self.ratio.n_phases();
+        let planes = self.ground.lanes().planes();
+        for (index, stencil) in self.stencils.iter_mut().enumerate() {
+            let col = self.ratio.like(index / self.n_yaws % n_phases, risk.origin[0]);
+            stencil.lay_on(planes, [col, risk.origin[1]].map(|index| self.ratio.base(index)));
+        }
     }
 
     /// Whether the pose in the centre of a risk cell depends on any surface cell from `min` to `max`, per axis.
@@ -79,48 +92,20 @@ impl Poses {
         self.ratio
     }
 
-    /// Risks of one risk cell for every yaw bin.
-    pub fn risks(&self, cell: [i64; 2], risks: &mut [Risk]) {
-        let (stencils, base) = self.stencils_of(cell);
-        self.instructions.run(Yaws { poses: self, stencils, base, risks });
+    /// What the kernels run on.
+    pub fn instructions(&self) -> Instructions {
+        self.instructions
     }
 
-    /// What the prior says of one risk cell for every yaw bin; nothing for the nominal judgement.
-    pub fn pose_priors(&self, cell: [i64; 2], priors: &mut [PosePrior]) {
-        if let Judgement::Physics(physics) = &self.judgement {
-            let (stencils, base) = self.stencils_of(cell);
-            self.instructions.run(YawPriors { poses: self, physics, stencils, base, priors });
-        }
-    }
-
-    fn stencils_of(&self, cell: [i64; 2]) -> (&[Stencil], [i64; 2]) {
-        let [col_phase, row_phase] = cell.map(|index| self.ratio.phase_index(index));
-        let first = (row_phase * self.ratio.n_phases() + col_phase) * self.n_yaws;
-        (&self.stencils[first..first + self.n_yaws], cell.map(|index| self.ratio.base(index)))
-    }
-
-    #[inline(always)]
-    fn pose_prior(&self, physics: &Physics, placed: &Placed) -> PosePrior {
-        let counts = placed.counts();
-        let pose = placed.pose_ground(counts, &self.lengths);
-        PosePrior {
-            moments: physics.tails.moments(&physics.equations.outcomes(&pose)),
-            is_blocked: counts.obstacles > 0,
-            is_unknown: physics.equations.is_unknown(&pose),
-        }
-    }
-
-    #[inline(always)]
-    fn risk(&self, placed: &Placed) -> Risk {
-        let counts = placed.counts();
-        let free = match &self.judgement {
-            Judgement::Physics(physics) => {
-                let pose = placed.pose_ground(counts, &self.lengths);
-                physics.tails.risk(&physics.equations.outcomes(&pose))
-            }
-            Judgement::Nominal => Risk::NONE,
-        };
-        if counts.obstacles > 0 { free.blocked() } else { free }
+    /// What the prior says of the poses of a line, from a lane of the block on. Whole spans are written: lines must
+    /// come in the order of their lanes. The nominal judgement knows obstacles alone.
+    pub fn read(&self, line: &PoseLine, first_lane: usize, block: &mut BlockPrior) {
+        let [col_phase, row_phase] = line.cell.map(|index| self.ratio.phase_index(index));
+        let stencil = (row_phase * self.ratio.n_phases() + col_phase) * self.n_yaws + line.yaw;
+        let base = line.cell.map(|index| self.ratio.base(index));
+        let first = self.ground.lanes().planes().index(base);
+        let stencil = &self.stencils[stencil];
+        self.instructions.run_on_lanes(ReadLine { poses: self, stencil, first, line, first_lane, block });
     }
 
     /// Belief of any pose; `None` outside the ground's window and for the nominal judgement.
@@ -130,12 +115,16 @@ impl Poses {
         let place = [x_m, y_m].map(|v| v / resolution_m);
         let base = place.map(|v| v.floor() as i64);
         let phase = place.map(|v| v - v.floor());
-        let stencil = Stencil::new(&self.lengths, resolution_m, phase, yaw_rad);
+        let mut stencil = Stencil::new(&self.lengths, resolution_m, phase, yaw_rad);
         self.contains(base, stencil.reach()).then(|| {
-            let placed = Placed { ground: &self.ground, stencil: &stencil, base };
-            let pose = placed.pose_ground(placed.counts(), &self.lengths);
-            let distribution = distribution(&physics.equations, &physics.equations.outcomes(&pose));
-            PriorBelief::new(&distribution, physics.evidence, physics.equations.is_unknown(&pose))
+            let ground = self.ground.lanes();
+            stencil.lay_on(ground.planes(), base);
+            let first = ground.planes().index(base);
+            let placed = Placed { lanes: Scalar, ground, stencil: &stencil, first, offset: 0 };
+            let pose = placed.pose_ground(&self.lengths);
+            let equations = &physics.equations;
+            let distribution = distribution(equations, &equations.outcomes(Scalar, &pose));
+            PriorBelief::new(&distribution, physics.evidence, equations.is_unknown(Scalar, &pose))
         })
     }
 
@@ -163,44 +152,107 @@ impl Poses {
     }
 }
 
-/// The poses of one risk cell, in the registers of any instruction set. Every one of them gives the same bits, since
-/// multiplications and additions stay apart.
-struct Yaws<'a> {
+/// The poses of a line, in packs of any instruction set. Every one of them gives the same bits, since multiplications
+/// and additions stay apart.
+struct ReadLine<'a> {
     poses: &'a Poses,
-    stencils: &'a [Stencil],
-    base: [i64; 2],
-    risks: &'a mut [Risk],
+    stencil: &'a Stencil,
+    /// Position of the first base cell in the layers.
+    first: usize,
+    line: &'a PoseLine,
+    first_lane: usize,
+    block: &'a mut BlockPrior,
 }
 
-impl pulp::WithSimd for Yaws<'_> {
+impl OnLanes for ReadLine<'_> {
     type Output = ();
 
     #[inline(always)]
-    fn with_simd<S: pulp::Simd>(self, _: S) {
-        let (poses, base) = (self.poses, self.base);
-        for (stencil, risk) in self.stencils.iter().zip(self.risks) {
-            *risk = poses.risk(&Placed { ground: &poses.ground, stencil, base });
+    fn run<L: Lanes>(mut self, lanes: L) {
+        for start in (0..self.line.n_lanes).step_by(SPAN) {
+            for offset in (0..SPAN).step_by(L::WIDTH) {
+                self.read(lanes, start, offset);
+            }
         }
     }
 }
 
-/// The same for what the prior says of these poses.
-struct YawPriors<'a> {
-    poses: &'a Poses,
-    physics: &'a Physics,
-    stencils: &'a [Stencil],
-    base: [i64; 2],
-    priors: &'a mut [PosePrior],
+impl ReadLine<'_> {
+    #[inline(always)]
+    fn read<L: Lanes>(&mut self, lanes: L, start: usize, offset: usize) {
+        let Self { poses, stencil, first, first_lane, .. } = *self;
+        let placed = Placed { lanes, ground: poses.ground.lanes(), stencil, first: first + start, offset };
+        let lane = first_lane + start;
+        let write = |block: &mut Block, value: Real<L>| {
+            if let Some(span) = block.span_mut(lane) {
+                lanes.to_span(value.1, span, offset);
+            }
+        };
+        let Judgement::Physics(physics) = &poses.judgement else {
+            write(&mut self.block.n_obstacles, placed.n_obstacles());
+            return;
+        };
+        let pose = placed.pose_ground(&poses.lengths);
+        write(&mut self.block.n_obstacles, pose.n_obstacles);
+        let is_unknown = physics.equations.is_unknown(lanes, &pose);
+        write(&mut self.block.unknown, lanes.real(1.0).or_else(is_unknown, lanes.real(0.0)));
+        let outcomes = physics.equations.outcomes(lanes, &pose);
+        let [linear, angular] = physics.tails.shortfalls(lanes, &outcomes);
+        for bin in 0..N_BINS {
+            write(&mut self.block.moments[0][bin], linear[bin]);
+            write(&mut self.block.moments[1][bin], angular[bin]);
+        }
+        for axis in 0..2 {
+            let excesses_rad = physics.tails.excesses_rad(lanes, &outcomes, axis);
+            for bin in 0..N_BINS {
+                write(&mut self.block.moments[2 + axis][bin], excesses_rad[bin]);
+            }
+        }
+    }
 }
 
-impl pulp::WithSimd for YawPriors<'_> {
-    type Output = ();
+/// The CVaR of every parameter of the poses of a block, see [`traversability::PartialMoments`].
+pub(crate) struct BlockCvar<'a> {
+    pub moments: &'a [[Block; N_BINS]; 4],
+    pub level: CvarLevel,
+}
+
+impl OnLanes for BlockCvar<'_> {
+    type Output = [Block; 4];
 
     #[inline(always)]
-    fn with_simd<S: pulp::Simd>(self, _: S) {
-        let (poses, base) = (self.poses, self.base);
-        for (stencil, prior) in self.stencils.iter().zip(self.priors) {
-            *prior = poses.pose_prior(self.physics, &Placed { ground: &poses.ground, stencil, base });
+    fn run<L: Lanes>(self, lanes: L) -> [Block; 4] {
+        let mut cvars = [Block::ZERO; 4];
+        for (parameter, cvar) in cvars.iter_mut().enumerate() {
+            for first_lane in (0..bicycle::lanes::BLOCK).step_by(SPAN) {
+                for offset in (0..SPAN).step_by(L::WIDTH) {
+                    let best = self.best(lanes, parameter, first_lane, offset);
+                    if let Some(span) = cvar.span_mut(first_lane) {
+                        lanes.to_span(best.1, span, offset);
+                    }
+                }
+            }
+        }
+        cvars
+    }
+}
+
+impl BlockCvar<'_> {
+    /// The largest v - E[(v - Z)^+] / level for traction, the smallest v + E[(Z - v)^+] / level for angles.
+    #[inline(always)]
+    fn best<L: Lanes>(&self, lanes: L, parameter: usize, first_lane: usize, offset: usize) -> Real<L> {
+        let per_level = lanes.real_single(self.level.reciprocal());
+        let tail = |bin: usize| {
+            let moment = &self.moments[parameter][bin];
+            per_level * lanes.real_of_span(moment.span(first_lane), offset)
+        };
+        let is_traction = parameter < 2;
+        let values = if is_traction { Bins::TRACTION.values() } else { Bins::ATTITUDE.values() };
+        let value = |bin: usize| lanes.real_single(values[bin]);
+        if is_traction {
+            (1..N_BINS).fold(value(0) - tail(0), |best, bin| best.max(value(bin) - tail(bin)))
+        } else {
+            (1..N_BINS).fold(value(0) + tail(0), |best, bin| best.min(value(bin) + tail(bin)))
         }
     }
 }
@@ -309,20 +361,24 @@ mod tests {
         let prior = PriorConfig::default();
         let lengths = Lengths::new(&CAR, &prior);
         let equations = Equations::new(&prior, &lengths);
-        let tails = Tails::new(&equations, traversability::CvarLevel::new(0.4).unwrap());
-        let judgement = Judgement::Physics(Box::new(Physics { equations, tails, evidence: 12.0 }));
+        let level = CvarLevel::new(0.4).unwrap();
+        let tails = Tails::new(&equations);
+        let judgement = Judgement::Physics(Box::new(Physics { equations, tails, level, evidence: 12.0 }));
         let ratio = Ratio::new(0.1, 0.1).unwrap();
         let mut poses = Poses::new(judgement, lengths, (ratio, 0.1), &window, 13, Instructions::Portable);
         poses.ground.read(&bumpy(window), [-100; 2], [100; 2]);
-        for cell in [[5, 5], [12, 11], [12, 12], [17, 4]] {
-            let mut portable = [Risk::NONE; 13];
-            poses.instructions = Instructions::Portable;
-            poses.risks(cell, &mut portable);
-            for instructions in Instructions::all() {
-                let mut found = [Risk::NONE; 13];
+        for (cell, yaw) in [([5, 5], 0), ([1, 11], 5), ([2, 12], 9), ([7, 4], 12)] {
+            let line = PoseLine { cell, yaw, n_lanes: 17 };
+            let mut risks = |instructions: Instructions| {
                 poses.instructions = instructions;
-                poses.risks(cell, &mut found);
-                assert_eq!(found, portable, "{instructions:?}");
+                let mut block = BlockPrior::default();
+                poses.read(&line, 3, &mut block);
+                let cvars = instructions.run_on_lanes(BlockCvar { moments: &block.moments, level });
+                cvars.map(|cvar| cvar.lanes()[3..20].to_vec())
+            };
+            let portable = risks(Instructions::Portable);
+            for instructions in Instructions::all() {
+                assert_eq!(risks(instructions), portable, "{instructions:?}");
             }
         }
     }

@@ -5,28 +5,18 @@ use std::ops::Range;
 use bicycle::Geometry;
 use bicycle::lanes::Instructions;
 use terrain::{CellRegion, GridGeometry, GridMap, SurfaceCell};
-use traversability::{CvarLevel, Ground, PartialMoments, Risk};
+use traversability::{CvarLevel, Ground, Risk};
 
+use crate::block_prior::{BlockPrior, PoseLine};
 use crate::lattice::Ratio;
 use crate::lengths::Lengths;
 use crate::outcomes::Equations;
-use crate::poses::{Judgement, Physics, Poses};
+use crate::poses::{BlockCvar, Judgement, Physics, Poses};
 use crate::tails::Tails;
 use crate::{Assumption, PriorBelief, PriorConfig, PriorConfigError, PriorMapError};
 
 /// Cells across a footprint beyond which nothing is judged in time.
 const FOOTPRINT_CELLS_MAX: f64 = 500.0;
-
-/// What the prior says of one pose, for whoever mixes it with something else.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PosePrior {
-    /// Of the distributions of equation 18.
-    pub moments: PartialMoments,
-    /// Whether the footprint touches an obstacle.
-    pub is_blocked: bool,
-    /// Whether so little of the footprint is known that it is judged as unknown ground.
-    pub is_unknown: bool,
-}
 
 /// The poses of a risk map over the ground that they stand on: the rear axle's centre in the centre of a cell of
 /// the window, the yaw in the centre of its bin. Cells are given by lattice indices: columns, rows.
@@ -96,7 +86,7 @@ impl PriorField {
     /// Judges at another level; everything is judged anew. The nominal assumption has none.
     pub fn set_level(&mut self, level: CvarLevel) {
         if let Judgement::Physics(physics) = &mut self.poses.judgement {
-            physics.tails = Tails::new(&physics.equations, level);
+            physics.level = level;
             self.read_from = None;
         }
     }
@@ -147,15 +137,32 @@ impl PriorField {
         })
     }
 
-    /// Risks of the poses in a cell, one for every yaw bin.
-    pub fn risks(&self, cell: [i64; 2], risks: &mut [Risk]) {
-        self.poses.risks(cell, risks);
+    /// What the prior says of the poses of a line, from a lane of the block on. Whole spans of
+    /// [`bicycle::lanes::SPAN`] lanes are written, so lines must come in the order of their lanes. Under the nominal
+    /// assumption, which has no distributions, obstacles alone are counted.
+    pub fn read_line(&self, line: &PoseLine, first_lane: usize, block: &mut BlockPrior) {
+        self.poses.read(line, first_lane, block);
     }
 
-    /// What the prior says of the poses in a cell, one for every yaw bin; nothing changes under the nominal
-    /// assumption, which has no distributions.
-    pub fn pose_priors(&self, cell: [i64; 2], priors: &mut [PosePrior]) {
-        self.poses.pose_priors(cell, priors);
+    /// Risks of the first `n` poses of a block.
+    pub fn risks(&self, block: &BlockPrior, n: usize) -> impl Iterator<Item = Risk> {
+        let free = match &self.poses.judgement {
+            Judgement::Physics(physics) => {
+                let cvar = BlockCvar { moments: &block.moments, level: physics.level };
+                Some(self.poses.instructions().run_on_lanes(cvar))
+            }
+            Judgement::Nominal => None,
+        };
+        let n_obstacles = block.n_obstacles;
+        (0..n).map(move |lane| {
+            let free = free.as_ref().map_or(Risk::NONE, |[linear, angular, roll, pitch]| Risk {
+                linear_traction: linear.0[lane],
+                angular_traction: angular.0[lane],
+                roll_rad: roll.0[lane],
+                pitch_rad: pitch.0[lane],
+            });
+            if n_obstacles.0[lane] > 0.0 { free.blocked() } else { free }
+        })
     }
 
     /// The ground in a cell.
@@ -197,8 +204,8 @@ fn judged(geometry: &Geometry, assumption: &Assumption) -> Result<(Lengths, Judg
             prior.validate()?;
             let lengths = Lengths::new(geometry, prior);
             let equations = Equations::new(prior, &lengths);
-            let tails = Tails::new(&equations, *level);
-            let physics = Physics { equations, tails, evidence: prior.evidence as f32 };
+            let tails = Tails::new(&equations);
+            let physics = Physics { equations, tails, level: *level, evidence: prior.evidence as f32 };
             Ok((lengths, Judgement::Physics(Box::new(physics))))
         }
         Assumption::Nominal { obstacle_margin_m } => {

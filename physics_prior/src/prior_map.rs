@@ -1,12 +1,14 @@
 //! From the known surface to a risk map, whole or where something changed.
 
+use std::ops::Range;
+
 use bicycle::Geometry;
-use bicycle::lanes::Instructions;
+use bicycle::lanes::{BLOCK, Instructions};
 use rayon::prelude::*;
 use terrain::{CellRegion, GridGeometry, GridMap, SurfaceCell};
 use traversability::{CvarLevel, Risk, RiskMap};
 
-use crate::{PriorBelief, PriorConfig, PriorConfigError, PriorField};
+use crate::{BlockPrior, PoseLine, PriorBelief, PriorConfig, PriorConfigError, PriorField};
 
 /// What a [`PriorMap`] takes the ground for.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -150,14 +152,37 @@ impl PriorMap {
         let risk_rows =
             risks[cells.start * n_yaws..cells.end * n_yaws].par_chunks_mut(geometry.n_cols * n_yaws);
         let lines = risk_rows.zip(ground[cells].par_chunks_mut(geometry.n_cols));
-        lines.enumerate().for_each(|(line, (risks, ground))| {
-            let lattice_row = geometry.origin[1] + (dirty.rows.start + line) as i64;
+        lines.enumerate().for_each_init(BlockPrior::default, |block, (line, (risks, ground))| {
+            let row = geometry.origin[1] + (dirty.rows.start + line) as i64;
+            for yaw in 0..n_yaws {
+                judge_row(field, [geometry.origin[0], row], &dirty.cols, (yaw, n_yaws), block, risks);
+            }
             for col in dirty.cols.clone() {
-                let cell = [geometry.origin[0] + col as i64, lattice_row];
-                field.risks(cell, &mut risks[col * n_yaws..(col + 1) * n_yaws]);
-                ground[col] = field.ground_in(cell, surface);
+                ground[col] = field.ground_in([geometry.origin[0] + col as i64, row], surface);
             }
         });
         self.map.close_border();
+    }
+}
+
+/// Judges the poses of one yaw in some columns of a row that begins in the lattice cell `west`.
+fn judge_row(
+    field: &PriorField,
+    west: [i64; 2],
+    cols: &Range<usize>,
+    (yaw, n_yaws): (usize, usize),
+    block: &mut BlockPrior,
+    risks: &mut [Risk],
+) {
+    let n_phases = field.ratio().n_phases();
+    for first_col in cols.clone().take(n_phases) {
+        for col in (first_col..cols.end).step_by(n_phases * BLOCK) {
+            let n_lanes = (cols.end - col).div_ceil(n_phases).min(BLOCK);
+            let cell = [west[0] + col as i64, west[1]];
+            field.read_line(&PoseLine { cell, yaw, n_lanes }, 0, block);
+            for (step, risk) in field.risks(block, n_lanes).enumerate() {
+                risks[(col + step * n_phases) * n_yaws + yaw] = risk;
+            }
+        }
     }
 }

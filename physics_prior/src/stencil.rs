@@ -4,6 +4,7 @@
 use terrain::{Footprint, WheelLayout};
 
 use crate::lengths::Lengths;
+use crate::planes::Planes;
 
 /// Four cells around a wheel's contact point and their bilinear weights.
 #[derive(Clone, Copy, Debug)]
@@ -12,6 +13,8 @@ pub(crate) struct WheelTap {
     pub offset: [i64; 2],
     /// South-west, south-east, north-west, north-east.
     pub weights: [f32; 4],
+    /// [`Planes::delta`] of the same.
+    pub deltas: [isize; 4],
 }
 
 /// Adjacent cells of one row.
@@ -21,14 +24,22 @@ pub(crate) struct Span {
     pub start: [i64; 2],
     /// Number of cells.
     pub n_cells: usize,
+    /// [`Planes::delta`] of the westmost cell and of the one after the last.
+    pub deltas: [isize; 2],
 }
 
 /// Cells between the wheels, adjacent in one row.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct BellySpan {
     pub span: Span,
     /// Where the westmost cell's centre lies in the body frame: forward, left [m].
     pub start_m: [f32; 2],
+    /// Adjacent cells, 2 to the power of this, two stretches of which cover the span.
+    pub level: usize,
+    /// [`Planes::delta`] of the first cells of these stretches.
+    pub stretches: [isize; 2],
+    /// [`Planes::delta`] of every cell.
+    pub cells: Vec<isize>,
 }
 
 /// A pose relative to its base cell, the cell of the surface that holds the rear axle's centre.
@@ -91,6 +102,25 @@ impl Stencil {
         }
     }
 
+    /// Finds its cells in the layers of the ground, for base cells like the given one.
+    pub fn lay_on(&mut self, planes: &Planes, base: [i64; 2]) {
+        for wheel in &mut self.wheels {
+            let [east, north] = wheel.offset;
+            let corners = [[east, north], [east + 1, north], [east, north + 1], [east + 1, north + 1]];
+            wheel.deltas = corners.map(|corner| planes.delta(base, corner));
+        }
+        for Span { start, n_cells, deltas } in &mut self.footprint {
+            let end = [start[0] + *n_cells as i64, start[1]];
+            *deltas = [*start, end].map(|offset| planes.delta(base, offset));
+        }
+        for belly in &mut self.belly {
+            let Span { start: [col, row], n_cells, .. } = belly.span;
+            let cell = |k: usize| planes.delta(base, [col + k as i64, row]);
+            belly.stretches = [cell(0), cell(n_cells - (1 << belly.level))];
+            belly.cells = (0..n_cells).map(cell).collect();
+        }
+    }
+
     /// Which cells it reads.
     pub fn reach(&self) -> Reach {
         let mut reach = Reach::BASE;
@@ -114,7 +144,8 @@ fn wheel_taps(wheels: &WheelLayout, centre_m: [f64; 2], yaw_rad: f64, resolution
         let [east, north] = place.map(|v| v - v.floor());
         let weights =
             [(1.0 - east) * (1.0 - north), east * (1.0 - north), (1.0 - east) * north, east * north];
-        WheelTap { offset: place.map(|v| v.floor() as i64), weights: weights.map(|w| w as f32) }
+        let offset = place.map(|v| v.floor() as i64);
+        WheelTap { offset, weights: weights.map(|w| w as f32), deltas: [0; 4] }
     })
 }
 
@@ -129,7 +160,7 @@ fn touched_spans(footprint: &Footprint, centre_m: [f64; 2], yaw_rad: f64, resolu
         let [west, east] = strip_extent(&corners, row as f64 + EDGE, row as f64 + 1.0 - EDGE)?;
         let start = (west + EDGE).floor() as i64;
         let n_cells = ((east - EDGE).floor() as i64 - start + 1).max(0) as usize;
-        (n_cells > 0).then_some(Span { start: [start, row], n_cells })
+        (n_cells > 0).then_some(Span { start: [start, row], n_cells, deltas: [0; 2] })
     };
     rows.filter_map(span).collect()
 }
@@ -173,7 +204,9 @@ fn belly_spans(belly: &Footprint, centre_m: [f64; 2], yaw_rad: f64, resolution_m
         let Some(start) = cols.clone().find(|&col| under(col, row)) else { continue };
         let n_cells = cols.filter(|&col| under(col, row)).count();
         let start_m = body_m(start, row).map(|v| v as f32);
-        spans.push(BellySpan { span: Span { start: [start, row], n_cells }, start_m });
+        let span = Span { start: [start, row], n_cells, deltas: [0; 2] };
+        let level = n_cells.ilog2() as usize;
+        spans.push(BellySpan { span, start_m, level, stretches: [0; 2], cells: Vec::new() });
     }
     spans
 }

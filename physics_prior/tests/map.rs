@@ -6,7 +6,7 @@ use bicycle::lanes::Instructions;
 use std::f64::consts::PI;
 
 use physics_prior::{
-    Assumption, PosePrior, PriorConfig, PriorConfigError, PriorField, PriorMap, PriorMapError,
+    Assumption, BlockPrior, PoseLine, PriorConfig, PriorConfigError, PriorField, PriorMap, PriorMapError,
 };
 use proptest::prelude::*;
 use surfaces::*;
@@ -360,19 +360,23 @@ fn a_pose_prior_has_the_risk_of_the_map() {
     let map = prior_map(&CAR, &assumption, &ground, 5);
     let mut field = PriorField::new(&CAR, &assumption, 0.1, geometry, 5, Instructions::widest()).unwrap();
     assert_eq!(field.read_all(&ground).unwrap(), CellRegion::whole(&geometry));
-    let nothing = PosePrior { moments: PartialMoments::uniform(), is_blocked: false, is_unknown: false };
+    let mut block = BlockPrior::default();
     let mut n_unknown = 0;
-    for (row, col) in (1..29).flat_map(|row| (1..33).map(move |col| (row, col))) {
-        let mut priors = [nothing; 5];
-        field.pose_priors([col as i64, row as i64], &mut priors);
-        for (yaw, prior) in priors.iter().enumerate() {
-            let found = map.risk_map().view().risk(Cell { row, col }, yaw);
-            let free = prior.moments.risk(level(0.3));
-            assert_eq!(prior.is_blocked, found.is_blocked());
-            let expected = if prior.is_blocked { free.blocked() } else { free };
-            assert!(close(found, expected, 1e-5), "{row} {col} {yaw} {found:?} {expected:?}");
-            n_unknown += usize::from(prior.is_unknown);
+    for (row, yaw) in (1..29).flat_map(|row| (0..5).map(move |yaw| (row, yaw))) {
+        // Two lines of a block, neither of whole spans.
+        let [first, second] = [1, 22].map(|col| PoseLine { cell: [col, row], yaw, n_lanes: 21 });
+        field.read_line(&first, 0, &mut block);
+        field.read_line(&PoseLine { n_lanes: 11, ..second }, 21, &mut block);
+        for lane in 0..32 {
+            let found = map.risk_map().view().risk(Cell { row: row as usize, col: 1 + lane }, yaw);
+            let moments = block.moments.each_ref().map(|moments| moments.each_ref().map(|bin| bin.0[lane]));
+            let free = PartialMoments { moments }.risk(level(0.3));
+            let is_blocked = block.n_obstacles.0[lane] > 0.0;
+            assert_eq!(is_blocked, found.is_blocked());
+            let expected = if is_blocked { free.blocked() } else { free };
+            assert!(close(found, expected, 1e-5), "{row} {lane} {yaw} {found:?} {expected:?}");
+            n_unknown += usize::from(block.unknown.0[lane] > 0.0);
         }
     }
-    assert!(n_unknown < 28 * 32 * 5 / 2, "{n_unknown}");
+    assert!(0 < n_unknown && n_unknown < 28 * 32 * 5 / 2, "{n_unknown}");
 }

@@ -2,6 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::{Lanes, Portable};
+
 /// Which instructions every kernel between scan and command uses.
 ///
 /// Results are the same on every machine that has the set, and differ in rounding between sets.
@@ -35,6 +37,26 @@ pub enum Instructions {
     Avx2(pulp::x86::V3),
     /// What every machine has.
     Portable,
+}
+
+/// A piece of work that is written for packs of any width.
+pub trait OnLanes {
+    /// What comes of it.
+    type Output;
+    /// Does it; must be inlined whole to run on the instructions of `lanes`.
+    fn run<L: Lanes>(self, lanes: L) -> Self::Output;
+}
+
+#[cfg(target_arch = "x86_64")]
+struct Vectorized<L, W>(L, W);
+
+#[cfg(target_arch = "x86_64")]
+impl<L: Lanes, W: OnLanes> pulp::NullaryFnOnce for Vectorized<L, W> {
+    type Output = W::Output;
+    #[inline(always)]
+    fn call(self) -> W::Output {
+        self.1.run(self.0)
+    }
 }
 
 /// An instruction set that the machine lacks.
@@ -94,6 +116,18 @@ impl Instructions {
             #[cfg(target_arch = "x86_64")]
             Self::Avx2(simd) => pulp::Simd::vectorize(simd, work),
             Self::Portable => work.with_simd(pulp::Scalar),
+        }
+    }
+
+    /// Runs work that is written for packs of any width.
+    #[inline]
+    pub fn run_on_lanes<W: OnLanes>(self, work: W) -> W::Output {
+        match self {
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx512(lanes) => lanes.vectorize(Vectorized(lanes, work)),
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx2(lanes) => lanes.vectorize(Vectorized(lanes, work)),
+            Self::Portable => work.run(Portable),
         }
     }
 }

@@ -1,15 +1,33 @@
 //! Packs on the instruction sets that `pulp` detects at run time.
 #![cfg(target_arch = "x86_64")]
 
-use super::{Constant, Lanes, polynomial};
+use super::{Constant, Lanes, SPAN, polynomial};
 use pulp::x86::{V3, V4};
-use pulp::{Simd, b16, cast, f32x8, f32x16, m32x8, u32x8};
+use pulp::{Simd, b16, bytemuck, cast, f32x8, f32x16, m32x8, u32x8};
 
 macro_rules! arithmetic_of_pulp {
     () => {
         #[inline(always)]
         fn constant(self, value: Constant) -> Self::Value {
             self.splat_f32s(value.single())
+        }
+        #[inline(always)]
+        fn single(self, value: f32) -> Self::Value {
+            self.splat_f32s(value)
+        }
+        #[inline(always)]
+        fn of_span(self, span: &[f32; SPAN], offset: usize) -> Self::Value {
+            let packs: [Self::Value; SPAN / <Self as Lanes>::WIDTH] = bytemuck::cast(*span);
+            packs[offset / Self::WIDTH]
+        }
+        #[inline(always)]
+        fn to_span(self, value: Self::Value, span: &mut [f32; SPAN], offset: usize) {
+            let pack: [f32; <Self as Lanes>::WIDTH] = cast!(value);
+            span[offset..offset + Self::WIDTH].copy_from_slice(&pack);
+        }
+        #[inline(always)]
+        fn magnitude(self, a: Self::Value) -> Self::Value {
+            self.abs_f32s(a)
         }
         #[inline(always)]
         fn add(self, a: Self::Value, b: Self::Value) -> Self::Value {
@@ -90,6 +108,10 @@ impl Lanes for V4 {
         b16(a.0 | b.0)
     }
     #[inline(always)]
+    fn any(self, mask: b16) -> bool {
+        mask.0 != 0
+    }
+    #[inline(always)]
     fn add_where(self, mask: b16, a: f32x16, b: f32x16) -> f32x16 {
         cast!(self.avx512f._mm512_mask_add_ps(cast!(a), mask.0, cast!(a), cast!(b)))
     }
@@ -121,6 +143,10 @@ impl Lanes for V3 {
     #[inline(always)]
     fn or(self, a: m32x8, b: m32x8) -> m32x8 {
         self.or_m32s(a, b)
+    }
+    #[inline(always)]
+    fn any(self, mask: m32x8) -> bool {
+        self.avx._mm256_movemask_ps(cast!(mask)) != 0
     }
     #[inline(always)]
     fn add_where(self, mask: m32x8, a: f32x8, b: f32x8) -> f32x8 {

@@ -1,6 +1,6 @@
 //! Packs in plain Rust, for machines without AVX2: the compiler makes of them what the target has.
 
-use super::{Constant, Lanes, polynomial};
+use super::{Constant, Lanes, SPAN, polynomial};
 
 /// Eight f32 without any instruction beyond the target's baseline.
 #[derive(Clone, Copy, Debug)]
@@ -24,6 +24,18 @@ impl Lanes for Portable {
     #[inline(always)]
     fn constant(self, value: Constant) -> Pack {
         [value.single(); 8]
+    }
+    #[inline(always)]
+    fn single(self, value: f32) -> Pack {
+        [value; 8]
+    }
+    #[inline(always)]
+    fn of_span(self, span: &[f32; SPAN], offset: usize) -> Pack {
+        std::array::from_fn(|i| span[offset + i])
+    }
+    #[inline(always)]
+    fn to_span(self, value: Pack, span: &mut [f32; SPAN], offset: usize) {
+        span[offset..offset + Self::WIDTH].copy_from_slice(&value);
     }
     #[inline(always)]
     fn add(self, a: Pack, b: Pack) -> Pack {
@@ -54,6 +66,10 @@ impl Lanes for Portable {
         zip(a, b, |a, b| if a > b { a } else { b })
     }
     #[inline(always)]
+    fn magnitude(self, a: Pack) -> Pack {
+        a.map(f32::abs)
+    }
+    #[inline(always)]
     fn sqrt(self, a: Pack) -> Pack {
         a.map(|a| if a <= 0.0 { 0.0 } else { a.sqrt() })
     }
@@ -76,6 +92,10 @@ impl Lanes for Portable {
     #[inline(always)]
     fn or(self, a: [bool; 8], b: [bool; 8]) -> [bool; 8] {
         std::array::from_fn(|i| a[i] | b[i])
+    }
+    #[inline(always)]
+    fn any(self, mask: [bool; 8]) -> bool {
+        mask.into_iter().any(|holds| holds)
     }
     #[inline(always)]
     fn select(self, mask: [bool; 8], yes: Pack, no: Pack) -> Pack {

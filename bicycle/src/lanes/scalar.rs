@@ -1,6 +1,6 @@
 //! The reference: one number, f64, functions that are the same on every platform.
 
-use super::{Constant, Lanes};
+use super::{Constant, Lanes, SPAN};
 
 /// One f64.
 #[derive(Clone, Copy, Debug)]
@@ -13,6 +13,15 @@ impl Lanes for Scalar {
 
     fn constant(self, value: Constant) -> f64 {
         value.value()
+    }
+    fn single(self, value: f32) -> f64 {
+        f64::from(value)
+    }
+    fn of_span(self, span: &[f32; SPAN], offset: usize) -> f64 {
+        f64::from(span[offset])
+    }
+    fn to_span(self, value: f64, span: &mut [f32; SPAN], offset: usize) {
+        span[offset] = value as f32;
     }
     fn add(self, a: f64, b: f64) -> f64 {
         a + b
@@ -35,6 +44,9 @@ impl Lanes for Scalar {
     fn max(self, a: f64, b: f64) -> f64 {
         if a > b { a } else { b }
     }
+    fn magnitude(self, a: f64) -> f64 {
+        a.abs()
+    }
     fn sqrt(self, a: f64) -> f64 {
         if a <= 0.0 { 0.0 } else { a.sqrt() }
     }
@@ -52,6 +64,9 @@ impl Lanes for Scalar {
     }
     fn or(self, a: bool, b: bool) -> bool {
         a || b
+    }
+    fn any(self, mask: bool) -> bool {
+        mask
     }
     fn select(self, mask: bool, yes: f64, no: f64) -> f64 {
         if mask { yes } else { no }

@@ -1,20 +1,13 @@
 //! The surface as networks read it: layers of plain numbers, padded so that no patch needs a bounds check.
 
-use physics_prior::Ratio;
+use physics_prior::{Planes, Ratio};
 use terrain::{GridGeometry, GridMap, SurfaceCell, TerrainClass};
 
-/// Lanes that are read at a time: a read may go so far beyond the last cell of a row.
-pub(super) const SPAN: usize = 16;
-
 /// Layers over a window of the surface's lattice.
-///
-/// Risk cells may lie several surface cells apart. The columns of a row are therefore kept in as many planes as that
-/// distance, so that what adjacent risk cells read is adjacent in memory whatever the ratio of the resolutions.
 #[derive(Clone, Debug)]
 pub(super) struct PatchGround {
-    window: GridGeometry,
-    n_planes: usize,
-    n_plane_cols: usize,
+    planes: Planes,
+    ratio: Ratio,
     per_height_m: f32,
     /// Height of the ground, 0 where unknown [m].
     pub heights_m: Vec<f32>,
@@ -23,36 +16,48 @@ pub(super) struct PatchGround {
     /// Features of the cover: height of vegetation over the height scale, probability of loose ground, probability of
     /// an obstacle.
     pub cover: [Vec<f32>; 3],
+    /// Number of unknown cells south and west of each corner of a cell, row-major with one more row and column than
+    /// the window: how many a rectangle holds is four reads.
+    n_unknown: Vec<u32>,
 }
 
 impl PatchGround {
     /// Ground of which nothing is known yet.
     pub fn unknown(window: GridGeometry, ratio: Ratio, height_scale_m: f64) -> Self {
-        Self::over(window, ratio.stride() as usize, (1.0 / height_scale_m) as f32)
+        Self::over(window, ratio, (1.0 / height_scale_m) as f32)
     }
 
     /// Unknown ground of another window.
     pub fn moved_to(&self, window: GridGeometry) -> Self {
-        Self::over(window, self.n_planes, self.per_height_m)
+        Self::over(window, self.ratio, self.per_height_m)
     }
 
-    fn over(window: GridGeometry, n_planes: usize, per_height_m: f32) -> Self {
-        let n_plane_cols = window.n_cols.div_ceil(n_planes) + SPAN;
-        let n = window.n_rows * n_planes * n_plane_cols;
+    fn over(window: GridGeometry, ratio: Ratio, per_height_m: f32) -> Self {
+        let planes = Planes::new(window, ratio);
         Self {
-            window,
-            n_planes,
-            n_plane_cols,
+            planes,
+            ratio,
             per_height_m,
-            heights_m: vec![0.0; n],
-            unknown: vec![1.0; n],
-            cover: std::array::from_fn(|_| vec![0.0; n]),
+            heights_m: planes.layer(0.0),
+            unknown: planes.layer(1.0),
+            cover: std::array::from_fn(|_| planes.layer(0.0)),
+            n_unknown: vec![0; (window.n_rows + 1) * (window.n_cols + 1)],
         }
     }
 
     /// Where the cells lie.
     pub fn window(&self) -> &GridGeometry {
-        &self.window
+        self.planes.window()
+    }
+
+    /// How the layers lie in memory.
+    pub fn planes(&self) -> &Planes {
+        &self.planes
+    }
+
+    /// How many surface cells the base advances from one footprint of a line to the next.
+    pub fn stride(&self) -> i64 {
+        self.ratio.stride()
     }
 
     /// Features per metre of height.
@@ -60,40 +65,48 @@ impl PatchGround {
         self.per_height_m
     }
 
-    /// Position of a lattice cell in the layers; the cell that lies [`Ratio::stride`] further east follows it.
-    pub fn index(&self, lattice: [i64; 2]) -> usize {
-        self.place(lattice) as usize
-    }
-
-    /// How much further a cell lies than the base cell that it is an offset from: the same for every base cell whose
-    /// column leaves the same remainder over [`Ratio::stride`].
-    pub fn delta(&self, base: [i64; 2], offset: [i64; 2]) -> isize {
-        let cell = [0, 1].map(|axis| base[axis] + offset[axis]);
-        self.place(cell) - self.place(base)
-    }
-
-    fn place(&self, lattice: [i64; 2]) -> isize {
-        let [col, row] = [0, 1].map(|axis| (lattice[axis] - self.window.origin[axis]) as isize);
-        let (n_planes, n_plane_cols) = (self.n_planes as isize, self.n_plane_cols as isize);
-        (row * n_planes + col.rem_euclid(n_planes)) * n_plane_cols + col.div_euclid(n_planes)
+    /// Whether every cell of a lattice rectangle within the window is known, both corners included.
+    pub fn is_known(&self, min: [i64; 2], max: [i64; 2]) -> bool {
+        let [west, south] = self.window().origin;
+        let sum = |[col, row]: [i64; 2]| {
+            self.n_unknown[(row - south) as usize * (self.window().n_cols + 1) + (col - west) as usize]
+        };
+        let [east, north] = max.map(|index| index + 1);
+        sum([east, north]) + sum(min) == sum([min[0], north]) + sum([east, min[1]])
     }
 
     /// Takes over the surface's lattice rectangle from `min` to `max`, both inclusive. What lies beyond the surface,
     /// and what is no number, is unknown.
     pub fn read(&mut self, surface: &GridMap<SurfaceCell>, min: [i64; 2], max: [i64; 2]) {
-        let first: [i64; 2] = std::array::from_fn(|axis| min[axis].max(self.window.origin[axis]));
-        let n = [self.window.n_cols, self.window.n_rows];
-        let last: [i64; 2] =
-            std::array::from_fn(|axis| max[axis].min(self.window.origin[axis] + n[axis] as i64 - 1));
+        let GridGeometry { origin, n_cols, n_rows, .. } = *self.window();
+        let n = [n_cols, n_rows];
+        let first: [i64; 2] = std::array::from_fn(|axis| min[axis].max(origin[axis]));
+        let last: [i64; 2] = std::array::from_fn(|axis| max[axis].min(origin[axis] + n[axis] as i64 - 1));
         for row in first[1]..=last[1] {
             for col in first[0]..=last[0] {
                 self.read_cell([col, row], cell_at(surface, [col, row]));
             }
         }
+        self.count_unknown(first[1]);
+    }
+
+    /// Brings the numbers of unknown cells up to date from a lattice row on.
+    fn count_unknown(&mut self, first_row: i64) {
+        let GridGeometry { origin: [west, south], n_cols, n_rows, .. } = *self.window();
+        for row in (first_row - south) as usize..n_rows {
+            let (below, above) = self.n_unknown.split_at_mut((row + 1) * (n_cols + 1));
+            let below = &below[row * (n_cols + 1)..];
+            let mut n_in_row = 0;
+            for col in 0..n_cols {
+                let index = self.planes.index([west + col as i64, south + row as i64]);
+                n_in_row += u32::from(self.unknown[index] > 0.0);
+                above[col + 1] = below[col + 1] + n_in_row;
+            }
+        }
     }
 
     fn read_cell(&mut self, lattice: [i64; 2], cell: &SurfaceCell) {
-        let index = self.index(lattice);
+        let index = self.planes.index(lattice);
         let is_known = cell.is_known() && cell.height_m.is_finite();
         self.heights_m[index] = if is_known { cell.height_m } else { 0.0 };
         self.unknown[index] = if is_known { 0.0 } else { 1.0 };
@@ -107,10 +120,45 @@ impl PatchGround {
     /// Bytes of the layers.
     pub fn n_bytes(&self) -> usize {
         let layers = [&self.heights_m, &self.unknown].into_iter().chain(&self.cover);
-        layers.map(|layer| size_of_val(&**layer)).sum()
+        layers.map(|layer| size_of_val(&**layer)).sum::<usize>() + size_of_val(&*self.n_unknown)
     }
 }
 
 fn cell_at(surface: &GridMap<SurfaceCell>, lattice: [i64; 2]) -> &SurfaceCell {
     surface.at_lattice(lattice).unwrap_or(&SurfaceCell::UNKNOWN)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const WINDOW: GridGeometry = GridGeometry { resolution_m: 0.1, origin: [-3, 4], n_rows: 7, n_cols: 9 };
+
+    fn is_hole([col, row]: [i64; 2]) -> bool {
+        (5 * col + 3 * row).rem_euclid(13) == 0
+    }
+
+    #[test]
+    fn a_rectangle_is_known_if_each_of_its_cells_is() {
+        let cell = |index: usize| {
+            let terrain::Cell { row, col } = WINDOW.cell(index);
+            let is_hole = is_hole([col as i64 - 3, row as i64 + 4]);
+            if is_hole { SurfaceCell::UNKNOWN } else { SurfaceCell::certain(0.1, TerrainClass::Open, 0.0) }
+        };
+        let values = (0..WINDOW.n_cells()).map(cell).collect();
+        #[allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
+        let (surface, ratio) = (GridMap::from_values(WINDOW, values).unwrap(), Ratio::new(0.3, 0.2).unwrap());
+        let mut ground = PatchGround::unknown(WINDOW, ratio, 0.1);
+        // In two parts, as what changes comes.
+        ground.read(&surface, [-3, 4], [5, 10]);
+        ground.read(&surface, [0, 7], [2, 8]);
+        let cells = || (4..11).flat_map(|row| (-3..6).map(move |col| [col, row]));
+        for (min, max) in cells().flat_map(|min| cells().map(move |max| (min, max))) {
+            if min[0] > max[0] || min[1] > max[1] {
+                continue;
+            }
+            let holes = (min[1]..=max[1]).flat_map(|row| (min[0]..=max[0]).map(move |col| [col, row]));
+            assert_eq!(ground.is_known(min, max), !holes.into_iter().any(is_hole), "{min:?} {max:?}");
+        }
+    }
 }

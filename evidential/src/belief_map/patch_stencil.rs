@@ -1,38 +1,51 @@
 //! Where a footprint's features lie relative to the cell under its rear axle.
 
+use physics_prior::Planes;
 use terrain::PatchShape;
 
-use super::patch_ground::PatchGround;
 use crate::FeatureLayout;
 
-/// Four cells around a point and their bilinear weights.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Tap {
+/// Four cells around some points.
+#[derive(Clone, Debug)]
+pub(super) struct Quad {
     /// South-west cell of the four: columns, rows from the base cell.
-    offset: [i64; 2],
-    /// South-west, south-east, north-west, north-east.
-    pub weights: [f32; 4],
-    /// [`PatchGround::delta`] of the same.
+    pub offset: [i64; 2],
+    /// [`Planes::delta`] of the south-west, south-east, north-west and north-east cell.
     pub deltas: [isize; 4],
+    pub points: Vec<Point>,
 }
 
-/// A sample of the cover patch.
+/// A point between the centres of four cells.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct CoverTap {
-    /// The height there, which may be unknown.
-    pub height: Tap,
-    /// The cell that holds the point: columns, rows from the base cell.
-    nearest: [i64; 2],
-    /// [`PatchGround::delta`] of the same.
-    pub nearest_delta: isize,
+pub(super) struct Point {
+    /// Which one it is of those that were asked for.
+    pub index: usize,
+    /// How far east and north of the south-west cell's centre it lies [cells].
+    pub place: [f32; 2],
+    /// Bilinear weights: south-west, south-east, north-west, north-east.
+    pub weights: [f32; 4],
+}
+
+/// The cell that holds a point.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Nearest {
+    /// Columns, rows from the base cell.
+    offset: [i64; 2],
+    /// [`Planes::delta`] of the same.
+    pub delta: isize,
 }
 
 /// Everything that [`FeatureLayout`] samples, for one yaw and one place within the base cell.
 #[derive(Clone, Debug)]
 pub(super) struct PatchStencil {
-    pub wheels: [Tap; 4],
-    pub heights: Vec<Tap>,
-    pub cover: Vec<CoverTap>,
+    pub wheels: Vec<Quad>,
+    /// Points of the fine patch.
+    pub heights: Vec<Quad>,
+    /// Points of the cover patch, where the height may be unknown.
+    pub cover: Vec<Quad>,
+    /// The same points, for what is not interpolated.
+    pub nearest: Vec<Nearest>,
+    pub n_heights: usize,
 }
 
 impl PatchStencil {
@@ -48,39 +61,36 @@ impl PatchStencil {
             let rows = (0..shape.n_rows).flat_map(|row| cols.clone().map(move |col| (row, col)));
             rows.map(|(row, col)| place(shape.body_point_m(row, col))).collect()
         };
-        let cover = |point: [f64; 2]| CoverTap {
-            height: tap(point),
-            nearest: point.map(|v| (v + EDGE).floor() as i64),
-            nearest_delta: 0,
-        };
+        let cover = points(&layout.cover_patch);
+        let nearest =
+            |point: &[f64; 2]| Nearest { offset: point.map(|v| (v + EDGE).floor() as i64), delta: 0 };
         Self {
-            wheels: layout.wheels.body_points_m().map(|point| tap(place(point))),
-            heights: points(&layout.height_patch).into_iter().map(tap).collect(),
-            cover: points(&layout.cover_patch).into_iter().map(cover).collect(),
+            wheels: quads(&layout.wheels.body_points_m().map(place)),
+            heights: quads(&points(&layout.height_patch)),
+            nearest: cover.iter().map(nearest).collect(),
+            cover: quads(&cover),
+            n_heights: layout.height_patch.n_samples(),
         }
     }
 
     /// Finds its cells in the layers of the ground, for base cells like the given one.
-    pub fn lay_on(&mut self, ground: &PatchGround, base: [i64; 2]) {
-        let heights = self.wheels.iter_mut().chain(&mut self.heights);
-        for tap in heights.chain(self.cover.iter_mut().map(|cover| &mut cover.height)) {
-            let [east, north] = tap.offset;
+    pub fn lay_on(&mut self, planes: &Planes, base: [i64; 2]) {
+        for quad in self.wheels.iter_mut().chain(&mut self.heights).chain(&mut self.cover) {
+            let [east, north] = quad.offset;
             let corners = [[east, north], [east + 1, north], [east, north + 1], [east + 1, north + 1]];
-            tap.deltas = corners.map(|corner| ground.delta(base, corner));
+            quad.deltas = corners.map(|corner| planes.delta(base, corner));
         }
-        for cover in &mut self.cover {
-            cover.nearest_delta = ground.delta(base, cover.nearest);
+        for nearest in &mut self.nearest {
+            nearest.delta = planes.delta(base, nearest.offset);
         }
     }
 
     /// Smallest and largest offset that it reads, each columns, rows.
     pub fn reach(&self) -> [[i64; 2]; 2] {
-        let taps =
-            self.wheels.iter().chain(&self.heights).chain(self.cover.iter().map(|cover| &cover.height));
         let [mut least, mut most] = [[0; 2]; 2];
-        for tap in taps {
-            least = [0, 1].map(|axis| tap.offset[axis].min(least[axis]));
-            most = [0, 1].map(|axis| (tap.offset[axis] + 1).max(most[axis]));
+        for quad in self.wheels.iter().chain(&self.heights).chain(&self.cover) {
+            least = [0, 1].map(|axis| quad.offset[axis].min(least[axis]));
+            most = [0, 1].map(|axis| (quad.offset[axis] + 1).max(most[axis]));
         }
         // The cell that holds a point of the cover is one of the four around it.
         [least, most]
@@ -90,15 +100,22 @@ impl PatchStencil {
 /// A point within this share of a cell of an edge lies beyond it, so that rounding does not decide [cells].
 const EDGE: f64 = 1e-6;
 
-/// The four cells around a point that is given in cells from the base cell's corner.
-fn tap(point: [f64; 2]) -> Tap {
-    // Cell centres lie half a cell from the corner.
-    let place = point.map(|v| v - 0.5);
-    let [east, north] = place.map(|v| v - v.floor());
-    let weights = [(1.0 - east) * (1.0 - north), east * (1.0 - north), (1.0 - east) * north, east * north];
-    Tap {
-        offset: place.map(|v| v.floor() as i64),
-        weights: weights.map(|weight| weight as f32),
-        deltas: [0; 4],
+/// Points, given in cells from the base cell's corner, by the four cells around them.
+fn quads(points: &[[f64; 2]]) -> Vec<Quad> {
+    let mut quads: Vec<Quad> = Vec::new();
+    for (index, point) in points.iter().enumerate() {
+        // Cell centres lie half a cell from the corner.
+        let from_centre = point.map(|v| v - 0.5);
+        let offset = from_centre.map(|v| v.floor() as i64);
+        let [east, north] = from_centre.map(|v| v - v.floor());
+        let weights =
+            [(1.0 - east) * (1.0 - north), east * (1.0 - north), (1.0 - east) * north, east * north];
+        let place = [east, north].map(|v| v as f32);
+        let point = Point { index, place, weights: weights.map(|weight| weight as f32) };
+        match quads.iter_mut().find(|quad| quad.offset == offset) {
+            Some(quad) => quad.points.push(point),
+            None => quads.push(Quad { offset, deltas: [0; 4], points: vec![point] }),
+        }
     }
+    quads
 }

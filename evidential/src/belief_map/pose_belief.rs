@@ -1,9 +1,10 @@
 //! What is believed of one pose.
 
+use bicycle::lanes::Block;
 use physics_prior::PriorBelief;
 use traversability::Pmf;
 
-use super::extraction::{Extract, Features, Line};
+use super::extraction::{Extract, Grounding, Line};
 use super::patch_stencil::PatchStencil;
 use super::{BeliefLayers, BeliefMap};
 use crate::predictor::{Prediction, PredictorError};
@@ -73,19 +74,19 @@ impl BeliefLayers {
             start + least[axis] >= 0 && start + most[axis] < n[axis] as i64
         });
         is_inside.then_some(())?;
-        stencil.lay_on(&self.ground, base);
-        let mut features = Features::default();
-        features.reserve(layout.n_features(), 1);
-        self.instructions.run(Extract {
+        stencil.lay_on(self.ground.planes(), base);
+        let mut features = vec![Block::ZERO; layout.n_features()];
+        let mut grounding = Grounding::default();
+        self.instructions.run_on_lanes(Extract {
             ground: &self.ground,
-            line: Line { stencil: &stencil, base, n_lanes: 1 },
+            line: Line { stencil: &stencil, reach: stencil.reach(), base, n_lanes: 1 },
             first_lane: 0,
             features: &mut features,
+            grounding: &mut grounding,
         });
-        let is_grounded = features.ungrounded[0] == 0.0;
-        let values = (0..layout.n_features()).filter_map(|feature| features.lanes::<1>(feature, 0));
-        let values: Vec<f32> = values.map(|lane| lane[0]).collect();
-        let is_partly_unknown = features.partly_unknown[0] > 0.0;
+        let is_grounded = grounding.ungrounded.0[0] == 0.0;
+        let values = features.iter().map(|feature| feature.0[0]).collect();
+        let is_partly_unknown = grounding.partly_unknown.0[0] > 0.0;
         Some(PoseFeatures { features: is_grounded.then_some(values), is_partly_unknown })
     }
 

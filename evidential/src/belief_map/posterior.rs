@@ -3,30 +3,26 @@
 //! The posterior's mean is a mixture of the prior's distribution and the networks'. Partial moments mix the same way
 //! (see [`traversability::PartialMoments`]), so no posterior distribution is ever built.
 
+use bicycle::lanes::Block;
 use pulp::Simd;
 use traversability::{Bins, N_BINS};
-
-use crate::predictor::{Lanes, N_LANES, register_of};
-
-/// Partial moments of a block by bin.
-pub(super) type BlockMoments<'a> = [&'a [f32; N_LANES]; N_BINS];
 
 /// What CVaR is taken of: a mixture of two distributions.
 #[derive(Clone, Copy)]
 pub(super) struct Mixture<'a> {
     /// Of the prior.
-    pub moments: BlockMoments<'a>,
+    pub moments: &'a [Block; N_BINS],
     /// Of the networks.
-    pub probabilities: &'a [Lanes; N_BINS],
+    pub probabilities: &'a [Block; N_BINS],
     /// Share of the networks.
-    pub share: &'a Lanes,
+    pub share: &'a Block,
 }
 
 /// Share of the networks in the posterior, s n / (n_prior + s n).
 #[inline(always)]
-pub(super) fn learned_share<S: Simd>(simd: S, evidence: &Lanes, prior_evidence: f32) -> Lanes {
-    let mut share = Lanes::ZERO;
-    for register in 0..Lanes::n_registers::<S>() {
+pub(super) fn learned_share<S: Simd>(simd: S, evidence: &Block, prior_evidence: f32) -> Block {
+    let mut share = Block::ZERO;
+    for register in 0..Block::n_registers::<S>() {
         let evidence = evidence.get::<S>(register);
         let total = simd.add_f32s(simd.splat_f32s(prior_evidence), evidence);
         share.set::<S>(register, simd.div_f32s(evidence, total));
@@ -37,10 +33,10 @@ pub(super) fn learned_share<S: Simd>(simd: S, evidence: &Lanes, prior_evidence: 
 impl Mixture<'_> {
     /// CVaR of traction from the left: the largest v - E[(v - Z)^+] / level.
     #[inline(always)]
-    pub fn traction_cvar<S: Simd>(&self, simd: S, per_level: f32) -> Lanes {
+    pub fn traction_cvar<S: Simd>(&self, simd: S, per_level: f32) -> Block {
         let values = Bins::TRACTION.values();
-        let mut cvar = Lanes::ZERO;
-        for register in 0..Lanes::n_registers::<S>() {
+        let mut cvar = Block::ZERO;
+        for register in 0..Block::n_registers::<S>() {
             let (mut mass, mut moment) = (simd.splat_f32s(0.0), simd.splat_f32s(0.0));
             let mut best = simd.splat_f32s(values[0]);
             for bin in 1..N_BINS {
@@ -59,10 +55,10 @@ impl Mixture<'_> {
 
     /// CVaR of an angle from the right, the smallest v + E[(Z - v)^+] / level [rad].
     #[inline(always)]
-    pub fn angle_cvar_rad<S: Simd>(&self, simd: S, per_level: f32) -> Lanes {
+    pub fn angle_cvar_rad<S: Simd>(&self, simd: S, per_level: f32) -> Block {
         let values = Bins::ATTITUDE.values();
-        let mut cvar = Lanes::ZERO;
-        for register in 0..Lanes::n_registers::<S>() {
+        let mut cvar = Block::ZERO;
+        for register in 0..Block::n_registers::<S>() {
             let (mut mass, mut moment) = (simd.splat_f32s(0.0), simd.splat_f32s(0.0));
             let mut best = simd.splat_f32s(values[N_BINS - 1]);
             for bin in (0..N_BINS - 1).rev() {
@@ -81,7 +77,7 @@ impl Mixture<'_> {
 
     #[inline(always)]
     fn mixed<S: Simd>(&self, simd: S, register: usize, bin: usize, learned: S::f32s) -> S::f32s {
-        let prior = register_of::<S>(self.moments[bin], register);
+        let prior = self.moments[bin].get::<S>(register);
         let share = self.share.get::<S>(register);
         let rest = simd.sub_f32s(simd.splat_f32s(1.0), share);
         simd.add_f32s(simd.mul_f32s(prior, rest), simd.mul_f32s(learned, share))

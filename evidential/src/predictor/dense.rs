@@ -5,12 +5,13 @@
 //! general matrix product, whose packing would cost as much as these products do.
 #![allow(clippy::needless_range_loop, reason = "arithmetic in registers: one index over several arrays")]
 
+use bicycle::lanes::Block;
 use pulp::Simd;
 
-use super::lanes::{Lanes, mul_add};
+use super::lanes::mul_add;
 
 /// Outputs that are accumulated in registers at a time.
-const ROWS: usize = 12;
+const ROWS: usize = 8;
 
 /// What follows a layer's sums.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -63,9 +64,9 @@ impl Dense {
         size_of_val(&*self.weights) + size_of_val(&*self.biases)
     }
 
-    /// The outputs of a block of footprints, one [`Lanes`] per output.
+    /// The outputs of a block of footprints, one [`Block`] per output.
     #[inline(always)]
-    pub fn apply<S: Simd>(&self, simd: S, input: &[Lanes], output: &mut [Lanes]) {
+    pub fn apply<S: Simd>(&self, simd: S, input: &[Block], output: &mut [Block]) {
         let slope = match self.activation {
             Activation::Linear => simd.splat_f32s(1.0),
             Activation::Leaky(slope) => simd.splat_f32s(slope),
@@ -73,17 +74,12 @@ impl Dense {
         let tiles = self.weights.chunks_exact(input.len()).zip(&self.biases);
         for ((weights, biases), output) in tiles.zip(output[..self.n_outputs].chunks_mut(ROWS)) {
             let tile = Tile { weights, biases, slope };
-            // As many sums as there are registers for; a short last tile needs fewer.
+            // As many sums as there are registers for; every weight that is read serves several.
             match (registers::<S>(), output.len()) {
-                (Registers::Many, 9..) => tile.apply::<12, 2>(simd, input, output),
-                (Registers::Many, 5..=8) => tile.apply::<8, 2>(simd, input, output),
-                (Registers::Many, _) => tile.apply::<4, 2>(simd, input, output),
-                (Registers::Few, 9..) => tile.apply::<12, 1>(simd, input, output),
-                (Registers::Few, 5..=8) => tile.apply::<8, 1>(simd, input, output),
-                (Registers::Few, _) => tile.apply::<4, 1>(simd, input, output),
-                (Registers::OfOne, 9..) => tile.apply::<12, 4>(simd, input, output),
-                (Registers::OfOne, 5..=8) => tile.apply::<8, 4>(simd, input, output),
-                (Registers::OfOne, _) => tile.apply::<4, 4>(simd, input, output),
+                (Registers::Many, 5..) => tile.apply::<8, 3>(simd, 0, input, output),
+                (Registers::Many, _) => tile.apply::<4, 3>(simd, 0, input, output),
+                (Registers::Few, _) => tile.apply_in_halves::<2>(simd, input, output),
+                (Registers::OfOne, _) => tile.apply_in_halves::<8>(simd, input, output),
             }
         }
     }
@@ -116,13 +112,27 @@ struct Tile<'a, S: Simd> {
 }
 
 impl<S: Simd> Tile<'_, S> {
-    /// `N` of the outputs, `V` registers of lanes at a time.
+    /// The outputs by fours, `V` registers of footprints at a time.
     #[inline(always)]
-    fn apply<const N: usize, const V: usize>(&self, simd: S, input: &[Lanes], output: &mut [Lanes]) {
-        for start in (0..Lanes::n_registers::<S>()).step_by(V) {
+    fn apply_in_halves<const V: usize>(&self, simd: S, input: &[Block], output: &mut [Block]) {
+        for (half, output) in output.chunks_mut(ROWS / 2).enumerate() {
+            self.apply::<{ ROWS / 2 }, V>(simd, half * ROWS / 2, input, output);
+        }
+    }
+
+    /// `N` of the outputs from the first on, `V` registers of footprints at a time.
+    #[inline(always)]
+    fn apply<const N: usize, const V: usize>(
+        &self,
+        simd: S,
+        first: usize,
+        input: &[Block],
+        output: &mut [Block],
+    ) {
+        for start in (0..Block::n_registers::<S>()).step_by(V) {
             let mut sums = [[simd.splat_f32s(0.0); V]; N];
             for row in 0..N {
-                sums[row] = [simd.splat_f32s(self.biases[row]); V];
+                sums[row] = [simd.splat_f32s(self.biases[first + row]); V];
             }
             for (weights, lanes) in self.weights.iter().zip(input) {
                 let mut values = [simd.splat_f32s(0.0); V];
@@ -130,17 +140,20 @@ impl<S: Simd> Tile<'_, S> {
                     values[v] = lanes.get::<S>(start + v);
                 }
                 for row in 0..N {
-                    let weight = simd.splat_f32s(weights[row]);
+                    let weight = simd.splat_f32s(weights[first + row]);
                     for v in 0..V {
                         sums[row][v] = mul_add(simd, weight, values[v], sums[row][v]);
                     }
                 }
             }
-            for (sums, lanes) in sums.iter().zip(output.iter_mut()) {
+            // By index, so that the sums stay in registers to the end.
+            for row in 0..N {
+                let Some(lanes) = output.get_mut(row) else { break };
                 for v in 0..V {
-                    let is_positive = simd.greater_than_f32s(sums[v], simd.splat_f32s(0.0));
-                    let below = simd.mul_f32s(self.slope, sums[v]);
-                    lanes.set::<S>(start + v, simd.select_f32s(is_positive, sums[v], below));
+                    let sum = sums[row][v];
+                    let is_positive = simd.greater_than_f32s(sum, simd.splat_f32s(0.0));
+                    let below = simd.mul_f32s(self.slope, sum);
+                    lanes.set::<S>(start + v, simd.select_f32s(is_positive, sum, below));
                 }
             }
         }
@@ -149,10 +162,11 @@ impl<S: Simd> Tile<'_, S> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::lanes::N_LANES;
+    use bicycle::lanes::BLOCK;
+
     use super::*;
 
-    struct Apply<'a>(&'a Dense, &'a [Lanes], &'a mut [Lanes]);
+    struct Apply<'a>(&'a Dense, &'a [Block], &'a mut [Block]);
 
     impl pulp::WithSimd for Apply<'_> {
         type Output = ();
@@ -173,19 +187,19 @@ mod tests {
             let n_inputs = 7;
             let weights: Vec<f32> = (0..n_outputs * n_inputs).map(number).collect();
             let biases: Vec<f32> = (0..n_outputs).map(|k| number(k + 5)).collect();
-            let input: Vec<Lanes> =
-                (0..n_inputs).map(|k| Lanes(std::array::from_fn(|lane| number(k * 3 + lane)))).collect();
+            let input: Vec<Block> =
+                (0..n_inputs).map(|k| Block(std::array::from_fn(|lane| number(k * 3 + lane)))).collect();
             for (activation, slope) in [(Activation::Linear, 1.0), (Activation::Leaky(0.25), 0.25)] {
                 let layer = Dense::new(&weights, &biases, activation);
-                let mut plain = vec![Lanes::ZERO; n_outputs];
+                let mut plain = vec![Block::ZERO; n_outputs];
                 pulp::WithSimd::with_simd(Apply(&layer, &input, &mut plain), pulp::Scalar);
                 for instructions in bicycle::lanes::Instructions::all() {
-                    let mut found = vec![Lanes::ZERO; n_outputs];
+                    let mut found = vec![Block::ZERO; n_outputs];
                     instructions.run(Apply(&layer, &input, &mut found));
                     assert_eq!(found, plain, "{instructions:?}");
                 }
                 for (output, lanes) in plain.iter().enumerate() {
-                    for lane in 0..N_LANES {
+                    for lane in 0..BLOCK {
                         let products =
                             (0..n_inputs).map(|k| weights[output * n_inputs + k] * input[k].0[lane]);
                         let sum = biases[output] + products.sum::<f32>();

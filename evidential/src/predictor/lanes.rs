@@ -1,42 +1,10 @@
-//! Numbers of several footprints side by side, and the functions that the networks need of them.
+//! The functions that the networks need of numbers of several footprints side by side.
 //!
 //! Everything is written in registers of any instruction set. What is no matrix product keeps products and sums apart,
 //! so that every instruction set gives the same bits.
 
-use pulp::{Simd, bytemuck};
-
-/// Footprints that are worked on together: two registers of the widest instruction set.
-pub(crate) const N_LANES: usize = 32;
-
-/// One number of [`N_LANES`] footprints.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[repr(C, align(64))]
-pub(crate) struct Lanes(pub [f32; N_LANES]);
-
-impl Lanes {
-    pub const ZERO: Self = Self([0.0; N_LANES]);
-
-    /// Registers that hold the lanes.
-    pub const fn n_registers<S: Simd>() -> usize {
-        N_LANES / S::F32_LANES
-    }
-
-    #[inline(always)]
-    pub fn get<S: Simd>(&self, register: usize) -> S::f32s {
-        register_of::<S>(&self.0, register)
-    }
-
-    #[inline(always)]
-    pub fn set<S: Simd>(&mut self, register: usize, values: S::f32s) {
-        bytemuck::cast_slice_mut::<f32, S::f32s>(&mut self.0)[register] = values;
-    }
-}
-
-/// One of the registers that hold some lanes.
-#[inline(always)]
-pub(crate) fn register_of<S: Simd>(lanes: &[f32; N_LANES], register: usize) -> S::f32s {
-    bytemuck::cast_slice::<f32, S::f32s>(lanes)[register]
-}
+use bicycle::lanes::Block;
+use pulp::Simd;
 
 /// a b + c, rounded once by the sets that do both in one instruction; registers of one number have none.
 #[inline(always)]
@@ -126,8 +94,8 @@ pub(crate) fn sigmoid<S: Simd>(simd: S, x: S::f32s) -> S::f32s {
 
 /// Turns one number per bin into probabilities.
 #[inline(always)]
-pub(crate) fn softmax<S: Simd, const N: usize>(simd: S, logits: &mut [Lanes; N]) {
-    for register in 0..Lanes::n_registers::<S>() {
+pub(crate) fn softmax<S: Simd, const N: usize>(simd: S, logits: &mut [Block; N]) {
+    for register in 0..Block::n_registers::<S>() {
         let mut largest = logits[0].get::<S>(register);
         for logit in &logits[1..] {
             largest = simd.max_f32s(largest, logit.get::<S>(register));
@@ -183,7 +151,7 @@ mod tests {
 
     #[test]
     fn probabilities_follow_from_logits_of_any_size() {
-        let mut logits = [Lanes([-1e6; N_LANES]), Lanes([3.0; N_LANES]), Lanes([3.0 + 2f32.ln(); N_LANES])];
+        let mut logits = [Block::filled(-1e6), Block::filled(3.0), Block::filled(3.0 + 2f32.ln())];
         logits[0].0[1] = 1e6;
         softmax(pulp::Scalar, &mut logits);
         for (found, expected) in [(logits[0].0[0], 0.0), (logits[1].0[0], 1.0 / 3.0), (logits[0].0[1], 1.0)] {
@@ -192,13 +160,13 @@ mod tests {
     }
 
     /// All functions of some numbers.
-    struct Functions<'a>(&'a mut [Lanes; 3]);
+    struct Functions<'a>(&'a mut [Block; 3]);
 
     impl pulp::WithSimd for Functions<'_> {
         type Output = ();
 
         fn with_simd<S: Simd>(self, simd: S) {
-            for register in 0..Lanes::n_registers::<S>() {
+            for register in 0..Block::n_registers::<S>() {
                 let x = self.0[0].get::<S>(register);
                 self.0[1].set::<S>(register, super::exp(simd, x));
                 self.0[2].set::<S>(register, sigmoid(simd, super::ln(simd, simd.mul_f32s(x, x))));
@@ -209,7 +177,7 @@ mod tests {
 
     #[test]
     fn every_instruction_set_gives_the_same_bits() {
-        let x = Lanes(std::array::from_fn(|lane| 0.37 * lane as f32 - 5.0));
+        let x = Block(std::array::from_fn(|lane| 0.37 * lane as f32 - 5.0));
         let mut plain = [x; 3];
         pulp::WithSimd::with_simd(Functions(&mut plain), pulp::Scalar);
         for instructions in bicycle::lanes::Instructions::all() {

@@ -1,11 +1,12 @@
 //! The networks of a checkpoint, ready to be laid over blocks of footprints.
 
+use bicycle::lanes::Block;
 use pulp::Simd;
 use traversability::N_BINS;
 
 use super::CheckpointError;
 use super::dense::{Activation, Dense};
-use super::lanes::{Lanes, exp, sigmoid, softmax};
+use super::lanes::{exp, sigmoid, softmax};
 use super::radial_flow::RadialFlow;
 use super::tensors::Tensors;
 use crate::{Architecture, Checkpoint, Standardisation};
@@ -39,21 +40,29 @@ const LOG_EVIDENCE_MAX: f32 = 30.0;
 #[derive(Clone, Debug)]
 pub(crate) struct BlockPrediction {
     /// Probabilities, shape [parameter, bin].
-    pub probabilities: [[Lanes; N_BINS]; N_HEADS],
+    pub probabilities: [[Block; N_BINS]; N_HEADS],
     /// Logarithm of the flow's density; zero without a flow.
-    pub log_density: Lanes,
+    pub log_density: Block,
     /// Evidence per parameter; zero without a flow.
-    pub evidence: [Lanes; N_HEADS],
+    pub evidence: [Block; N_HEADS],
 }
 
 /// Buffers for one block, so that nothing is allocated on the way.
 #[derive(Clone, Debug)]
 pub(crate) struct Workspace {
     /// Features, shape [feature].
-    pub input: Vec<Lanes>,
-    layers: [Vec<Lanes>; 2],
-    hidden: Vec<Lanes>,
+    pub input: Vec<Block>,
+    layers: [Vec<Block>; 2],
+    hidden: Vec<Block>,
     pub prediction: BlockPrediction,
+}
+
+impl Workspace {
+    /// Bytes of what it allocated.
+    pub fn n_bytes(&self) -> usize {
+        let blocks = [&self.input, &self.hidden].into_iter().chain(&self.layers);
+        blocks.map(|blocks| size_of_val(&**blocks)).sum()
+    }
 }
 
 impl Network {
@@ -113,13 +122,13 @@ impl Network {
     pub fn workspace(&self, n_inputs: usize) -> Workspace {
         let widest = self.encoder.iter().map(Dense::n_outputs).max().unwrap_or(0);
         Workspace {
-            input: vec![Lanes::ZERO; n_inputs],
-            layers: [vec![Lanes::ZERO; widest], vec![Lanes::ZERO; widest]],
-            hidden: vec![Lanes::ZERO; self.hidden.n_outputs()],
+            input: vec![Block::ZERO; n_inputs],
+            layers: [vec![Block::ZERO; widest], vec![Block::ZERO; widest]],
+            hidden: vec![Block::ZERO; self.hidden.n_outputs()],
             prediction: BlockPrediction {
-                probabilities: [[Lanes::ZERO; N_BINS]; N_HEADS],
-                log_density: Lanes::ZERO,
-                evidence: [Lanes::ZERO; N_HEADS],
+                probabilities: [[Block::ZERO; N_BINS]; N_HEADS],
+                log_density: Block::ZERO,
+                evidence: [Block::ZERO; N_HEADS],
             },
         }
     }
@@ -169,14 +178,14 @@ impl EvidenceHead {
     fn apply<S: Simd>(
         &self,
         simd: S,
-        latent: &mut [Lanes],
-        hidden: &[Lanes],
+        latent: &mut [Block],
+        hidden: &[Block],
         prediction: &mut BlockPrediction,
     ) {
         self.scales.apply(simd, hidden, &mut prediction.evidence);
         self.flow.log_density(simd, latent, &mut prediction.log_density);
         let (least, most) = (simd.splat_f32s(-LOG_EVIDENCE_MAX), simd.splat_f32s(LOG_EVIDENCE_MAX));
-        for register in 0..Lanes::n_registers::<S>() {
+        for register in 0..Block::n_registers::<S>() {
             let log_density = prediction.log_density.get::<S>(register);
             let log_count = simd.add_f32s(log_density, simd.splat_f32s(self.log_budget));
             let count = exp(simd, simd.min_f32s(simd.max_f32s(log_count, least), most));
