@@ -41,7 +41,7 @@ impl Frame {
     }
 
     /// How a frame of one time lies in that of another; `None` where both are the same.
-    pub fn from_to(&self, from_ns: u64, to_ns: u64) -> Option<Jump> {
+    pub fn shift(&self, from_ns: u64, to_ns: u64) -> Option<Jump> {
         if to_ns < from_ns {
             return self.between(to_ns, from_ns).map(|jump| jump.inverse());
         }
@@ -68,10 +68,10 @@ mod tests {
         assert_eq!(frame.since(99), Some(first.then(&second)), "before both");
         assert_eq!(frame.since(100), Some(second), "in the frame of the first");
         assert_eq!(frame.since(200), None, "in the frame of now");
-        assert_eq!(frame.from_to(99, 100), Some(first));
-        assert_eq!(frame.from_to(100, 250), Some(second));
-        assert_eq!(frame.from_to(250, 99), Some(first.then(&second).inverse()), "and back");
-        assert_eq!(frame.from_to(100, 199), None);
+        assert_eq!(frame.shift(99, 100), Some(first));
+        assert_eq!(frame.shift(100, 250), Some(second));
+        assert_eq!(frame.shift(250, 99), Some(first.then(&second).inverse()), "and back");
+        assert_eq!(frame.shift(100, 199), None);
         frame.forget();
         assert_eq!(frame.since(0), None);
     }

@@ -180,7 +180,7 @@ impl Pilot {
 
     fn ask(&mut self, chart: &Chart<'_>, odometry: &Odometry, destination: &Destination) -> Decision {
         let before_ns = self.chart_at_ns.replace(chart.odometry_at_ns);
-        if let Some(jump) = before_ns.and_then(|at_ns| self.frame.from_to(at_ns, chart.odometry_at_ns)) {
+        if let Some(jump) = before_ns.and_then(|at_ns| self.frame.shift(at_ns, chart.odometry_at_ns)) {
             self.controller.carry(|pose| jump.pose(pose));
         }
         let (state, goal_m) = self.on_chart(odometry, chart.odometry_at_ns, destination.goal_m);

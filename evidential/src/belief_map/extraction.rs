@@ -110,12 +110,12 @@ impl Extract<'_> {
             for quad in &self.line.stencil.heights {
                 let corners = spans.corners(&self.ground.heights_m, quad);
                 let mut planes = [Plane::level(lanes); N];
-                for n in 0..N {
-                    planes[n] = Plane::through(scale.relative(corners[n], reference_m[n]));
+                for ((plane, corners), reference_m) in planes.iter_mut().zip(corners).zip(reference_m) {
+                    *plane = Plane::through(scale.relative(corners, reference_m));
                 }
                 for point in &quad.points {
-                    for n in 0..N {
-                        let height = limited(lanes, planes[n].at(lanes, point));
+                    for (n, plane) in planes.iter().enumerate() {
+                        let height = limited(lanes, plane.at(lanes, point));
                         write(&mut self.features[point.index], height, lane + n * SPAN, offset);
                     }
                 }
@@ -240,8 +240,8 @@ impl<L: Lanes, const N: usize> Spans<L, N> {
     fn corners(&self, layer: &[f32], quad: &Quad) -> [[Real<L>; 4]; N] {
         let mut corners = [[self.lanes.real(0.0); 4]; N];
         for (n, corners) in corners.iter_mut().enumerate() {
-            for corner in 0..4 {
-                corners[corner] = self.read(layer, quad.deltas[corner], n);
+            for (corner, delta) in corners.iter_mut().zip(quad.deltas) {
+                *corner = self.read(layer, delta, n);
             }
         }
         corners

@@ -158,7 +158,7 @@ impl BeliefLayers {
         }
         // What is all unknown has nothing that networks could judge; they have no share in it below.
         let unknown = &block.prior.unknown.lanes()[..n_lanes];
-        if unknown.iter().any(|&is_unknown| is_unknown == 0.0) {
+        if unknown.contains(&0.0) {
             for part in parts {
                 self.extract(part, block);
             }
