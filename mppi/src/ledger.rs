@@ -1,13 +1,12 @@
 //! What went to the vehicle and when, whoever decided it, as far back as delays reach.
 
-use bicycle::Command;
 use std::collections::VecDeque;
 
 /// Past commands with the times of their sending, in memory that is taken once.
 #[derive(Clone, Debug)]
-pub(crate) struct Ledger {
+pub(crate) struct Ledger<C> {
     /// Oldest first.
-    sent: VecDeque<Sent>,
+    sent: VecDeque<Sent<C>>,
     n_most: usize,
     /// What is sent sooner than this after another takes its place [s].
     apart_s: f64,
@@ -15,12 +14,12 @@ pub(crate) struct Ledger {
 }
 
 #[derive(Clone, Copy, Debug)]
-struct Sent {
+struct Sent<C> {
     at_s: f64,
-    command: Command,
+    command: C,
 }
 
-impl Ledger {
+impl<C: Copy> Ledger<C> {
     /// Commands of the last `reach_s`, one every `period_s` or more seldom. Commands that follow each other in less than
     /// half of that count as one, the later.
     pub(crate) fn new(reach_s: f64, period_s: f64) -> Self {
@@ -41,7 +40,7 @@ impl Ledger {
     }
 
     /// A command is sent now.
-    pub(crate) fn send(&mut self, command: Command) {
+    pub(crate) fn send(&mut self, command: C) {
         if self.sent.back().is_some_and(|last| self.now_s - last.at_s < self.apart_s) {
             return self.correct(command);
         }
@@ -52,7 +51,7 @@ impl Ledger {
     }
 
     /// The last command went out as another.
-    pub(crate) fn correct(&mut self, command: Command) {
+    pub(crate) fn correct(&mut self, command: C) {
         match self.sent.back_mut() {
             Some(last) => last.command = command,
             None => self.sent.push_back(Sent { at_s: self.now_s, command }),
@@ -60,12 +59,12 @@ impl Ledger {
     }
 
     /// The last command.
-    pub(crate) fn last(&self) -> Option<Command> {
+    pub(crate) fn last(&self) -> Option<C> {
         self.sent.back().map(|sent| sent.command)
     }
 
     /// The command in force `age_s` ago; before the first, the first; before any, none.
-    pub(crate) fn at(&self, age_s: f64) -> Option<Command> {
+    pub(crate) fn at(&self, age_s: f64) -> Option<C> {
         let n_sent = self.sent.partition_point(|sent| self.now_s - sent.at_s >= age_s);
         self.sent.get(n_sent.saturating_sub(1)).map(|sent| sent.command)
     }
@@ -74,6 +73,7 @@ impl Ledger {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use bicycle::Command;
     use rand::{RngExt, SeedableRng};
     use rand_xoshiro::Xoshiro256PlusPlus;
 
