@@ -145,19 +145,19 @@ impl PriorMap {
         let field = &self.field;
         let geometry = *self.map.geometry();
         let n_yaws = self.map.view().n_yaws;
-        let (risks, ground) = self.map.arrays_mut();
-        let cells = dirty.rows.start * geometry.n_cols..dirty.rows.end * geometry.n_cols;
-        let risk_rows =
-            risks[cells.start * n_yaws..cells.end * n_yaws].par_chunks_mut(geometry.n_cols * n_yaws);
-        let lines = risk_rows.zip(ground[cells].par_chunks_mut(geometry.n_cols));
-        lines.enumerate().for_each(|(line, (risks, ground))| {
-            let lattice_row = geometry.origin[1] + (dirty.rows.start + line) as i64;
-            for col in dirty.cols.clone() {
-                let cell = [geometry.origin[0] + col as i64, lattice_row];
-                field.risks(cell, &mut risks[col * n_yaws..(col + 1) * n_yaws]);
-                ground[col] = field.ground_in(cell, surface);
-            }
+        self.map.fill(|risks, ground| {
+            let cells = dirty.rows.start * geometry.n_cols..dirty.rows.end * geometry.n_cols;
+            let risk_rows =
+                risks[cells.start * n_yaws..cells.end * n_yaws].par_chunks_mut(geometry.n_cols * n_yaws);
+            let lines = risk_rows.zip(ground[cells].par_chunks_mut(geometry.n_cols));
+            lines.enumerate().for_each(|(line, (risks, ground))| {
+                let lattice_row = geometry.origin[1] + (dirty.rows.start + line) as i64;
+                for col in dirty.cols.clone() {
+                    let cell = [geometry.origin[0] + col as i64, lattice_row];
+                    field.risks(cell, &mut risks[col * n_yaws..(col + 1) * n_yaws]);
+                    ground[col] = field.ground_in(cell, surface);
+                }
+            });
         });
-        self.map.close_border();
     }
 }
