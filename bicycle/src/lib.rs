@@ -44,5 +44,6 @@ pub use model::{GroundSample, Model, ModelError};
 pub use motion::{Command, ImuSample, Odometry, State};
 pub use stepper::{Asked, LaneState, Rates, Stepper};
 pub use vehicle::{
-    Axle, Body, Drivetrain, Geometry, Limits, Servo, Suspension, Tyre, Vehicle, VehicleError, Wheel,
+    Axle, Body, Differential, Drivetrain, Geometry, Limits, Servo, Suspension, Tyre, Vehicle, VehicleError,
+    Wheel,
 };

@@ -134,6 +134,22 @@ pub struct Drivetrain {
     pub rear_share: f64,
     /// First-order response time of the torque [s].
     pub response_s: f64,
+    /// How the driven wheels share their speeds; limited slip where nothing is said.
+    #[serde(default)]
+    pub differential: Differential,
+}
+
+/// What stands between the driven wheels, within the axles and between them alike.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Differential {
+    /// Wheels turn as they like under equal torques left and right.
+    Open,
+    /// Torque goes from faster to slower wheels in proportion to their difference of speed.
+    #[default]
+    LimitedSlip,
+    /// All driven wheels turn alike.
+    Locked,
 }
 
 /// Steering servo.
@@ -152,12 +168,26 @@ pub struct Servo {
 pub struct Tyre {
     /// Rolling resistance over load on hard ground [-].
     pub rolling_resistance: f64,
-    /// Relaxation length of the lateral force [m].
+    /// Way that the tyre rolls until its force has followed a step of slip to 63 % [m].
     pub relaxation_length_m: f64,
+    /// Force over load and slip for little slip, along and across alike [-]: across, the cornering stiffness per radian
+    /// over load. [`Tyre::CAR_SLIP_STIFFNESS`] where nothing is said.
+    #[serde(default = "car_slip_stiffness")]
+    pub slip_stiffness: f64,
     /// Relative loss of friction for a load twice the static one [-].
     pub load_sensitivity: f64,
     /// Radial stiffness [N/m].
     pub radial_stiffness_n_per_m: f64,
+}
+
+impl Tyre {
+    /// Slip stiffness of a car-like tyre of no special make. Real ones lie around 10 to 15, low and
+    /// wide ones above 20: that of CommonRoad's vehicle models has 22 (Althoff and Wuersching 2020, table 7).
+    pub const CAR_SLIP_STIFFNESS: f64 = 12.0;
+}
+
+fn car_slip_stiffness() -> f64 {
+    Tyre::CAR_SLIP_STIFFNESS
 }
 
 /// A vehicle description that cannot be.
@@ -204,6 +234,7 @@ impl Vehicle {
             ("drivetrain.brake_torque_max_nm", self.drivetrain.brake_torque_max_nm),
             ("drivetrain.power_max_w", self.drivetrain.power_max_w),
             ("tyre.relaxation_length_m", self.tyre.relaxation_length_m),
+            ("tyre.slip_stiffness", self.tyre.slip_stiffness),
             ("tyre.radial_stiffness_n_per_m", self.tyre.radial_stiffness_n_per_m),
         ];
         let not_negative = [

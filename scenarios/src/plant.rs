@@ -32,8 +32,8 @@ use terrain::Pose;
 
 use crate::{Deviation, DeviationError, Motion, World};
 use chassis::{BodyMotion, Chassis, Wrench};
-pub(crate) use drivetrain::DIFFERENTIAL_S_PER_M;
 use drivetrain::Drivetrain;
+pub(crate) use drivetrain::LIMITED_SLIP_S_PER_M;
 use envelope::Disc;
 use ground::Ground;
 use linkage::Linkage;
@@ -256,6 +256,12 @@ impl Plant {
                 WheelInput { steering_rad: steering_rad[i], torque: torques[i], anti_roll_n: anti_roll_n[i] };
             let wheel = (&mut self.wheels[i], &self.struts[i]);
             self.gear[i].step(wheel, &input, &self.motion, &self.ground, &mut wrench);
+        }
+        let [spin_radps, inertia_kgm2] =
+            [self.wheels.map(|wheel| wheel.spin_radps), self.wheels.map(|wheel| wheel.inertia_kgm2)];
+        let coupling_nm = self.drivetrain.coupling_nm(spin_radps, inertia_kgm2, self.step_s);
+        for (wheel, torque_nm) in self.wheels.iter_mut().zip(coupling_nm) {
+            wheel.couple(torque_nm, self.step_s, &mut wrench);
         }
         for load in &mut self.loads {
             load.push(&self.motion, &self.ground, self.step_s, &mut wrench);

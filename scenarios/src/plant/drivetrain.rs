@@ -1,13 +1,13 @@
-//! Speed servo, motor, limited-slip differentials and brakes.
+//! Speed servo, motor, differentials and brakes.
 
-use bicycle::Vehicle;
+use bicycle::{Differential, Vehicle};
 
 use super::rest::{Rest, Stance};
 use crate::Deviation;
 
 /// Torque between a wheel and the mean of the driven wheels, per difference of circumferential speed, over the
-/// wheel's load: how tight the limited-slip differentials are [s/m].
-pub(crate) const DIFFERENTIAL_S_PER_M: f64 = 0.25;
+/// wheel's load: how tight limited-slip differentials are [s/m].
+pub(crate) const LIMITED_SLIP_S_PER_M: f64 = 0.25;
 /// Time the servo adds to the motor's response [s].
 const SERVO_TIME_S: f64 = 0.08;
 /// The integral's time over the servo's [-].
@@ -41,6 +41,7 @@ pub(crate) struct Drivetrain {
     drive_share: [f64; 4],
     /// Share of the brake torque on each wheel.
     brake_share: [f64; 4],
+    /// Torque between a driven wheel and their mean per difference of turning; infinite where they are locked [N m s].
     differential_nms: f64,
     /// The commanded speed, ramped.
     reference_mps: f64,
@@ -78,7 +79,11 @@ impl Drivetrain {
             response_s: vehicle.drivetrain.response_s,
             drive_share: pairs(rear),
             brake_share: pairs(brake_rear),
-            differential_nms: DIFFERENTIAL_S_PER_M * mean_load_n * radius_m * radius_m,
+            differential_nms: match vehicle.drivetrain.differential {
+                Differential::Open => 0.0,
+                Differential::LimitedSlip => LIMITED_SLIP_S_PER_M * mean_load_n * radius_m * radius_m,
+                Differential::Locked => f64::INFINITY,
+            },
             reference_mps: 0.0,
             expected_mps: 0.0,
             integral_n: 0.0,
@@ -107,7 +112,7 @@ impl Drivetrain {
         self
     }
 
-    /// Torques for wheels that turn at `spin_radps` relative to the body.
+    /// Torques of motor and brakes for wheels that turn at `spin_radps` relative to the body.
     pub(crate) fn step(&mut self, commanded_mps: f64, spin_radps: [f64; 4], step_s: f64) -> [WheelTorque; 4] {
         let mean_radps = self.mean_spin_radps(&spin_radps);
         let understood_mps = self.understood_mps(commanded_mps, step_s);
@@ -116,14 +121,30 @@ impl Drivetrain {
         self.drive_nm += share * (drive_nm - self.drive_nm);
         // Brakes let go at once: else the motor starts against them.
         self.brake_nm += if brake_nm < self.brake_nm { 1.0 } else { share } * (brake_nm - self.brake_nm);
-        std::array::from_fn(|i| {
-            let driven = if self.drive_share[i] > 0.0 { 1.0 } else { 0.0 };
-            let differential_nm = driven * self.differential_nms * (mean_radps - spin_radps[i]);
-            WheelTorque {
-                drive_nm: self.drive_nm * self.drive_share[i] + differential_nm,
-                brake_nm: self.brake_nm * self.brake_share[i],
-            }
+        std::array::from_fn(|i| WheelTorque {
+            drive_nm: self.drive_nm * self.drive_share[i],
+            brake_nm: self.brake_nm * self.brake_share[i],
         })
+    }
+
+    /// Torques of the differentials on wheels that turn at `spin_radps` and have these inertias; their sum is zero.
+    ///
+    /// Implicit: with J a wheel's inertia and k the differentials' torque per speed, the wheel ends the step at
+    /// w' = w + k (m - w') dt / J, where m is the mean of all w'. Solved, m is the mean of w weighted by
+    /// 1 / (1 / J + 1 / (k dt)), and the torque is that weight times (m - w) / dt: for locked wheels, whose k is
+    /// infinite, too.
+    pub(crate) fn coupling_nm(&self, spin_radps: [f64; 4], inertia_kgm2: [f64; 4], step_s: f64) -> [f64; 4] {
+        if self.differential_nms == 0.0 {
+            return [0.0; 4];
+        }
+        let slack = 1.0 / (self.differential_nms * step_s);
+        let weight: [f64; 4] = std::array::from_fn(|i| match self.drive_share[i] > 0.0 {
+            true => 1.0 / (1.0 / inertia_kgm2[i] + slack),
+            false => 0.0,
+        });
+        let sum = |value: [f64; 4]| (0..4).map(|i| weight[i] * value[i]).sum::<f64>();
+        let mean_radps = sum(spin_radps) / sum([1.0; 4]);
+        std::array::from_fn(|i| weight[i] * (mean_radps - spin_radps[i]) / step_s)
     }
 
     /// What is left of a command behind smoothing and dead band and under the battery's voltage, which falls while

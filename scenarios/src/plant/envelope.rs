@@ -45,7 +45,7 @@ pub(crate) struct Contact {
     pub normal: Vector3<f64>,
     /// Elastic force along the normal [N].
     pub force_n: f64,
-    /// From the hub to the centre of pressure [m].
+    /// From the hub to the centre of pressure, against the normal [m].
     pub loaded_radius_m: f64,
 }
 
@@ -66,7 +66,8 @@ pub(crate) struct Envelope {
 struct Pressure {
     force: Vector2<f64>,
     weight: f64,
-    radius: f64,
+    /// Weighted places of the pressed pieces, seen from the hub.
+    place: Vector2<f64>,
     lateral: f64,
 }
 
@@ -143,8 +144,8 @@ impl Envelope {
         if pressure.weight <= 0.0 {
             return None;
         }
-        let loaded_radius_m = pressure.radius / pressure.weight;
         let inward = pressure.force.normalize();
+        let loaded_radius_m = -pressure.place.dot(&inward) / pressure.weight;
         let point_m = disc.hub_m + disc.left * (pressure.lateral / pressure.weight)
             - (disc.ahead * inward.x + disc.up * inward.y) * loaded_radius_m;
         let cross_slope = self.cross_slope(ground, disc, &point_m);
@@ -163,23 +164,23 @@ impl Envelope {
             // The ground point in the wheel's plane, seen from the hub.
             let point = Vector2::new(ahead_m, above_m * disc.up.z - self.radius_m);
             if let Some(before) = previous
-                && let Some((force, radius_m)) = self.segment(before, point)
+                && let Some((force, middle)) = self.segment(before, point)
             {
                 let weight = force.norm();
                 pressure.force += force;
                 pressure.weight += weight;
-                pressure.radius += weight * radius_m;
+                pressure.place += middle * weight;
                 pressure.lateral += weight * left_m;
             }
             previous = Some(point);
         }
     }
 
-    /// Force of a straight piece of ground, from back to front, on a disc over its stiffness [m2], and the distance
-    /// of the pressed part from the hub [m]: the integral of (r - rho) times the direction to the hub over the part
+    /// Force of a straight piece of ground, from back to front, on a disc over its stiffness [m2], and the middle of the
+    /// pressed part seen from the hub [m]: the integral of (r - rho) times the direction to the hub over the part
     /// inside.
     #[inline]
-    fn segment(&self, start: Vector2<f64>, end: Vector2<f64>) -> Option<(Vector2<f64>, f64)> {
+    fn segment(&self, start: Vector2<f64>, end: Vector2<f64>) -> Option<(Vector2<f64>, Vector2<f64>)> {
         let r = self.radius_m;
         let run = end - start;
         let squares = [start.norm_squared(), end.norm_squared()];
@@ -212,7 +213,7 @@ impl Envelope {
         let inward = d * (r * ratio.ln() - (b - a));
         let along = -(r * (rho_b - rho_a) - 0.5 * (rho_b * rho_b - rho_a * rho_a));
         let rim = r * (RIM_SHARE * r - nearest).max(0.0) * (b - a) / (2.0 * r);
-        Some((normal * (inward + rim) + tangent * along, rho(0.5 * (a + b), d)))
+        Some((normal * (inward + rim) + tangent * along, tangent * (0.5 * (a + b)) - normal * d))
     }
 
     /// Rise of the ground per length along the axle, seen in the wheel's frame [-].
@@ -273,6 +274,10 @@ mod tests {
             let contact = tyre.touch(&ground(|_, _| 0.0), &Disc::new(hub_m, heading).unwrap()).unwrap();
             assert!((contact.force_n - 4000.0).abs() < 1e-6, "{contact:?}");
             assert!((contact.normal - Vector3::z()).norm() < 1e-9, "{contact:?}");
+            assert!(
+                (contact.loaded_radius_m - 0.38).abs() < 1e-9 && contact.point_m.z.abs() < 1e-9,
+                "{contact:?}"
+            );
         }
     }
 

@@ -8,7 +8,7 @@ use super::drivetrain::WheelTorque;
 use super::envelope::{Contact, Disc, Envelope};
 use super::ground::Ground;
 use super::rest::Rest;
-use super::tyre::{Footing, Shear, Tyre};
+use super::tyre::{Bristles, Footing, Tyre};
 use super::vegetation::{Immersion, Stems};
 use crate::Deviation;
 
@@ -43,7 +43,11 @@ pub(crate) struct Wheel {
     turning_radps: f64,
     /// Turning relative to the body [rad/s].
     pub spin_radps: f64,
-    shear: Shear,
+    /// Inertia that the wheel opposed to torques in the last step, the ground's hold on it included [kg m2].
+    pub inertia_kgm2: f64,
+    /// Along the axle.
+    left: Vector3<f64>,
+    bristles: Bristles,
     stems: Stems,
     /// Normal force of the ground [N].
     pub load_n: f64,
@@ -117,7 +121,9 @@ impl Wheel {
             travel_mps: 0.0,
             turning_radps: 0.0,
             spin_radps: 0.0,
-            shear: Shear::default(),
+            inertia_kgm2: 0.0,
+            left: Vector3::y(),
+            bristles: Bristles::default(),
             stems: Stems::default(),
             load_n: 0.0,
             force_n: Vector3::zeros(),
@@ -129,6 +135,14 @@ impl Wheel {
     pub(crate) fn friction_n(&self) -> Vector3<f64> {
         let normal = self.contact.map_or_else(Vector3::zeros, |contact| contact.normal);
         self.force_n - normal * self.force_n.dot(&normal)
+    }
+
+    /// Turns by a torque between this wheel and others for a step, which pushes back on the body that carries both.
+    pub(crate) fn couple(&mut self, torque_nm: f64, step_s: f64, wrench: &mut Wrench) {
+        let change_radps = torque_nm * step_s / self.inertia_kgm2;
+        self.turning_radps += change_radps;
+        self.spin_radps += change_radps;
+        wrench.torque_nm -= self.left * torque_nm;
     }
 
     /// Where the wheel is on a body that moves so.
@@ -210,6 +224,7 @@ impl RunningGear {
         wrench: &mut Wrench,
     ) {
         let frame = wheel.frame(body, input.steering_rad);
+        wheel.left = frame.left;
         let hub_mps = body.velocity_at_mps(&frame.hub_m) + frame.up * wheel.travel_mps;
         let body_radps = body.angular_radps.dot(&frame.left);
         wheel.contact =
@@ -263,7 +278,7 @@ impl RunningGear {
             load_n: slide.load_n,
             friction: soil.friction,
         };
-        let grip = self.tyre.grip(&mut wheel.shear, &footing, self.step_s);
+        let grip = self.tyre.grip(&mut wheel.bristles, &footing, self.step_s);
         let resistance = self.rolling_resistance + f64::from(soil.rolling_resistance);
         wheel.load_n = slide.load_n;
         Stand {
@@ -277,7 +292,7 @@ impl RunningGear {
     }
 
     fn hang(&self, wheel: &mut Wheel) -> Stand {
-        wheel.shear = Shear::default();
+        wheel.bristles = Bristles::default();
         wheel.load_n = 0.0;
         Stand { force_n: Vector3::zeros(), grip_nm: 0.0, grip_nms: 0.0, resistance_nm: 0.0 }
     }
@@ -285,6 +300,7 @@ impl RunningGear {
     /// Turns the wheel by a step, implicitly in the slip, and gives the torque of the shaft on the wheel [N m].
     fn turn(&self, wheel: &mut Wheel, stand: &Stand, torque: &WheelTorque, body_radps: f64) -> f64 {
         let inertia_kgm2 = self.spin_inertia_kgm2 + self.step_s * stand.grip_nms;
+        wheel.inertia_kgm2 = inertia_kgm2;
         let free_radps = wheel.turning_radps + self.step_s * (torque.drive_nm - stand.grip_nm) / inertia_kgm2;
         // Brake and rolling resistance stop the wheel at most; they do not turn it back.
         let most_nm = torque.brake_nm + stand.resistance_nm;

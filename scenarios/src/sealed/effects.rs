@@ -8,7 +8,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 use super::fleet::TestMachine;
 use super::{Made, Magnitude};
 use crate::Deviation;
-use crate::plant::{AIR_KGPM3, DIFFERENTIAL_S_PER_M, GRAVITY_MPS2};
+use crate::plant::{AIR_KGPM3, GRAVITY_MPS2, LIMITED_SLIP_S_PER_M};
 
 /// Their ids, which are the catalogue's.
 pub const EFFECTS: [&str; 24] = [
@@ -105,17 +105,20 @@ fn tyres(id: &str, of: impl Fn([f64; 3]) -> f64, sign: f64, machine: &TestMachin
     let fast_mps = machine.speeds_mps[1];
     let gradient_s2_per_m2 = of([0.2, 0.35, 0.6]) / (fast_mps * fast_mps);
     let wheelbase_m = machine.vehicle.geometry.wheelbase_m;
-    let usual_mps = 0.6 * fast_mps;
+    let stiffness = machine.vehicle.tyre.slip_stiffness;
     if sign > 0.0 {
-        // The axle gives way under m v^2 kappa and under the moment that the differentials put on the front axle.
+        // The axle gives way under m v^2 kappa and under the moment that the differentials, which yield in series with
+        // the tyres, put on the front axle.
+        let usual_mps = 0.6 * fast_mps;
+        let coupling_s_per_m = 1.0 / (1.0 / LIMITED_SLIP_S_PER_M + usual_mps / stiffness);
         let half_track_m = 0.5 * machine.vehicle.geometry.track_m;
-        let differentials_kg = DIFFERENTIAL_S_PER_M * machine.mass_kg() * GRAVITY_MPS2 * half_track_m.powi(2)
+        let differentials_kg = coupling_s_per_m * machine.mass_kg() * GRAVITY_MPS2 * half_track_m.powi(2)
             / (wheelbase_m * usual_mps);
         let rad_per_n = gradient_s2_per_m2 * wheelbase_m / (machine.front_kg() + differentials_kg);
         Made::new("st_uspeed", gradient_s2_per_m2, Deviation::SteeringCompliance { rad_per_n })
     } else {
-        // kappa v / (g C) (1 / f - 1) is lost to the slip angle of the front tyres; a gradient at the usual speed.
-        let lost = gradient_s2_per_m2 * usual_mps * wheelbase_m * GRAVITY_MPS2 * machine.steepness_s_per_m();
+        // kappa v^2 / (g C) (1 / f - 1) is lost to the slip angle of the front tyres.
+        let lost = gradient_s2_per_m2 * wheelbase_m * GRAVITY_MPS2 * stiffness;
         let front = 1.0 / (1.0 + lost);
         Made::new("front_tyre_stiffness", front, Deviation::TyreStiffness { front, rear: 1.0 })
     }

@@ -11,8 +11,6 @@ use crate::plant::{GRAVITY_MPS2, vegetation_resistance};
 use crate::random::stream;
 use crate::{Deviation, OdometryConfig, Stribeck, World, WorldError};
 
-/// Friction over slip speed at small slip is this over the Stribeck speed: 10 sqrt2, see the tyre.
-const CURVE_STEEPNESS: f64 = 14.142;
 /// Share of machines whose motor controller has no integral, as cheap ones have none.
 const DROOP_SHARE: f64 = 0.8;
 
@@ -79,11 +77,6 @@ impl TestMachine {
         f64::from(self.hills.friction.static_friction)
     }
 
-    /// Friction over slip speed of the firm ground at small slip [s/m].
-    pub(super) fn steepness_s_per_m(&self) -> f64 {
-        CURVE_STEEPNESS * self.friction() / f64::from(self.hills.friction.stribeck_speed_mps)
-    }
-
     /// Resistance of the meadows [m/s2].
     pub(super) fn vegetation_mps2(&self) -> f64 {
         GRAVITY_MPS2 * vegetation_resistance(&self.vehicle, self.hills.vegetation_m)
@@ -136,6 +129,7 @@ fn varied(base: &Vehicle, rng: &mut Xoshiro256PlusPlus) -> Vehicle {
     vehicle.tyre.radial_stiffness_n_per_m *= mass * factor(0.85, 1.25);
     vehicle.tyre.rolling_resistance *= factor(0.6, 1.6);
     vehicle.tyre.load_sensitivity *= factor(0.5, 1.5);
+    vehicle.tyre.slip_stiffness *= factor(0.85, 1.25);
     let drivetrain = &mut vehicle.drivetrain;
     drivetrain.drive_torque_max_nm *= mass * size * factor(1.0, 1.4);
     drivetrain.brake_torque_max_nm *= mass * size * factor(1.0, 1.4);
@@ -148,14 +142,14 @@ fn varied(base: &Vehicle, rng: &mut Xoshiro256PlusPlus) -> Vehicle {
     vehicle
 }
 
-/// Firm ground on which slip stands at about a tenth of a fast drive's speed when it slides.
+/// Firm ground that holds alike at every slip speed.
 fn friction(fast_mps: f64, rng: &mut Xoshiro256PlusPlus) -> Stribeck {
     let friction = rng.random_range(0.7..0.95) as f32;
     Stribeck {
         static_friction: friction,
         dynamic_friction: friction,
         viscous_friction: 0.0,
-        stribeck_speed_mps: (fast_mps * rng.random_range(0.5..1.0)) as f32,
+        stribeck_speed_mps: fast_mps as f32,
     }
 }
 

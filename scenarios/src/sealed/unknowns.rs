@@ -6,6 +6,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 use super::Made;
 use super::fleet::TestMachine;
 use crate::Deviation;
+use crate::friction::brush_friction;
 use crate::plant::GRAVITY_MPS2;
 
 /// Their names.
@@ -64,12 +65,11 @@ pub(super) fn make(id: &str, machine: &TestMachine, rng: &mut Xoshiro256PlusPlus
     }
 }
 
-/// The moment under which a slow drive would turn as under `share` of the largest steering angle: axles half a
-/// wheelbase from the middle, each with half of the weight times the friction's steepness per lateral speed.
+/// The moment under which a drive would turn as under `share` of the largest steering angle: axles half a wheelbase
+/// from the middle hold half of the weight each, times the friction of their tyres at the slip that turning gives them.
 fn turning_nm(share: f64, machine: &TestMachine) -> f64 {
-    let [slow_mps, fast_mps] = machine.speeds_mps;
-    let wheelbase_m = machine.vehicle.geometry.wheelbase_m;
-    let yaw_rate_radps = share * machine.steering_max_rad.tan() * 0.5 * (slow_mps + fast_mps) / wheelbase_m;
-    let weight_n = machine.mass_kg() * GRAVITY_MPS2;
-    0.25 * weight_n * machine.steepness_s_per_m() * wheelbase_m * wheelbase_m * yaw_rate_radps
+    let vehicle = &machine.vehicle;
+    let slip = 0.5 * share * machine.steering_max_rad.tan();
+    let held = brush_friction(machine.friction(), vehicle.tyre.slip_stiffness, slip);
+    0.5 * machine.mass_kg() * GRAVITY_MPS2 * held * vehicle.geometry.wheelbase_m
 }

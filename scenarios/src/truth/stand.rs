@@ -248,9 +248,12 @@ impl Statics {
             let first_m = place.at(ahead_m + STATIONS[0] * radius_m, left_m);
             ground.run_m::<9>(first_m, [place.cos * step_m, place.sin * step_m])
         });
-        // A tread half on a step is carried by the higher half, but sinks in a little.
+        // A tread half on a step is two springs of half the stiffness side by side: it sinks half way to the lower side,
+        // or, where that bears nothing, by the static deflection once more.
+        let sunk_m = radius_m - self.hub_height_m;
         let hub_m: [f64; 9] = std::array::from_fn(|k| {
-            0.7 * left_m[k].max(right_m[k]) + 0.3 * left_m[k].min(right_m[k]) + RIM[k] * radius_m * lean
+            let [high_m, low_m] = [left_m[k].max(right_m[k]), left_m[k].min(right_m[k])];
+            high_m - (0.5 * (high_m - low_m)).min(sunk_m) + RIM[k] * radius_m * lean
         });
         let best = (0..9).fold(4, |best, k| if hub_m[k] > hub_m[best] { k } else { best });
         let slope = slope_at_contact(&hub_m.map(|hub_m| hub_m / radius_m), best, lean);

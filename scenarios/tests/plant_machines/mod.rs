@@ -3,7 +3,9 @@
 
 use std::sync::Arc;
 
-use bicycle::{Axle, Body, Command, Drivetrain, Geometry, Limits, Servo, Suspension, Tyre, Vehicle, Wheel};
+use bicycle::{
+    Axle, Body, Command, Differential, Drivetrain, Geometry, Limits, Servo, Suspension, Tyre, Vehicle, Wheel,
+};
 use scenarios::{Patch, Plant, Stribeck, World};
 use terrain::GridGeometry;
 
@@ -99,11 +101,13 @@ pub fn full_size() -> Vehicle {
             power_max_w: 60_000.0,
             rear_share: 0.5,
             response_s: 0.15,
+            differential: Differential::LimitedSlip,
         },
         servo: Servo { response_s: 0.15, delay_s: 0.05 },
         tyre: Tyre {
             rolling_resistance: 0.02,
             relaxation_length_m: 0.3,
+            slip_stiffness: 12.0,
             load_sensitivity: 0.1,
             radial_stiffness_n_per_m: 150_000.0,
         },
@@ -152,11 +156,13 @@ pub fn rc_car() -> Vehicle {
             power_max_w: 60.0,
             rear_share: 0.5,
             response_s: 0.05,
+            differential: Differential::LimitedSlip,
         },
         servo: Servo { response_s: 0.06, delay_s: 0.02 },
         tyre: Tyre {
             rolling_resistance: 0.03,
             relaxation_length_m: 0.03,
+            slip_stiffness: 12.0,
             load_sensitivity: 0.05,
             radial_stiffness_n_per_m: 3000.0,
         },
