@@ -284,7 +284,7 @@ impl Plant {
 
     fn move_body(&mut self, wrench: &Wrench) {
         let before_mps = self.motion.velocity_at_mps(&self.motion.origin_m);
-        self.chassis.step(wrench, &self.motion, &self.ground);
+        self.chassis.step(wrench, &self.ground);
         self.motion = self.chassis.motion();
         let after_mps = self.motion.velocity_at_mps(&self.motion.origin_m);
         let acceleration_mps2 = (after_mps - before_mps) / self.step_s;

@@ -1,7 +1,7 @@
-//! The body as a rigid body of rapier, with its contact with the ground.
+//! The body: a rigid body in the air, and one of rapier's where it comes near the ground.
 
 use bicycle::Vehicle;
-use nalgebra::{Isometry3, Vector3};
+use nalgebra::{Isometry3, Quaternion, Unit, UnitQuaternion, Vector3};
 use rapier3d::prelude::{
     Array2, Collider, ColliderBuilder, ColliderHandle, IntegrationParameters, MassProperties, PhysicsWorld,
     Pose as RapierPose, RigidBodyBuilder, RigidBodyHandle, Rotation, Vector,
@@ -58,11 +58,32 @@ pub(crate) struct Chassis {
     hulls: Vec<Hull>,
     near_m: f64,
     cog_m: Vector3<f64>,
+    mass_kg: f64,
+    inertia_kgm2: Vector3<f64>,
+    rotation: UnitQuaternion<f64>,
+    motion: BodyMotion,
     step_s: f64,
     steps_to_check: u32,
+    /// Whether a hull is near the ground: then rapier moves the body.
+    is_near: bool,
 }
 
 impl BodyMotion {
+    fn at_rest(pose: &Isometry3<f64>, local_cog_m: &Vector3<f64>) -> Self {
+        let still = Vector3::zeros();
+        let origin_m = pose.translation.vector;
+        let axes = [Vector3::x(), Vector3::y(), Vector3::z()];
+        let mut motion = Self { origin_m, axes, cog_m: origin_m, linear_mps: still, angular_radps: still };
+        motion.turn_to(&pose.rotation);
+        motion.cog_m = motion.point_m(local_cog_m);
+        motion
+    }
+
+    fn turn_to(&mut self, rotation: &UnitQuaternion<f64>) {
+        let matrix = rotation.to_rotation_matrix();
+        self.axes = std::array::from_fn(|i| matrix.matrix().column(i).into_owned());
+    }
+
     pub(crate) fn point_m(&self, local_m: &Vector3<f64>) -> Vector3<f64> {
         self.origin_m + self.direction(local_m)
     }
@@ -119,44 +140,83 @@ impl Chassis {
                 underside_m: underside(&low_m, &high_m, spacing_m),
             })
             .collect();
-        let near_m = NEAR_SHARE * vehicle.geometry.ground_clearance_m;
-        Self { physics, body, hulls, near_m, cog_m: stance.cog_m, step_s, steps_to_check: 0 }
+        let motion = BodyMotion::at_rest(pose, &stance.cog_m);
+        Self {
+            physics,
+            body,
+            hulls,
+            near_m: NEAR_SHARE * vehicle.geometry.ground_clearance_m,
+            cog_m: stance.cog_m,
+            mass_kg: rest.mass_kg,
+            inertia_kgm2: rest.inertia_kgm2,
+            rotation: pose.rotation,
+            motion,
+            step_s,
+            steps_to_check: 0,
+            is_near: false,
+        }
     }
 
     /// How the body lies and moves now.
     pub(crate) fn motion(&self) -> BodyMotion {
-        let body = &self.physics.bodies[self.body];
-        let pose = body.position();
-        let axes = [Vector::X, Vector::Y, Vector::Z].map(|axis| nalgebra(pose.rotation * axis));
-        let origin_m = nalgebra(pose.translation);
-        let mut motion = BodyMotion {
-            origin_m,
-            axes,
-            cog_m: origin_m,
-            linear_mps: nalgebra(body.linvel()),
-            angular_radps: nalgebra(body.angvel()),
-        };
-        motion.cog_m = motion.point_m(&self.cog_m);
-        motion
+        self.motion
     }
 
     /// Moves the body by a step under gravity, the wheels' forces and contact with the ground.
-    pub(crate) fn step(&mut self, wrench: &Wrench, motion: &BodyMotion, ground: &Ground) {
+    pub(crate) fn step(&mut self, wrench: &Wrench, ground: &Ground) {
         if self.steps_to_check == 0 {
             self.steps_to_check = CHECK_STEPS;
-            self.wake_near_hulls(motion, ground);
+            self.wake_near_hulls(ground);
         }
         self.steps_to_check -= 1;
+        if self.is_near {
+            self.step_beside_ground(wrench);
+        } else {
+            self.step_in_air(wrench);
+        }
+    }
+
+    /// Newton's and Euler's equations, velocities before positions.
+    fn step_in_air(&mut self, wrench: &Wrench) {
+        let motion = &mut self.motion;
+        let gravity_mps2 = Vector3::z() * GRAVITY_MPS2;
+        motion.linear_mps += (wrench.force_n / self.mass_kg - gravity_mps2) * self.step_s;
+        let rate_radps = motion.in_body(&motion.angular_radps);
+        let momentum = self.inertia_kgm2.component_mul(&rate_radps);
+        let torque_nm = motion.in_body(&wrench.torque_nm) - rate_radps.cross(&momentum);
+        let after_radps = (momentum + torque_nm * self.step_s).component_div(&self.inertia_kgm2);
+        motion.angular_radps = motion.direction(&after_radps);
+        let half_rad = motion.angular_radps * (0.5 * self.step_s);
+        let turn = Quaternion::from_parts(1.0, half_rad);
+        self.rotation = Unit::new_normalize(turn * self.rotation.into_inner());
+        let cog_m = motion.cog_m + motion.linear_mps * self.step_s;
+        motion.turn_to(&self.rotation);
+        motion.cog_m = cog_m;
+        motion.origin_m = cog_m - motion.direction(&self.cog_m);
+    }
+
+    fn step_beside_ground(&mut self, wrench: &Wrench) {
         let body = &mut self.physics.bodies[self.body];
         body.reset_forces(false);
         body.reset_torques(false);
         body.add_force(glam(&wrench.force_n), false);
         body.add_torque(glam(&wrench.torque_nm), false);
         self.physics.step();
+        let body = &self.physics.bodies[self.body];
+        let pose = body.position();
+        let [x, y, z, w] = pose.rotation.to_array();
+        self.rotation = Unit::new_unchecked(Quaternion::new(w, x, y, z));
+        let motion = &mut self.motion;
+        motion.turn_to(&self.rotation);
+        motion.origin_m = nalgebra(pose.translation);
+        motion.cog_m = motion.point_m(&self.cog_m);
+        motion.linear_mps = nalgebra(body.linvel());
+        motion.angular_radps = nalgebra(body.angvel());
     }
 
-    /// Contact with the ground costs more than all the rest: hulls take part only near it.
-    fn wake_near_hulls(&mut self, motion: &BodyMotion, ground: &Ground) {
+    /// Contact with the ground costs more than all the rest: hulls take part only near it, and rapier only with them.
+    fn wake_near_hulls(&mut self, ground: &Ground) {
+        let motion = &self.motion;
         let until_check_m = motion.linear_mps.norm() * self.step_s * f64::from(CHECK_STEPS);
         let margin_m = self.near_m + until_check_m;
         let tilted = motion.axes[2].z < TILTED_COSINE;
@@ -164,9 +224,18 @@ impl Chassis {
             let point_m = motion.point_m(local_m);
             point_m.z - ground.height_m(point_m.x, point_m.y) < margin_m
         };
+        let was_near = std::mem::replace(&mut self.is_near, false);
         for hull in &self.hulls {
             let near = tilted || hull.underside_m.iter().any(low);
             self.physics.colliders[hull.collider].set_enabled(near);
+            self.is_near |= near;
+        }
+        if self.is_near && !was_near {
+            let pose = Isometry3::from_parts(motion.origin_m.into(), self.rotation);
+            let body = &mut self.physics.bodies[self.body];
+            body.set_position(rapier_pose(&pose), false);
+            body.set_linvel(glam(&motion.linear_mps), false);
+            body.set_angvel(glam(&motion.angular_radps), false);
         }
     }
 }
