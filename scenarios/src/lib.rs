@@ -37,7 +37,7 @@ pub use friction::Stribeck;
 pub use layers::{LayerConfig, LayersError, WorldLayers, world_from_layers};
 pub use motion::Motion;
 pub use pair::{End, Pair, PairError, PairWish, check_pair, feasible_pair};
-pub use plant::{CommandError, Plant, PlantError, WheelState};
+pub use plant::{Collision, CommandError, Plant, PlantError, WheelState};
 pub use random::{seed_of, stream};
 pub use rock_field::{
     MAPS_PER_SPLIT, RockFieldConfig, RockFieldError, RockMap, RockPopulation, Split, rock_field,

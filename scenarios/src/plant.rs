@@ -10,8 +10,10 @@
 //! Deterministic: the same vehicle, world, start and commands give the same bits.
 
 mod chassis;
+mod collision;
 mod drivetrain;
 mod envelope;
+mod error;
 mod ground;
 mod linkage;
 mod load;
@@ -19,6 +21,7 @@ mod machine;
 mod receiver;
 mod rest;
 mod servo;
+mod strut;
 mod trailer;
 mod tyre;
 mod vegetation;
@@ -26,15 +29,18 @@ mod wheel;
 
 use std::sync::Arc;
 
-use bicycle::{Command, Vehicle, VehicleError};
+use bicycle::{Command, Vehicle};
 use nalgebra::{Isometry3, Rotation3, Translation3, UnitQuaternion, Vector3};
 use terrain::Pose;
 
-use crate::{Deviation, DeviationError, Motion, World};
+use crate::{Deviation, Motion, World};
 use chassis::{BodyMotion, Chassis, Wrench};
+pub use collision::Collision;
+use collision::Collisions;
 use drivetrain::Drivetrain;
 pub(crate) use drivetrain::LIMITED_SLIP_S_PER_M;
 use envelope::Disc;
+pub use error::{CommandError, PlantError};
 use ground::Ground;
 use linkage::Linkage;
 pub(crate) use load::AIR_KGPM3;
@@ -43,8 +49,9 @@ use machine::Machine;
 use receiver::Receiver;
 use rest::{Rest, Stance};
 use servo::SteeringServo;
+use strut::Strut;
 pub(crate) use vegetation::vegetation_resistance;
-use wheel::{RunningGear, Strut, Wheel, WheelInput};
+use wheel::{RunningGear, Wheel, WheelInput};
 
 /// Acceleration of gravity [m/s2].
 pub(crate) const GRAVITY_MPS2: f64 = 9.81;
@@ -54,52 +61,6 @@ const SETTLING_S: f64 = 1.5;
 /// Below this cosine of the body's tilt (70 degrees) it has rolled over.
 const ROLLED_OVER_COSINE: f64 = 0.342;
 
-/// Why there is no plant.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum PlantError {
-    /// No vehicle can be like this.
-    #[error("vehicle: {0}")]
-    Vehicle(#[from] VehicleError),
-    /// No machine departs from it like this.
-    #[error(transparent)]
-    Deviation(#[from] DeviationError),
-    /// A tyre that its own vehicle squeezes flat.
-    #[error(
-        "tyre.radial_stiffness_n_per_m: expected a static deflection below {most_m:.3} m (a third of the \
-         radius), found {found_m:.3} m"
-    )]
-    FlatTyre {
-        /// A third of the wheel's radius [m].
-        most_m: f64,
-        /// Deflection under a quarter of the weight [m].
-        found_m: f64,
-    },
-    /// The start is no pose.
-    #[error("start: expected finite x, y, yaw, found {0:?}")]
-    NonFiniteStart([f64; 3]),
-    /// A wheel would stand outside the world.
-    #[error(
-        "start: expected every wheel between ({:.1}, {:.1}) and ({:.1}, {:.1}) m, found one at ({:.1}, {:.1}) m",
-        extent_m[0][0], extent_m[0][1], extent_m[1][0], extent_m[1][1], found_m[0], found_m[1]
-    )]
-    StartOutside {
-        /// South-west and north-east end of the world's surface [m].
-        extent_m: [[f64; 2]; 2],
-        /// The wheel [m].
-        found_m: [f64; 2],
-    },
-}
-
-/// A command that is no number.
-#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-#[error("command: expected finite speed and steering, found {speed_mps} m/s and {steering_rad} rad")]
-pub struct CommandError {
-    /// The speed given [m/s].
-    pub speed_mps: f32,
-    /// The steering angle given [rad].
-    pub steering_rad: f32,
-}
-
 /// How one wheel stands.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WheelState {
@@ -107,7 +68,7 @@ pub struct WheelState {
     pub load_n: f64,
     /// Normal and friction force of the ground on it, in the map frame [N].
     pub force_n: [f64; 3],
-    /// Centre of its contact in the map frame, if it touches the ground [m].
+    /// Centre of its contact in the map frame, of the heavier one where it has two, if it touches the ground [m].
     pub contact_m: Option<[f64; 3]>,
     /// Hub in the map frame [m].
     pub hub_m: [f64; 3],
@@ -138,6 +99,7 @@ pub struct Plant {
     step_s: f64,
     n_steps: u64,
     left_world: bool,
+    collisions: Collisions,
 }
 
 impl Plant {
@@ -181,6 +143,7 @@ impl Plant {
         let mut plant = Self::parked(&machine, gear, &stance, ground, (start, step_s))?;
         plant.advance(SETTLING_S);
         plant.n_steps = 0;
+        plant.collisions = Collisions::default();
         Ok(plant)
     }
 
@@ -217,6 +180,7 @@ impl Plant {
             step_s,
             n_steps: 0,
             left_world: false,
+            collisions: Collisions::default(),
             ground,
             gear,
         })
@@ -267,6 +231,8 @@ impl Plant {
             load.push(&self.motion, &self.ground, self.step_s, &mut wrench);
         }
         self.move_body(&wrench);
+        let (wheels, body) = ((&self.gear, &self.wheels), (&self.chassis, &self.ground));
+        self.collisions.count(wheels, body, (self.time_s(), self.step_s));
     }
 
     /// Friction of the ground on the front axle in the last step, left positive [N].
@@ -338,7 +304,7 @@ impl Plant {
             WheelState {
                 load_n: wheel.load_n,
                 force_n: wheel.force_n.into(),
-                contact_m: wheel.contact.map(|contact| contact.point_m.into()),
+                contact_m: wheel.heaviest().map(|contact| contact.point_m.into()),
                 hub_m: self.hub_m(i).into(),
                 speed_mps: wheel.spin_radps * self.rolling_radius_m,
                 travel_m: wheel.travel_m,
@@ -349,6 +315,17 @@ impl Plant {
     /// Whether the body lies on its side or its roof.
     pub fn rolled_over(&self) -> bool {
         self.motion.axes[2].z < ROLLED_OVER_COSINE
+    }
+
+    /// What obstacles have done to the vehicle, if it has touched one.
+    pub fn collision(&self) -> Option<Collision> {
+        self.collisions.first()
+    }
+
+    /// Whether a wheel stands in water.
+    pub fn is_in_water(&self) -> bool {
+        let mut touches = self.wheels.iter().flat_map(Wheel::touches);
+        touches.any(|touch| self.ground.patch(touch.contact.point_m.x, touch.contact.point_m.y).is_water())
     }
 
     /// Whether a wheel has ever been beyond the border of the world, where the ground is made up.

@@ -41,7 +41,12 @@ impl Patch {
         Self { class: TerrainClass::Vegetation, vegetation_height_m, ..self }
     }
 
-    /// The same ground under something that must not be touched.
+    /// Water of a depth that nobody knows: an obstacle of no height.
+    pub fn is_water(&self) -> bool {
+        self.class == TerrainClass::Obstacle && self.obstacle_height_m == 0.0
+    }
+
+    /// The same ground under something that must not be touched; of no height: under water.
     pub const fn obstructed(self, obstacle_height_m: f32) -> Self {
         Self { class: TerrainClass::Obstacle, obstacle_height_m, vegetation_height_m: 0.0, ..self }
     }

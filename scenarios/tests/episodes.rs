@@ -312,3 +312,67 @@ fn the_default_drive_starts_40_m_from_its_goal_heading_for_it() {
         assert!([x_m, y_m, task.goal_m[0], task.goal_m[1]].iter().all(|v| (4.9..45.1).contains(v)));
     }
 }
+
+/// The car rolls into a wall of a metre at x = 8 m.
+fn walled(height_m: f32) -> Task {
+    strip(
+        |_| 0.0,
+        move |x| {
+            let open = Patch::open(Stribeck::ASPHALT);
+            if x > 8.0 { open.obstructed(height_m) } else { open }
+        },
+    )
+}
+
+#[test]
+fn touching_an_obstacle_is_a_collision_with_its_impulse() {
+    let (end, episode) = outcome(walled(1.0), CRUISE);
+    assert_eq!(end, Outcome::Collision);
+    // Wheels and bumper reach 0.255 m ahead, the wall begins half a cell of 0.05 m before x = 8.
+    let collision = episode.collision().unwrap();
+    assert!((7.68..7.78).contains(&collision.at_m[0]), "{collision:?}");
+    assert!((collision.time_s - episode.time_s()).abs() < 0.2, "{collision:?} {}", episode.time_s());
+    // 3 kg at 1 m/s: 3 N s until it stands, of which the brakes of the floor take nothing yet; and what the wheels push
+    // meanwhile, at most 0.98 of the weight in the 35 ms that two tyres of 3000 N/m take to stop 3 kg: 1 N s.
+    assert!((2.8..4.2).contains(&collision.impulse_ns), "{collision:?}");
+    // Half as fast, half as hard.
+    let slow = Decision::Drive(Command { speed_mps: 0.5, steering_rad: 0.0 });
+    let (end, slowly) = outcome(walled(1.0), slow);
+    assert_eq!(end, Outcome::Collision);
+    assert!(slowly.collision().unwrap().impulse_ns < 0.8 * collision.impulse_ns);
+    // A drive that touches nothing has none.
+    assert_eq!(outcome(flat(), CRUISE).1.collision(), None);
+}
+
+#[test]
+fn water_ends_the_drive_where_the_first_wheel_stands_in_it() {
+    let (end, episode) = outcome(walled(0.0), CRUISE);
+    assert_eq!(end, Outcome::InWater);
+    // The front axle is 0.18 m ahead of the rear one.
+    assert!((7.79..7.86).contains(&episode.motion().pose.x_m), "{:?}", episode.motion().pose);
+    assert_eq!(episode.collision(), None);
+}
+
+#[test]
+fn a_vehicle_whose_controller_is_still_being_started_is_neither_stuck_nor_stopped() {
+    let mut config = blind(&rc_car());
+    config.rules.startup_s = 10.0;
+    for (waiting, end, ends_s) in [
+        (Decision::Stop(StopReason::StaleCommand), Outcome::Stopped, 14.0),
+        (Decision::Hold(HoldReason::NoMap), Outcome::Stuck, 15.0),
+    ] {
+        let mut episode = Episode::new(flat(), &rc_car(), config.clone(), 1).unwrap();
+        assert_eq!(episode.run(|_| waiting, |_| ControlFlow::Continue(())).unwrap(), end);
+        assert!((episode.time_s() - ends_s).abs() < 0.25, "{}", episode.time_s());
+    }
+    // Told to drive for a moment, it is judged as any other from then on.
+    let mut episode = Episode::new(flat(), &rc_car(), config.clone(), 1).unwrap();
+    let begins = |observation: &Observation| match observation.valid_at_ns {
+        0 => Decision::Drive(Command::default()),
+        _ => Decision::Stop(StopReason::StaleCommand),
+    };
+    assert_eq!(episode.run(begins, |_| ControlFlow::Continue(())).unwrap(), Outcome::Stopped);
+    assert!((episode.time_s() - 4.1).abs() < 0.25, "{}", episode.time_s());
+    config.rules.startup_s = f64::NAN;
+    assert!(Episode::new(flat(), &rc_car(), config, 1).is_err());
+}

@@ -154,3 +154,49 @@ fn leaving_the_world_is_reported() {
     // The made-up ground beyond the edge carries it: it does not fall for ever.
     assert!(plant.pose().z_m > 0.3);
 }
+
+#[test]
+fn a_wall_takes_the_momentum_that_the_vehicle_loses() {
+    // Down a ramp without motor and brakes and over level ground against a wall.
+    let geometry = GridGeometry::centred(0.1, 100, 600, 0.0, 0.0);
+    let wall = |x_m: f64, _: f64| {
+        let open = Patch::open(Stribeck::ASPHALT);
+        if x_m > 10.0 { open.obstructed(2.0) } else { open }
+    };
+    let ramp_m = |x_m: f64, _: f64| 0.1 * (-x_m).max(0.0);
+    let world = Arc::new(World::from_fn("ramp and wall", geometry, ramp_m, wall).unwrap());
+    for vehicle in [full_size(), rc_car()] {
+        let mut plant = Plant::new(&powerless(vehicle.clone()), world.clone(), [-6.0, 0.0, 0.0]).unwrap();
+        let mut before_mps = 0.0;
+        while plant.collision().is_none() && plant.time_s() < 30.0 {
+            before_mps = plant.motion().velocity_mps[0];
+            plant.step();
+        }
+        assert!(before_mps > 1.0, "{}: {before_mps} m/s", vehicle.name);
+        plant.advance(0.5);
+        let mass_kg = vehicle.body.mass_kg + 4.0 * vehicle.wheel.mass_kg;
+        let found_ns = plant.collision().unwrap().impulse_ns;
+        // The wheels go on turning and push: their inertia is I / r^2 of mass, 7 % of the car's, 16 % of the small one's.
+        let share = found_ns / (mass_kg * before_mps);
+        println!("{}: {before_mps:.2} m/s, {found_ns:.1} N s, {share:.3}", vehicle.name);
+        assert!((0.97..1.17).contains(&share), "{}: {share} of {} N s", vehicle.name, mass_kg * before_mps);
+        assert!((9.9 - plant.collision().unwrap().at_m[0]) < vehicle.geometry.length_m + 0.1);
+    }
+}
+
+#[test]
+fn who_passes_beside_an_obstacle_has_not_touched_it() {
+    let geometry = GridGeometry::centred(0.1, 200, 200, 0.0, 0.0);
+    let post = |x_m: f64, y_m: f64| {
+        let open = Patch::open(Stribeck::ASPHALT);
+        if x_m.abs() < 0.3 && y_m > 1.3 { open.obstructed(2.0) } else { open }
+    };
+    let world = Arc::new(World::from_fn("post", geometry, |_, _| 0.0, post).unwrap());
+    // Half of the width is 0.9 m.
+    let mut plant = Plant::new(&full_size(), world.clone(), [-6.0, 0.0, 0.0]).unwrap();
+    drive(&mut plant, 1.0, 0.0, 10.0);
+    assert!(plant.pose().x_m > 2.0 && plant.collision().is_none(), "{:?}", plant.collision());
+    let mut plant = Plant::new(&full_size(), world, [-6.0, 0.6, 0.0]).unwrap();
+    drive(&mut plant, 1.0, 0.0, 10.0);
+    assert!(plant.collision().is_some());
+}

@@ -61,6 +61,10 @@ pub enum End {
     OutOfBounds,
     /// It stood still because it was told to stop.
     Stopped,
+    /// It touched an obstacle.
+    Collision,
+    /// It stood in water.
+    InWater,
 }
 
 /// One drive in numbers.

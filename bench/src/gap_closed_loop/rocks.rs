@@ -96,5 +96,7 @@ fn end(outcome: Outcome) -> End {
         Outcome::OutOfBounds => End::OutOfBounds,
         Outcome::Timeout => End::Timeout,
         Outcome::Stopped => End::Stopped,
+        Outcome::Collision => End::Collision,
+        Outcome::InWater => End::InWater,
     }
 }

@@ -65,6 +65,8 @@ pub fn name_of_outcome(outcome: Outcome) -> &'static str {
         Outcome::OutOfBounds => "out of bounds",
         Outcome::Timeout => "time limit passed",
         Outcome::Stopped => "stopped",
+        Outcome::Collision => "collision",
+        Outcome::InWater => "in water",
     }
 }
 

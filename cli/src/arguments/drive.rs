@@ -271,6 +271,8 @@ Outcomes:
   timeout         --time-limit passed
   stopped         the controller stopped for good, all of --commands were carried out,
                   or Ctrl-C
+  collision       body or wheels touched an obstacle
+  in_water        a wheel stood in water, whose depth nobody knows
 
 Elevation files:
   .npz        elevation [row, col] in metres, row 0 = south, column 0 = west;

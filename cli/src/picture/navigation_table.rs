@@ -29,13 +29,15 @@ const TEXT: TextStyle = TextStyle::new(17, Anchor::Start);
 const SOFT: TextStyle = TextStyle::new(16, Anchor::Middle).coloured(Rgb::INK_SOFT);
 
 /// All outcomes in the order of the legend. The letter tells them apart where colours do not.
-const OUTCOMES: [Outcome; 7] = [
+const OUTCOMES: [Outcome; 9] = [
     Outcome::Goal,
     Outcome::Stuck,
     Outcome::Timeout,
     Outcome::Stopped,
     Outcome::OutOfBounds,
+    Outcome::InWater,
     Outcome::AttitudeLimit,
+    Outcome::Collision,
     Outcome::RolledOver,
 ];
 
@@ -48,7 +50,9 @@ fn look(outcome: Outcome) -> (Rgb, Rgb, &'static str) {
         Outcome::Timeout => (Rgb(0x9f, 0xb4, 0xd6), Rgb::INK, "T"),
         Outcome::Stopped => (Rgb(0x5a, 0x64, 0x74), Rgb::WHITE, "X"),
         Outcome::OutOfBounds => (Rgb(0x7a, 0x5a, 0xa8), Rgb::WHITE, "O"),
+        Outcome::InWater => (Rgb(0x2b, 0x5c, 0x9e), Rgb::WHITE, "W"),
         Outcome::AttitudeLimit => (Rgb(0xe2, 0x6a, 0x2c), Rgb::WHITE, "A"),
+        Outcome::Collision => (Rgb(0x7d, 0x2a, 0x14), Rgb::WHITE, "C"),
         Outcome::RolledOver => (Rgb(0xa8, 0x10, 0x2c), Rgb::WHITE, "R"),
     }
 }

@@ -11,14 +11,14 @@ use bicycle::{Command, Decision, ImuSample, Odometry, Vehicle};
 use terrain::Scan;
 
 use crate::{
-    CommandError, Deviation, IMU_PERIOD_NS, Imu, ImuConfig, Motion, OdometryConfig, OdometrySensor, Plant,
-    PlantError, RangeSensor, RangeSensorConfig, RangeSensorError, Task,
+    Collision, CommandError, Deviation, IMU_PERIOD_NS, Imu, ImuConfig, Motion, OdometryConfig,
+    OdometrySensor, Plant, PlantError, RangeSensor, RangeSensorConfig, RangeSensorError, Task,
 };
 pub use fault::{Fault, SensorFault};
 pub use referee::{Outcome, Rules};
 pub use trace::{TraceRow, drive_log};
 
-use referee::Referee;
+use referee::{Referee, STANDING_MPS};
 
 /// What the vehicle measures in one control cycle.
 #[derive(Clone, Debug, Default)]
@@ -181,8 +181,10 @@ impl Episode {
         }
         self.n_cycles += 1;
         self.referee.judge_cycle(decision, &motion, self.time_s(), self.cycle_s());
-        if self.outcome() == Some(Outcome::AttitudeLimit) {
-            self.see_what_becomes_of_it()?;
+        match self.outcome() {
+            Some(Outcome::AttitudeLimit) => self.see_what_becomes_of_it()?,
+            Some(Outcome::Collision) => self.see_it_stand()?,
+            _ => {}
         }
         self.measure(&motion, imu);
         Ok(())
@@ -215,6 +217,11 @@ impl Episode {
     /// How the episode ended, if it has.
     pub fn outcome(&self) -> Option<Outcome> {
         self.referee.outcome()
+    }
+
+    /// What obstacles did to the vehicle, if it touched one.
+    pub fn collision(&self) -> Option<Collision> {
+        self.plant.collision()
     }
 
     /// The true motion now.
@@ -288,6 +295,20 @@ impl Episode {
             self.plant.advance(IMU_PERIOD_NS as f64 * 1e-9);
             if self.plant.rolled_over() {
                 self.referee.saw_rolling_over();
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    /// A vehicle that struck an obstacle is braked and watched until it stands, so that the whole impulse is counted.
+    fn see_it_stand(&mut self) -> Result<(), EpisodeError> {
+        self.plant.set_command(Command { speed_mps: 0.0, ..self.command })?;
+        let n_samples = (self.config.rules.aftermath_s * 1e9) as u64 / IMU_PERIOD_NS;
+        for _ in 0..n_samples {
+            self.plant.advance(IMU_PERIOD_NS as f64 * 1e-9);
+            let [ahead_mps, left_mps, _] = self.plant.motion().velocity_mps;
+            if ahead_mps.hypot(left_mps) < STANDING_MPS {
                 break;
             }
         }

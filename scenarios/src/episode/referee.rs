@@ -25,6 +25,10 @@ pub enum Outcome {
     Timeout,
     /// It stood still because it was told to stop, or the episode was broken off.
     Stopped,
+    /// Body or wheels touched an obstacle; [`Plant::collision`] says how hard.
+    Collision,
+    /// A wheel stood in water, whose depth nobody knows.
+    InWater,
 }
 
 impl std::fmt::Display for Outcome {
@@ -37,6 +41,8 @@ impl std::fmt::Display for Outcome {
             Self::OutOfBounds => "out of bounds",
             Self::Timeout => "time limit passed",
             Self::Stopped => "stopped",
+            Self::Collision => "collision",
+            Self::InWater => "in water",
         })
     }
 }
@@ -53,13 +59,25 @@ pub struct Rules {
     pub immobile_s: f64,
     /// Stop decisions for this long without a break end the episode once the vehicle stands [s].
     pub stopped_s: f64,
-    /// How long a vehicle that broke an attitude limit is watched for rolling over [s].
+    /// How long a vehicle that broke an attitude limit is watched for rolling over, and one that struck an obstacle
+    /// until it stands [s].
     pub aftermath_s: f64,
+    /// How long a vehicle may stand before it is told to drive for the first time, as one does whose controller is
+    /// still being started [s]: until then nobody is stuck or stopped.
+    #[serde(default)]
+    pub startup_s: f64,
 }
 
 impl Default for Rules {
     fn default() -> Self {
-        Self { time_limit_s: 120.0, immobile_m: 0.1, immobile_s: 5.0, stopped_s: 4.0, aftermath_s: 3.0 }
+        Self {
+            time_limit_s: 120.0,
+            immobile_m: 0.1,
+            immobile_s: 5.0,
+            stopped_s: 4.0,
+            aftermath_s: 3.0,
+            startup_s: 0.0,
+        }
     }
 }
 
@@ -72,17 +90,19 @@ impl Rules {
             ("rules.stopped_s", self.stopped_s),
             ("rules.aftermath_s", self.aftermath_s),
         ];
-        match settings.into_iter().find(|(_, found)| !(found.is_finite() && *found > 0.0)) {
-            Some((field, found)) => {
-                Err(EpisodeError::Setting { field, expected: "a finite number > 0", found })
-            }
-            None => Ok(()),
+        if let Some((field, found)) = settings.into_iter().find(|(_, v)| !(v.is_finite() && *v > 0.0)) {
+            return Err(EpisodeError::Setting { field, expected: "a finite number > 0", found });
         }
+        if !(self.startup_s.is_finite() && self.startup_s >= 0.0) {
+            let (field, found) = ("rules.startup_s", self.startup_s);
+            return Err(EpisodeError::Setting { field, expected: "a finite number >= 0", found });
+        }
+        Ok(())
     }
 }
 
 /// Speed below which a vehicle that was told to stop stands [m/s].
-const STANDING_MPS: f64 = 0.05;
+pub(super) const STANDING_MPS: f64 = 0.05;
 
 /// Watches the true motion.
 #[derive(Clone, Debug)]
@@ -93,6 +113,8 @@ pub(super) struct Referee {
     /// Time and place at the end of each cycle within the last `immobile_s`.
     places: VecDeque<(f64, [f64; 2])>,
     stopping_s: f64,
+    /// Whether the vehicle was ever told to drive.
+    has_begun: bool,
     last_m: Option<[f64; 3]>,
     path_length_m: f64,
     largest_roll_rad: f64,
@@ -107,6 +129,7 @@ impl Referee {
             outcome: None,
             places: VecDeque::new(),
             stopping_s: 0.0,
+            has_begun: false,
             last_m: None,
             path_length_m: 0.0,
             largest_roll_rad: 0.0,
@@ -152,6 +175,10 @@ impl Referee {
         }
         self.outcome = if plant.rolled_over() {
             Some(Outcome::RolledOver)
+        } else if plant.collision().is_some() {
+            Some(Outcome::Collision)
+        } else if plant.is_in_water() {
+            Some(Outcome::InWater)
         } else if self.largest_roll_rad > self.limits.roll_max_rad
             || self.largest_pitch_rad > self.limits.pitch_max_rad
         {
@@ -169,6 +196,10 @@ impl Referee {
 
     /// Judges what only shows over several cycles.
     pub(super) fn judge_cycle(&mut self, decision: &Decision, motion: &Motion, time_s: f64, cycle_s: f64) {
+        self.has_begun |= matches!(decision, Decision::Drive(_));
+        if !self.has_begun && time_s < self.rules.startup_s {
+            return;
+        }
         let is_stop = matches!(decision, Decision::Stop(_));
         self.stopping_s = if is_stop { self.stopping_s + cycle_s } else { 0.0 };
         let here_m = [motion.pose.x_m, motion.pose.y_m];

@@ -214,6 +214,30 @@ impl Chassis {
         motion.angular_radps = nalgebra(body.angvel());
     }
 
+    /// Impulse of obstacles on the body in the last step, in map coordinates [N s].
+    pub(crate) fn obstacle_impulse_ns(&self, ground: &Ground) -> Vector3<f64> {
+        let mut impulse_ns = Vector3::zeros();
+        if !self.is_near {
+            return impulse_ns;
+        }
+        for hull in &self.hulls {
+            for pair in self.physics.contact_pairs_with(hull.collider) {
+                // A manifold's normal points from the pair's first collider to its second.
+                let sign = if pair.collider2 == hull.collider { 1.0 } else { -1.0 };
+                let first = self.physics.colliders[pair.collider1].position();
+                for manifold in pair.solver_manifolds() {
+                    let at_obstacle = manifold.points.iter().filter(|point| {
+                        let place_m = *first * point.local_p1;
+                        point.data.impulse > 0.0 && ground.is_obstacle(place_m.x, place_m.y)
+                    });
+                    let sum_ns: f64 = at_obstacle.map(|point| point.data.impulse).sum();
+                    impulse_ns += nalgebra(manifold.data.normal) * (sign * sum_ns);
+                }
+            }
+        }
+        impulse_ns
+    }
+
     /// Contact with the ground costs more than all the rest: hulls take part only near it, and rapier only with them.
     fn wake_near_hulls(&mut self, ground: &Ground) {
         let motion = &self.motion;

@@ -4,6 +4,10 @@
 //! ground inside the disc presses towards the hub with a force per length in proportion to how deep it lies under
 //! the tread. The force of a segment has a closed form and derives from a potential, so rolling over a rock and
 //! down again gains nothing. A tyre wraps around a sharp edge and sinks further onto it than onto a plane.
+//!
+//! Pieces that follow each other press in one place. Where the ground leaves the disc between two places, or turns up
+//! in a corner, and the two press from different sides, as the ground and the face of a step do, the wheel has two
+//! contacts, each with a normal, a load and a friction of its own.
 
 use nalgebra::{Vector2, Vector3};
 
@@ -21,6 +25,14 @@ const RIM_SHARE: f64 = 0.5;
 const CORE_SHARE: f64 = 0.25;
 /// Sine of the axle's inclination beyond which a wheel lies on its side.
 const LYING_SINE: f64 = 0.95;
+/// Contacts that a wheel may have.
+pub(crate) const CONTACTS: usize = 2;
+/// Sine of the angle by which the ground turns up in a corner (30 degrees).
+const CORNER_SINE: f64 = 0.5;
+/// Cosine of the angle up to which places press from the same side (30 degrees).
+const SAME_SIDE_COSINE: f64 = 0.866;
+/// How far beside a disc the ground's slope across it is taken, over the tread that it stands for [-].
+const BESIDE_SHARE: f64 = 0.25;
 /// Steepest ground across the tread that the contact normal follows [-].
 const CROSS_SLOPE_MAX: f64 = 2.0;
 
@@ -62,13 +74,58 @@ pub(crate) struct Envelope {
 }
 
 /// Sums over the ground inside the discs; forces over stiffness [m2].
-#[derive(Default)]
+#[derive(Clone, Copy, Default)]
 struct Pressure {
     force: Vector2<f64>,
     weight: f64,
     /// Weighted places of the pressed pieces, seen from the hub.
     place: Vector2<f64>,
     lateral: f64,
+    /// Weighted rise of the ground per length along the axle.
+    cross: f64,
+}
+
+/// A piece of ground inside a disc.
+struct Piece {
+    /// Force over stiffness [m2].
+    force: Vector2<f64>,
+    /// Its middle, seen from the hub [m].
+    middle: Vector2<f64>,
+    /// Direction from back to front.
+    tangent: Vector2<f64>,
+}
+
+impl Pressure {
+    fn add(&mut self, other: &Self) {
+        self.force += other.force;
+        self.weight += other.weight;
+        self.place += other.place;
+        self.lateral += other.lateral;
+        self.cross += other.cross;
+    }
+
+    /// From the hub to the centre of pressure, against the direction of the force [m].
+    fn loaded_radius_m(&self, inward: &Vector2<f64>) -> f64 {
+        -self.place.dot(inward) / self.weight
+    }
+
+    /// Whether this presses from the side that `other` presses from.
+    fn is_beside(&self, other: &Self) -> bool {
+        self.force.dot(&other.force) > SAME_SIDE_COSINE * self.force.norm() * other.force.norm()
+    }
+}
+
+/// Adds a place to the contact on its side, or to a new one, or, when there are enough, to the nearer one.
+fn gather(place: &Pressure, contacts: &mut [Pressure; CONTACTS]) {
+    if place.weight <= 0.0 {
+        return;
+    }
+    let alike = contacts.iter().position(|contact| contact.weight <= 0.0 || contact.is_beside(place));
+    let nearer = || {
+        let [first, second] = contacts.map(|contact| contact.force.normalize().dot(&place.force));
+        usize::from(second > first)
+    };
+    contacts[alike.unwrap_or_else(nearer)].add(place);
 }
 
 impl Disc {
@@ -98,6 +155,11 @@ impl Envelope {
         self.radius_m
     }
 
+    /// Distance between the places at which a disc asks for the ground [m]: no contact is known better.
+    pub(crate) fn spacing_m(&self) -> f64 {
+        2.0 * self.radius_m / (self.stations_m.len() - 1) as f64
+    }
+
     /// Distance rolled per turn, over two pi [m]: that of a radial tyre lies a third of the deflection below the
     /// unloaded radius.
     pub(crate) fn rolling_radius_m(&self, loaded_radius_m: f64) -> f64 {
@@ -108,7 +170,7 @@ impl Envelope {
     pub(crate) fn force_on_plane_n(&self, deflection_m: f64) -> f64 {
         let depth_m = deflection_m - self.radius_m;
         let ends = [-self.radius_m, self.radius_m].map(|along_m| Vector2::new(along_m, depth_m));
-        self.segment(ends[0], ends[1]).map_or(0.0, |(force, _)| force.y * self.stiffness_n_per_m2)
+        self.segment(ends[0], ends[1]).map_or(0.0, |piece| piece.force.y * self.stiffness_n_per_m2)
     }
 
     /// Deflection under a load on level ground [m].
@@ -135,52 +197,73 @@ impl Envelope {
         deepest_m
     }
 
-    /// Contact of the wheel with the ground, `None` in the air.
-    pub(crate) fn touch(&self, ground: &Ground, disc: &Disc) -> Option<Contact> {
-        let mut pressure = Pressure::default();
+    /// Contacts of the wheel with the ground, none in the air.
+    pub(crate) fn touch(&self, ground: &Ground, disc: &Disc) -> [Option<Contact>; CONTACTS] {
+        let mut contacts = [Pressure::default(); CONTACTS];
         for &left_m in &self.slices_m {
-            self.press_slice(ground, disc, left_m, &mut pressure);
+            self.press_slice(ground, disc, left_m, &mut contacts);
         }
-        if pressure.weight <= 0.0 {
-            return None;
-        }
+        contacts.map(|pressure| (pressure.weight > 0.0).then(|| self.contact(disc, &pressure)))
+    }
+
+    fn contact(&self, disc: &Disc, pressure: &Pressure) -> Contact {
         let inward = pressure.force.normalize();
-        let loaded_radius_m = -pressure.place.dot(&inward) / pressure.weight;
+        let loaded_radius_m = pressure.loaded_radius_m(&inward);
         let point_m = disc.hub_m + disc.left * (pressure.lateral / pressure.weight)
             - (disc.ahead * inward.x + disc.up * inward.y) * loaded_radius_m;
-        let cross_slope = self.cross_slope(ground, disc, &point_m);
+        let cross_slope = pressure.cross / pressure.weight;
         let force = disc.ahead * pressure.force.x + (disc.up - disc.left * cross_slope) * pressure.force.y;
         let magnitude = force.norm();
         let force_n = magnitude * self.stiffness_n_per_m2 / self.slices_m.len() as f64;
-        Some(Contact { point_m, normal: force / magnitude, force_n, loaded_radius_m })
+        Contact { point_m, normal: force / magnitude, force_n, loaded_radius_m }
     }
 
-    fn press_slice(&self, ground: &Ground, disc: &Disc, left_m: f64, pressure: &mut Pressure) {
+    fn press_slice(&self, ground: &Ground, disc: &Disc, left_m: f64, contacts: &mut [Pressure; CONTACTS]) {
         let foot = disc.hub_m + disc.left * left_m - disc.up * self.radius_m;
-        let mut previous = None;
+        let mut previous: Option<Vector2<f64>> = None;
+        let mut place = Pressure::default();
+        let mut tangent = Vector2::zeros();
         for &ahead_m in &self.stations_m {
-            let place = foot + disc.ahead * ahead_m;
-            let above_m = ground.height_m(place.x, place.y) - place.z;
+            let at = foot + disc.ahead * ahead_m;
+            let above_m = ground.height_m(at.x, at.y) - at.z;
             // The ground point in the wheel's plane, seen from the hub.
             let point = Vector2::new(ahead_m, above_m * disc.up.z - self.radius_m);
-            if let Some(before) = previous
-                && let Some((force, middle)) = self.segment(before, point)
-            {
-                let weight = force.norm();
-                pressure.force += force;
-                pressure.weight += weight;
-                pressure.place += middle * weight;
-                pressure.lateral += weight * left_m;
-            }
+            let piece = previous.and_then(|before| self.segment(before, point));
             previous = Some(point);
+            let is_corner = piece.as_ref().is_none_or(|piece| tangent.perp(&piece.tangent) > CORNER_SINE);
+            if is_corner {
+                self.leave(ground, disc, left_m, &mut place, contacts);
+            }
+            let Some(piece) = piece else { continue };
+            let weight = piece.force.norm();
+            place.force += piece.force;
+            place.weight += weight;
+            place.place += piece.middle * weight;
+            place.lateral += weight * left_m;
+            tangent = piece.tangent;
+        }
+        self.leave(ground, disc, left_m, &mut place, contacts);
+    }
+
+    /// Ends a place under a disc.
+    fn leave(
+        &self,
+        ground: &Ground,
+        disc: &Disc,
+        left_m: f64,
+        place: &mut Pressure,
+        contacts: &mut [Pressure; CONTACTS],
+    ) {
+        if place.weight > 0.0 {
+            place.cross = place.weight * self.cross_slope(ground, disc, left_m, place);
+            gather(&std::mem::take(place), contacts);
         }
     }
 
-    /// Force of a straight piece of ground, from back to front, on a disc over its stiffness [m2], and the middle of the
-    /// pressed part seen from the hub [m]: the integral of (r - rho) times the direction to the hub over the part
+    /// Force of a straight piece of ground, from back to front, on a disc: the integral of (r - rho) times the direction to the hub over the part
     /// inside.
     #[inline]
-    fn segment(&self, start: Vector2<f64>, end: Vector2<f64>) -> Option<(Vector2<f64>, Vector2<f64>)> {
+    fn segment(&self, start: Vector2<f64>, end: Vector2<f64>) -> Option<Piece> {
         let r = self.radius_m;
         let run = end - start;
         let squares = [start.norm_squared(), end.norm_squared()];
@@ -213,17 +296,24 @@ impl Envelope {
         let inward = d * (r * ratio.ln() - (b - a));
         let along = -(r * (rho_b - rho_a) - 0.5 * (rho_b * rho_b - rho_a * rho_a));
         let rim = r * (RIM_SHARE * r - nearest).max(0.0) * (b - a) / (2.0 * r);
-        Some((normal * (inward + rim) + tangent * along, tangent * (0.5 * (a + b)) - normal * d))
+        let force = normal * (inward + rim) + tangent * along;
+        Some(Piece { force, middle: tangent * (0.5 * (a + b)) - normal * d, tangent })
     }
 
-    /// Rise of the ground per length along the axle, seen in the wheel's frame [-].
-    fn cross_slope(&self, ground: &Ground, disc: &Disc, point_m: &Vector3<f64>) -> f64 {
+    /// Rise per length along the axle of the ground that a place under a disc stands on, seen in the wheel's frame [-]:
+    /// taken close beside the disc, so that a tread half on a step is not pushed off as if by a slope.
+    fn cross_slope(&self, ground: &Ground, disc: &Disc, left_m: f64, place: &Pressure) -> f64 {
+        let inward = place.force.normalize();
+        let radius_m = place.loaded_radius_m(&inward);
+        let point_m =
+            disc.hub_m + disc.left * left_m - (disc.ahead * inward.x + disc.up * inward.y) * radius_m;
+        let beside_m = BESIDE_SHARE * self.width_m / self.slices_m.len() as f64;
         let above_m = |side: f64| {
-            let place = point_m + disc.left * (0.5 * side * self.width_m);
+            let place = point_m + disc.left * (side * beside_m);
             ground.height_m(place.x, place.y) - place.z
         };
         let rise_m = above_m(1.0) - above_m(-1.0);
-        let run_m = (self.width_m + rise_m * disc.left.z).max(0.1 * self.width_m);
+        let run_m = (2.0 * beside_m + rise_m * disc.left.z).max(0.2 * beside_m);
         (rise_m * disc.up.z / run_m).clamp(-CROSS_SLOPE_MAX, CROSS_SLOPE_MAX)
     }
 }
@@ -237,115 +327,4 @@ fn slices_m(width_m: f64, cell_m: f64) -> Vec<f64> {
 }
 
 #[cfg(test)]
-mod tests {
-    use std::sync::Arc;
-
-    use terrain::GridGeometry;
-
-    use super::*;
-    use crate::{Patch, Stribeck, World};
-
-    const RADIUS_M: f64 = 0.4;
-
-    fn ground(height_m: impl Fn(f64, f64) -> f64) -> Ground {
-        let geometry = GridGeometry::centred(0.1, 80, 80, 0.0, 0.0);
-        let patch = |_: f64, _: f64| Patch::open(Stribeck::ROCK);
-        Ground::new(Arc::new(World::from_fn("test", geometry, height_m, patch).unwrap()))
-    }
-
-    /// A tyre of 200 kN/m under 4 kN: 20 mm.
-    fn tyre() -> Envelope {
-        Envelope::new(RADIUS_M, 0.2, 200_000.0, 4000.0, 0.1)
-    }
-
-    /// Upright, heading east.
-    fn upright(hub_m: Vector3<f64>) -> Disc {
-        Disc::new(hub_m, Vector3::y()).unwrap()
-    }
-
-    #[test]
-    fn the_plane_answers_with_the_given_stiffness() {
-        let tyre = tyre();
-        assert!((tyre.deflection_m(4000.0) - 0.02).abs() < 1e-9);
-        // Depth to the power 1.5 for small depths: half the load at 2^(-2/3) of the depth.
-        assert!((tyre.deflection_m(2000.0) / (0.02 * 2f64.powf(-2.0 / 3.0)) - 1.0).abs() < 0.01);
-        let hub_m = Vector3::new(0.013, 0.021, RADIUS_M - 0.02);
-        for heading in [Vector3::y(), -Vector3::x(), Vector3::new(0.6, 0.8, 0.0)] {
-            let contact = tyre.touch(&ground(|_, _| 0.0), &Disc::new(hub_m, heading).unwrap()).unwrap();
-            assert!((contact.force_n - 4000.0).abs() < 1e-6, "{contact:?}");
-            assert!((contact.normal - Vector3::z()).norm() < 1e-9, "{contact:?}");
-            assert!(
-                (contact.loaded_radius_m - 0.38).abs() < 1e-9 && contact.point_m.z.abs() < 1e-9,
-                "{contact:?}"
-            );
-        }
-    }
-
-    #[test]
-    fn a_slope_pushes_along_its_normal() {
-        for slope_rad in [0.2f64, 0.5, 0.9] {
-            let normal = Vector3::new(-slope_rad.sin(), 0.0, slope_rad.cos());
-            let ground = ground(|x_m, _| x_m * slope_rad.tan());
-            let contact = tyre().touch(&ground, &upright(normal * (RADIUS_M - 0.02))).unwrap();
-            assert!((contact.force_n / 4000.0 - 1.0).abs() < 1e-3, "{slope_rad}: {contact:?}");
-            assert!((contact.normal - normal).norm() < 1e-3, "{slope_rad}: {contact:?}");
-        }
-    }
-
-    #[test]
-    fn a_leaning_wheel_on_a_leaning_plane_is_an_upright_one_on_a_level_plane() {
-        let slope_rad = 0.5f64;
-        let normal = Vector3::new(0.0, -slope_rad.sin(), slope_rad.cos());
-        let left = Vector3::new(0.0, slope_rad.cos(), slope_rad.sin());
-        let ground = ground(|_, y_m| y_m * slope_rad.tan());
-        let disc = Disc::new(normal * (RADIUS_M - 0.02), left).unwrap();
-        let contact = tyre().touch(&ground, &disc).unwrap();
-        assert!((contact.force_n / 4000.0 - 1.0).abs() < 1e-3, "{contact:?}");
-        assert!((contact.normal - normal).norm() < 1e-3, "{contact:?}");
-    }
-
-    #[test]
-    fn a_cross_slope_pushes_sideways() {
-        // An upright wheel on ground that rises to its left by 0.2: the normal leans to the right.
-        let ground = ground(|_, y_m| 0.2 * y_m);
-        let hub_m = Vector3::new(0.0, 0.0, RADIUS_M - 0.02);
-        let contact = tyre().touch(&ground, &upright(hub_m)).unwrap();
-        let expected = Vector3::new(0.0, -0.2, 1.0).normalize();
-        assert!((contact.normal - expected).norm() < 1e-3, "{contact:?}");
-        // And the centre of pressure moves uphill.
-        assert!(contact.point_m.y > 0.005, "{contact:?}");
-    }
-
-    #[test]
-    fn rough_ground_presses_as_the_sum_over_its_points() {
-        // Kinks at the cell centres only, every other of a finer tyre's stations: the chain is the ground itself.
-        let tyre = Envelope::new(RADIUS_M, 0.2, 200_000.0, 4000.0, 0.2 / 3.0);
-        let heights_m = |x_m: f64| 0.05 * (9.0 * x_m).sin() + 0.03 * (23.0 * x_m).cos();
-        let ground = ground(|x_m, _| heights_m(x_m));
-        for step in 0..20 {
-            let hub_m =
-                Vector3::new(0.05 + 0.1 * f64::from(step), 0.05, heights_m(0.1 * f64::from(step)) + 0.37);
-            let found = tyre.touch(&ground, &upright(hub_m));
-            let mut sum = Vector3::zeros();
-            let n = 80_000;
-            let dx_m = 2.0 * RADIUS_M / f64::from(n);
-            for i in 0..n {
-                let x_m = hub_m.x - RADIUS_M + (f64::from(i) + 0.5) * dx_m;
-                let height_m = |x_m: f64| ground.height_m(x_m, 0.05);
-                let rise = (height_m(x_m + 0.5 * dx_m) - height_m(x_m - 0.5 * dx_m)) / dx_m;
-                let towards = hub_m - Vector3::new(x_m, hub_m.y, height_m(x_m));
-                let depth_m = (RADIUS_M - towards.norm()).max(0.0);
-                sum += towards.normalize() * (depth_m * dx_m * (1.0 + rise * rise).sqrt());
-            }
-            let expected_n = sum * tyre.stiffness_n_per_m2;
-            let found_n = found.map_or(Vector3::zeros(), |contact| contact.normal * contact.force_n);
-            assert!((found_n - expected_n).norm() < 1.0 + 2e-3 * expected_n.norm(), "{found_n} {expected_n}");
-        }
-    }
-
-    #[test]
-    fn a_wheel_in_the_air_touches_nothing() {
-        let hub_m = Vector3::new(0.0, 0.0, RADIUS_M + 1e-6);
-        assert!(tyre().touch(&ground(|_, _| 0.0), &upright(hub_m)).is_none());
-    }
-}
+mod tests;

@@ -11,8 +11,13 @@ pub(crate) struct Ground {
     cells_per_m: f64,
     n_rows: usize,
     n_cols: usize,
+    /// Whether anything stands on the ground.
+    has_obstacles: bool,
     world: Arc<World>,
 }
+
+/// A surface raised by more than this belongs to an obstacle [m].
+const RAISED_MIN_M: f64 = 1e-3;
 
 impl Ground {
     pub(crate) fn new(world: Arc<World>) -> Self {
@@ -24,6 +29,7 @@ impl Ground {
             cells_per_m: 1.0 / geometry.resolution_m,
             n_rows: geometry.n_rows,
             n_cols: geometry.n_cols,
+            has_obstacles: world.patches.values().iter().any(|patch| patch.obstacle_height_m > 0.0),
             world,
         }
     }
@@ -48,6 +54,11 @@ impl Ground {
         } else {
             south_west + v * (north_west - south_west) + u * (north_east - north_west)
         }
+    }
+
+    /// Whether the surface there is that of an obstacle.
+    pub(crate) fn is_obstacle(&self, x_m: f64, y_m: f64) -> bool {
+        self.has_obstacles && self.height_m(x_m, y_m) > self.world.height_m(x_m, y_m) + RAISED_MIN_M
     }
 
     /// What the ground is made of.
@@ -81,6 +92,11 @@ impl Ground {
     /// All heights, row-major from the south-west [m].
     pub(crate) fn surface_m(&self) -> &[f32] {
         &self.surface_m
+    }
+
+    /// Whether anything stands on the ground.
+    pub(crate) fn has_obstacles(&self) -> bool {
+        self.has_obstacles
     }
 
     /// Edge of a cell [m].

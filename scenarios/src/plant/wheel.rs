@@ -1,21 +1,18 @@
 //! One wheel on its strut: travel, spin, and the forces it hands to the body.
 
-use bicycle::{Suspension, Vehicle};
+use bicycle::Vehicle;
 use nalgebra::{Vector2, Vector3};
 
 use super::chassis::{BodyMotion, Wrench};
 use super::drivetrain::WheelTorque;
-use super::envelope::{Contact, Disc, Envelope};
+use super::envelope::{CONTACTS, Contact, Disc, Envelope};
 use super::ground::Ground;
 use super::rest::Rest;
+use super::strut::Strut;
 use super::tyre::{Bristles, Footing, Tyre};
 use super::vegetation::{Immersion, Stems};
 use crate::Deviation;
 
-/// Stiffness of the travel stops over that of the spring [-].
-const STOP_RATIO: f64 = 10.0;
-/// Damping of the travel stops over critical for the wheel [-].
-const STOP_DAMPING: f64 = 0.3;
 /// Radial damping of the tyre over critical for the wheel [-].
 const TYRE_DAMPING: f64 = 0.05;
 
@@ -47,24 +44,21 @@ pub(crate) struct Wheel {
     pub inertia_kgm2: f64,
     /// Along the axle.
     left: Vector3<f64>,
-    bristles: Bristles,
+    touches: [Option<Touch>; CONTACTS],
     stems: Stems,
     /// Normal force of the ground [N].
     pub load_n: f64,
     /// Normal and friction force of the ground in map coordinates [N].
     pub force_n: Vector3<f64>,
-    /// Where the ground pushes, if it does.
-    pub contact: Option<Contact>,
 }
 
-/// Strut of one axle's wheels.
+/// A place where a wheel touches the ground.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Strut {
-    suspension: Suspension,
-    /// Spring force at rest [N].
-    preload_n: f64,
-    stop_n_per_m: f64,
-    stop_ns_per_m: f64,
+pub(crate) struct Touch {
+    pub contact: Contact,
+    bristles: Bristles,
+    /// Normal and friction force of the ground in map coordinates [N].
+    pub force_n: Vector3<f64>,
 }
 
 /// What acts on one wheel from the vehicle's side.
@@ -102,9 +96,14 @@ struct Slide {
 }
 
 /// What the ground does to a wheel.
+#[derive(Default)]
 struct Stand {
     /// Force on the hub [N].
     force_n: Vector3<f64>,
+    /// Its moment about the hub [N m].
+    moment_nm: Vector3<f64>,
+    /// Sum of the normal forces [N].
+    load_n: f64,
     /// Friction's torque against the wheel's turning [N m].
     grip_nm: f64,
     /// Its growth with the turning within a step [N m s].
@@ -123,18 +122,43 @@ impl Wheel {
             spin_radps: 0.0,
             inertia_kgm2: 0.0,
             left: Vector3::y(),
-            bristles: Bristles::default(),
+            touches: [None; CONTACTS],
             stems: Stems::default(),
             load_n: 0.0,
             force_n: Vector3::zeros(),
-            contact: None,
         }
+    }
+
+    /// Where the ground pushes.
+    pub(crate) fn touches(&self) -> impl Iterator<Item = &Touch> {
+        self.touches.iter().flatten()
+    }
+
+    /// Where the ground pushes most.
+    pub(crate) fn heaviest(&self) -> Option<Contact> {
+        let heavier = |a: &&Touch, b: &&Touch| a.contact.force_n.total_cmp(&b.contact.force_n);
+        self.touches().max_by(heavier).map(|touch| touch.contact)
     }
 
     /// What of the ground's force lies in the ground, in map coordinates [N].
     pub(crate) fn friction_n(&self) -> Vector3<f64> {
-        let normal = self.contact.map_or_else(Vector3::zeros, |contact| contact.normal);
-        self.force_n - normal * self.force_n.dot(&normal)
+        let in_ground_n = |touch: &Touch| {
+            let normal = touch.contact.normal;
+            touch.force_n - normal * touch.force_n.dot(&normal)
+        };
+        self.touches().map(in_ground_n).sum()
+    }
+
+    /// Takes new contacts; the tread is bent in each as it was in the one that pushed from the nearest direction.
+    fn touch(&mut self, contacts: [Option<Contact>; CONTACTS]) {
+        let before = self.touches;
+        self.touches = contacts.map(|contact| {
+            let contact = contact?;
+            let along = |touch: &&Touch| touch.contact.normal.dot(&contact.normal);
+            let nearest = before.iter().flatten().max_by(|a, b| along(a).total_cmp(&along(b)));
+            let bristles = nearest.map_or_else(Bristles::default, |touch| touch.bristles);
+            Some(Touch { contact, bristles, force_n: Vector3::zeros() })
+        });
     }
 
     /// Turns by a torque between this wheel and others for a step, which pushes back on the body that carries both.
@@ -155,28 +179,6 @@ impl Wheel {
             left: left * cos - ahead * sin,
             up,
         }
-    }
-}
-
-impl Strut {
-    pub(crate) fn new(suspension: Suspension, load_n: f64, wheel_kg: f64) -> Self {
-        let stop_n_per_m = STOP_RATIO * suspension.stiffness_n_per_m;
-        let stop_ns_per_m = 2.0 * STOP_DAMPING * (stop_n_per_m * wheel_kg).sqrt();
-        Self { suspension, preload_n: load_n, stop_n_per_m, stop_ns_per_m }
-    }
-
-    /// Force at a travel [N], its stiffness [N/m] and damping [N s/m].
-    fn law(&self, travel_m: f64) -> [f64; 3] {
-        let Suspension { stiffness_n_per_m, damping_ns_per_m, travel_m: most_m } = self.suspension;
-        let spring_n = self.preload_n + stiffness_n_per_m * travel_m;
-        // An unloaded spring is loose, it does not pull.
-        let spring = if spring_n > 0.0 { [spring_n, stiffness_n_per_m] } else { [0.0, 0.0] };
-        let beyond_m = travel_m - travel_m.clamp(-most_m, most_m);
-        if beyond_m == 0.0 {
-            return [spring[0], spring[1], damping_ns_per_m];
-        }
-        let force_n = spring[0] + self.stop_n_per_m * beyond_m;
-        [force_n, spring[1] + self.stop_n_per_m, damping_ns_per_m + self.stop_ns_per_m]
     }
 }
 
@@ -227,21 +229,14 @@ impl RunningGear {
         wheel.left = frame.left;
         let hub_mps = body.velocity_at_mps(&frame.hub_m) + frame.up * wheel.travel_mps;
         let body_radps = body.angular_radps.dot(&frame.left);
-        wheel.contact =
-            Disc::new(frame.hub_m, frame.left).and_then(|disc| self.envelope.touch(ground, &disc));
-        let stand = match wheel.contact {
-            Some(contact) => {
-                let slide = self.slide(wheel, &contact, &frame, &hub_mps, body);
-                self.stand(wheel, &contact, &slide, ground)
-            }
-            None => self.hang(wheel),
-        };
+        let disc = Disc::new(frame.hub_m, frame.left);
+        wheel.touch(disc.map_or([None; CONTACTS], |disc| self.envelope.touch(ground, &disc)));
+        let stand = self.stand(wheel, &frame, &hub_mps, body, ground);
         wheel.force_n = stand.force_n;
+        wheel.load_n = stand.load_n;
         let shaft_nm = self.turn(wheel, &stand, &input.torque, body_radps);
         // About its own axle the wheel turns freely: there the body feels the shaft and nothing else.
-        let arm_m = wheel.contact.map_or_else(Vector3::zeros, |contact| contact.point_m - frame.hub_m);
-        let moment_nm = arm_m.cross(&stand.force_n);
-        wrench.torque_nm += moment_nm - frame.left * (moment_nm.dot(&frame.left) + shaft_nm);
+        wrench.torque_nm += stand.moment_nm - frame.left * (stand.moment_nm.dot(&frame.left) + shaft_nm);
         // Along the strut the body feels the spring and nothing else.
         let along_n = stand.force_n.dot(&frame.up);
         let strut_n = self.stroke(wheel, strut, along_n - input.anti_roll_n) + input.anti_roll_n;
@@ -270,31 +265,62 @@ impl RunningGear {
         Slide { forward, left, slip_mps, rolling_radius_m, load_n }
     }
 
-    fn stand(&self, wheel: &mut Wheel, contact: &Contact, slide: &Slide, ground: &Ground) -> Stand {
+    /// What the ground does in all places.
+    fn stand(
+        &self,
+        wheel: &mut Wheel,
+        frame: &WheelFrame,
+        hub_mps: &Vector3<f64>,
+        body: &BodyMotion,
+        ground: &Ground,
+    ) -> Stand {
+        let mut touches = wheel.touches;
+        let mut stand = Stand::default();
+        for touch in touches.iter_mut().flatten() {
+            let slide = self.slide(wheel, &touch.contact, frame, hub_mps, body);
+            self.stand_in(touch, wheel.spin_radps, &slide, ground, &mut stand);
+            stand.moment_nm += (touch.contact.point_m - frame.hub_m).cross(&touch.force_n);
+        }
+        wheel.touches = touches;
+        stand
+    }
+
+    /// Adds what the ground does in one of them.
+    fn stand_in(
+        &self,
+        touch: &mut Touch,
+        spin_radps: f64,
+        slide: &Slide,
+        ground: &Ground,
+        stand: &mut Stand,
+    ) {
+        let contact = &touch.contact;
         let soil = ground.patch(contact.point_m.x, contact.point_m.y);
         let footing = Footing {
             slip_mps: slide.slip_mps,
-            rolling_mps: wheel.spin_radps * slide.rolling_radius_m,
+            rolling_mps: spin_radps * slide.rolling_radius_m,
             load_n: slide.load_n,
             friction: soil.friction,
         };
-        let grip = self.tyre.grip(&mut wheel.bristles, &footing, self.step_s);
+        let grip = self.tyre.grip(&mut touch.bristles, &footing, self.step_s);
+        touch.force_n =
+            contact.normal * slide.load_n + slide.forward * grip.force_n.x + slide.left * grip.force_n.y;
         let resistance = self.rolling_resistance + f64::from(soil.rolling_resistance);
-        wheel.load_n = slide.load_n;
-        Stand {
-            force_n: contact.normal * slide.load_n
-                + slide.forward * grip.force_n.x
-                + slide.left * grip.force_n.y,
-            grip_nm: grip.force_n.x * slide.rolling_radius_m,
-            grip_nms: grip.stiffness_ns_per_m * slide.rolling_radius_m * slide.rolling_radius_m,
-            resistance_nm: resistance * slide.load_n * slide.rolling_radius_m,
-        }
+        stand.force_n += touch.force_n;
+        stand.load_n += slide.load_n;
+        stand.grip_nm += grip.force_n.x * slide.rolling_radius_m;
+        stand.grip_nms += grip.stiffness_ns_per_m * slide.rolling_radius_m * slide.rolling_radius_m;
+        stand.resistance_nm += resistance * slide.load_n * slide.rolling_radius_m;
     }
 
-    fn hang(&self, wheel: &mut Wheel) -> Stand {
-        wheel.bristles = Bristles::default();
-        wheel.load_n = 0.0;
-        Stand { force_n: Vector3::zeros(), grip_nm: 0.0, grip_nms: 0.0, resistance_nm: 0.0 }
+    /// Force of obstacles on a wheel in map coordinates [N].
+    pub(crate) fn obstacle_force_n(&self, wheel: &Wheel, ground: &Ground) -> Vector3<f64> {
+        let of_obstacles = wheel.touches().filter(|touch| {
+            // The face that pushes may begin as far behind the contact as the ground is asked for.
+            let place_m = touch.contact.point_m - touch.contact.normal * self.envelope.spacing_m();
+            ground.is_obstacle(place_m.x, place_m.y)
+        });
+        of_obstacles.map(|touch| touch.force_n).sum()
     }
 
     /// Turns the wheel by a step, implicitly in the slip, and gives the torque of the shaft on the wheel [N m].
@@ -315,7 +341,8 @@ impl RunningGear {
     /// Moves the strut by a step, implicitly in its own and the tyre's stiffness, and gives its force [N].
     fn stroke(&self, wheel: &mut Wheel, strut: &Strut, load_n: f64) -> f64 {
         let [force_n, stiffness_n_per_m, damping_ns_per_m] = strut.law(wheel.travel_m);
-        let tyre_n_per_m = if wheel.contact.is_some() { self.radial_n_per_m } else { 0.0 };
+        let touches = wheel.touches().next().is_some();
+        let tyre_n_per_m = if touches { self.radial_n_per_m } else { 0.0 };
         let inertia_kg = self.mass_kg
             + self.step_s * (damping_ns_per_m + self.step_s * (stiffness_n_per_m + tyre_n_per_m));
         wheel.travel_mps = (self.mass_kg * wheel.travel_mps + self.step_s * (load_n - force_n)) / inertia_kg;
