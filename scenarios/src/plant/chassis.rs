@@ -19,6 +19,8 @@ const CHECK_STEPS: u32 = 16;
 const NEAR_SHARE: f64 = 0.25;
 /// Places along the vehicle at which its underside is held against the ground.
 const UNDERSIDE_PLACES: f64 = 36.0;
+/// Points that a row of them has at the most.
+const ROW_MAX: usize = UNDERSIDE_PLACES as usize + 2;
 /// Below this cosine of the body's tilt its sides may touch first: every hull then counts as near.
 const TILTED_COSINE: f64 = 0.6;
 
@@ -47,8 +49,17 @@ pub(crate) struct Wrench {
 /// A box of the body.
 struct Hull {
     collider: ColliderHandle,
-    /// Points of the underside in the body frame [m].
-    underside_m: Vec<Vector3<f64>>,
+    underside: Underside,
+}
+
+/// The lattice of points at which a hull's underside is held against the ground, in the body frame.
+struct Underside {
+    /// Rear right corner [m].
+    first_m: Vector3<f64>,
+    /// To the next point ahead and to the left [m].
+    spacing_m: [f64; 2],
+    /// Points ahead and to the left.
+    n: [usize; 2],
 }
 
 /// The rigid body.
@@ -66,6 +77,8 @@ pub(crate) struct Chassis {
     steps_to_check: u32,
     /// Whether a hull is near the ground: then rapier moves the body.
     is_near: bool,
+    /// What contact gave the body in the last step beside the ground [N s].
+    contact_impulse_ns: Vector3<f64>,
 }
 
 impl BodyMotion {
@@ -137,7 +150,7 @@ impl Chassis {
             .into_iter()
             .map(|[low_m, high_m]| Hull {
                 collider: physics.insert_collider(panel(&low_m, &high_m), Some(body)),
-                underside_m: underside(&low_m, &high_m, spacing_m),
+                underside: Underside::of(&low_m, &high_m, spacing_m),
             })
             .collect();
         let motion = BodyMotion::at_rest(pose, &stance.cog_m);
@@ -154,6 +167,7 @@ impl Chassis {
             step_s,
             steps_to_check: 0,
             is_near: false,
+            contact_impulse_ns: Vector3::zeros(),
         }
     }
 
@@ -178,9 +192,9 @@ impl Chassis {
 
     /// Newton's and Euler's equations, velocities before positions.
     fn step_in_air(&mut self, wrench: &Wrench) {
+        let free_mps2 = self.free_mps2(wrench);
         let motion = &mut self.motion;
-        let gravity_mps2 = Vector3::z() * GRAVITY_MPS2;
-        motion.linear_mps += (wrench.force_n / self.mass_kg - gravity_mps2) * self.step_s;
+        motion.linear_mps += free_mps2 * self.step_s;
         let rate_radps = motion.in_body(&motion.angular_radps);
         let momentum = self.inertia_kgm2.component_mul(&rate_radps);
         let torque_nm = motion.in_body(&wrench.torque_nm) - rate_radps.cross(&momentum);
@@ -196,6 +210,7 @@ impl Chassis {
     }
 
     fn step_beside_ground(&mut self, wrench: &Wrench) {
+        let free_mps = self.motion.linear_mps + self.free_mps2(wrench) * self.step_s;
         let body = &mut self.physics.bodies[self.body];
         body.reset_forces(false);
         body.reset_torques(false);
@@ -212,30 +227,32 @@ impl Chassis {
         motion.cog_m = motion.point_m(&self.cog_m);
         motion.linear_mps = nalgebra(body.linvel());
         motion.angular_radps = nalgebra(body.angvel());
+        self.contact_impulse_ns = (motion.linear_mps - free_mps) * self.mass_kg;
     }
 
-    /// Impulse of obstacles on the body in the last step, in map coordinates [N s].
+    /// Acceleration of the body if nothing but the wheels touched it [m/s2].
+    fn free_mps2(&self, wrench: &Wrench) -> Vector3<f64> {
+        wrench.force_n / self.mass_kg - Vector3::z() * GRAVITY_MPS2
+    }
+
+    /// Impulse of contact on the body in the last step, in map coordinates, if an obstacle touched it [N s]: what is
+    /// left of the change of momentum. The engine's own numbers keep what points gave that have parted since.
     pub(crate) fn obstacle_impulse_ns(&self, ground: &Ground) -> Vector3<f64> {
-        let mut impulse_ns = Vector3::zeros();
-        if !self.is_near {
-            return impulse_ns;
+        if self.is_near && self.hulls.iter().any(|hull| self.is_at_obstacle(hull, ground)) {
+            self.contact_impulse_ns
+        } else {
+            Vector3::zeros()
         }
-        for hull in &self.hulls {
-            for pair in self.physics.contact_pairs_with(hull.collider) {
-                // A manifold's normal points from the pair's first collider to its second.
-                let sign = if pair.collider2 == hull.collider { 1.0 } else { -1.0 };
-                let first = self.physics.colliders[pair.collider1].position();
-                for manifold in pair.solver_manifolds() {
-                    let at_obstacle = manifold.points.iter().filter(|point| {
-                        let place_m = *first * point.local_p1;
-                        point.data.impulse > 0.0 && ground.is_obstacle(place_m.x, place_m.y)
-                    });
-                    let sum_ns: f64 = at_obstacle.map(|point| point.data.impulse).sum();
-                    impulse_ns += nalgebra(manifold.data.normal) * (sign * sum_ns);
-                }
-            }
-        }
-        impulse_ns
+    }
+
+    fn is_at_obstacle(&self, hull: &Hull, ground: &Ground) -> bool {
+        let touching = self.physics.contact_pairs_with(hull.collider).filter(|pair| pair.has_any_active_contact());
+        let mut places_m = touching.flat_map(|pair| {
+            let first = *self.physics.colliders[pair.collider1].position();
+            let points = pair.solver_manifolds().iter().flat_map(|manifold| &manifold.points);
+            points.filter(|point| point.data.impulse > 0.0).map(move |point| first * point.local_p1)
+        });
+        places_m.any(|place_m| ground.is_obstacle(place_m.x, place_m.y))
     }
 
     /// Contact with the ground costs more than all the rest: hulls take part only near it, and rapier only with them.
@@ -244,13 +261,9 @@ impl Chassis {
         let until_check_m = motion.linear_mps.norm() * self.step_s * f64::from(CHECK_STEPS);
         let margin_m = self.near_m + until_check_m;
         let tilted = motion.axes[2].z < TILTED_COSINE;
-        let low = |local_m: &Vector3<f64>| {
-            let point_m = motion.point_m(local_m);
-            point_m.z - ground.height_m(point_m.x, point_m.y) < margin_m
-        };
         let was_near = std::mem::replace(&mut self.is_near, false);
         for hull in &self.hulls {
-            let near = tilted || hull.underside_m.iter().any(low);
+            let near = tilted || hull.underside.is_near(motion, ground, margin_m);
             self.physics.colliders[hull.collider].set_enabled(near);
             self.is_near |= near;
         }
@@ -297,14 +310,31 @@ fn panel(low_m: &Vector3<f64>, high_m: &Vector3<f64>) -> Collider {
         .build()
 }
 
-fn underside(low_m: &Vector3<f64>, high_m: &Vector3<f64>, spacing_m: f64) -> Vec<Vector3<f64>> {
-    let places = |low_m: f64, high_m: f64| {
-        let n = ((high_m - low_m) / spacing_m).ceil().max(1.0) as i32;
-        (0..=n).map(move |i| low_m + (high_m - low_m) * f64::from(i) / f64::from(n))
-    };
-    places(low_m.x, high_m.x)
-        .flat_map(|x_m| places(low_m.y, high_m.y).map(move |y_m| Vector3::new(x_m, y_m, low_m.z)))
-        .collect()
+impl Underside {
+    fn of(low_m: &Vector3<f64>, high_m: &Vector3<f64>, spacing_m: f64) -> Self {
+        let sides_m = [high_m.x - low_m.x, high_m.y - low_m.y];
+        let steps = sides_m.map(|side_m| (side_m / spacing_m).ceil().max(1.0));
+        Self {
+            first_m: *low_m,
+            spacing_m: [sides_m[0] / steps[0], sides_m[1] / steps[1]],
+            n: steps.map(|steps| steps as usize + 1),
+        }
+    }
+
+    /// Whether a point of it is less than `margin_m` above the ground.
+    fn is_near(&self, motion: &BodyMotion, ground: &Ground, margin_m: f64) -> bool {
+        let step_m = motion.axes[0] * self.spacing_m[0];
+        let mut heights_m = [0.0; ROW_MAX];
+        let heights_m = &mut heights_m[..self.n[0].min(ROW_MAX)];
+        (0..self.n[1]).any(|row| {
+            let left_m = Vector3::y() * (row as f64 * self.spacing_m[1]);
+            let first_m = motion.point_m(&(self.first_m + left_m));
+            ground.run_m([first_m.x, first_m.y], [step_m.x, step_m.y], heights_m);
+            let mut above_m =
+                heights_m.iter().enumerate().map(|(k, height_m)| first_m.z + k as f64 * step_m.z - height_m);
+            above_m.any(|above_m| above_m < margin_m)
+        })
+    }
 }
 
 /// The ground as rapier's heightfield. That one is y-up, its rows along z and columns along x; turned by a right

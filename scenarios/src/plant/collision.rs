@@ -13,8 +13,7 @@ pub struct Collision {
     pub time_s: f64,
     /// Where its rear axle's centre was then, in the map [m].
     pub at_m: [f64; 2],
-    /// Level momentum that the obstacle has taken from it by wheels and body, until the vehicle stood, came back or
-    /// parted from it [N s].
+    /// Level momentum that obstacles have taken from it by wheels and body, until it stood or came back [N s].
     pub impulse_ns: f64,
 }
 
@@ -23,8 +22,10 @@ pub struct Collision {
 pub(super) struct Collisions {
     first: Option<Collision>,
     impulse_ns: Vector2<f64>,
-    /// Whether the first touch has passed.
-    is_over: bool,
+    /// Level velocity before the last step [m/s].
+    velocity_mps: Vector2<f64>,
+    /// The same before the first touch [m/s].
+    approach_mps: Vector2<f64>,
 }
 
 impl Collisions {
@@ -35,17 +36,23 @@ impl Collisions {
         (chassis, ground): (&Chassis, &Ground),
         (time_s, step_s): (f64, f64),
     ) {
-        if self.is_over || !ground.has_obstacles() {
+        if !ground.has_obstacles() {
+            return;
+        }
+        let motion = chassis.motion();
+        // A hard body is stopped and thrown back within one step: what counts is how it came.
+        let before_mps = std::mem::replace(&mut self.velocity_mps, motion.linear_mps.xy());
+        if self.first.is_some() && before_mps.dot(&self.approach_mps) <= 0.0 {
+            self.approach_mps = Vector2::zeros();
             return;
         }
         let on_wheels = gear.iter().zip(wheels).map(|(gear, wheel)| gear.obstacle_force_n(wheel, ground));
         let impulse_ns =
             chassis.obstacle_impulse_ns(ground).xy() + on_wheels.sum::<Vector3<f64>>().xy() * step_s;
-        let motion = chassis.motion();
-        let is_against = impulse_ns.dot(&motion.linear_mps.xy()) < 0.0;
-        if self.first.is_some() && !is_against {
-            self.is_over = true;
-        } else if impulse_ns != Vector2::zeros() {
+        if impulse_ns != Vector2::zeros() {
+            if self.first.is_none() {
+                self.approach_mps = before_mps;
+            }
             self.impulse_ns += impulse_ns;
             let at_m = motion.origin_m.xy().into();
             let first = Collision { time_s, at_m, impulse_ns: 0.0 };

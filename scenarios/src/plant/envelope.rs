@@ -19,6 +19,9 @@ const SLICE_CELLS: f64 = 1.25;
 const STATION_CELLS: f64 = 0.75;
 /// The same over the wheel's radius [-].
 const STATION_SHARE: f64 = 0.25;
+/// Stations ahead of the hub at the most, and all together.
+const STATIONS_AHEAD: f64 = 12.0;
+const STATIONS: usize = 25;
 /// Share of the radius at which the rim meets the ground: beyond, the tyre is squeezed flat.
 const RIM_SHARE: f64 = 0.5;
 /// Share of the radius below which the ground may not come to the hub in the closed form (it is singular there).
@@ -67,6 +70,9 @@ pub(crate) struct Envelope {
     width_m: f64,
     /// Places ahead of the hub at which the ground's height is asked [m].
     stations_m: Vec<f64>,
+    /// How far below the hub ground between a station and the next may lie and touch the disc [m]: at the one, and at
+    /// the other.
+    reach_m: Vec<[f64; 2]>,
     /// Discs along the axle [m].
     slices_m: Vec<f64>,
     /// Force per length of ground and depth, all slices together [N/m2].
@@ -117,9 +123,6 @@ impl Pressure {
 
 /// Adds a place to the contact on its side, or to a new one, or, when there are enough, to the nearer one.
 fn gather(place: &Pressure, contacts: &mut [Pressure; CONTACTS]) {
-    if place.weight <= 0.0 {
-        return;
-    }
     let alike = contacts.iter().position(|contact| contact.weight <= 0.0 || contact.is_beside(place));
     let nearer = || {
         let [first, second] = contacts.map(|contact| contact.force.normalize().dot(&place.force));
@@ -142,10 +145,12 @@ impl Disc {
 impl Envelope {
     /// A tyre of secant stiffness `stiffness_n_per_m` under `load_n` on a plane, on ground of `cell_m` cells.
     pub(crate) fn new(radius_m: f64, width_m: f64, stiffness_n_per_m: f64, load_n: f64, cell_m: f64) -> Self {
-        let n = (radius_m / (STATION_CELLS * cell_m).min(STATION_SHARE * radius_m)).ceil().min(12.0) as i32;
-        let stations_m = (-n..=n).map(|i| f64::from(i) * radius_m / f64::from(n)).collect();
+        let n = (radius_m / (STATION_CELLS * cell_m).min(STATION_SHARE * radius_m)).ceil().min(STATIONS_AHEAD)
+            as i32;
+        let stations_m: Vec<_> = (-n..=n).map(|i| f64::from(i) * radius_m / f64::from(n)).collect();
+        let reach_m = stations_m.array_windows().map(|ends_m| reach_m(radius_m, ends_m)).collect();
         let slices_m = slices_m(width_m, cell_m);
-        let mut envelope = Self { radius_m, width_m, stations_m, slices_m, stiffness_n_per_m2: 1.0 };
+        let mut envelope = Self { radius_m, width_m, stations_m, reach_m, slices_m, stiffness_n_per_m2: 1.0 };
         envelope.stiffness_n_per_m2 = load_n / envelope.force_on_plane_n(load_n / stiffness_n_per_m);
         envelope
     }
@@ -219,19 +224,16 @@ impl Envelope {
     }
 
     fn press_slice(&self, ground: &Ground, disc: &Disc, left_m: f64, contacts: &mut [Pressure; CONTACTS]) {
-        let foot = disc.hub_m + disc.left * left_m - disc.up * self.radius_m;
-        let mut previous: Option<Vector2<f64>> = None;
         let mut place = Pressure::default();
         let mut tangent = Vector2::zeros();
-        for &ahead_m in &self.stations_m {
-            let at = foot + disc.ahead * ahead_m;
-            let above_m = ground.height_m(at.x, at.y) - at.z;
-            // The ground point in the wheel's plane, seen from the hub.
-            let point = Vector2::new(ahead_m, above_m * disc.up.z - self.radius_m);
-            let piece = previous.and_then(|before| self.segment(before, point));
-            previous = Some(point);
+        let points = self.ground_points(ground, disc, left_m);
+        for (ends, reach_m) in points[..self.stations_m.len()].array_windows().zip(&self.reach_m) {
+            let [start, end] = *ends;
+            // Most pieces lie far below the disc.
+            let is_far = start.y < -reach_m[0] && end.y < -reach_m[1];
+            let piece = if is_far { None } else { self.segment(start, end) };
             let is_corner = piece.as_ref().is_none_or(|piece| tangent.perp(&piece.tangent) > CORNER_SINE);
-            if is_corner {
+            if is_corner && place.weight > 0.0 {
                 self.leave(ground, disc, left_m, &mut place, contacts);
             }
             let Some(piece) = piece else { continue };
@@ -242,7 +244,26 @@ impl Envelope {
             place.lateral += weight * left_m;
             tangent = piece.tangent;
         }
-        self.leave(ground, disc, left_m, &mut place, contacts);
+        if place.weight > 0.0 {
+            self.leave(ground, disc, left_m, &mut place, contacts);
+        }
+    }
+
+    /// The ground under a disc at all stations, in the wheel's plane and seen from the hub [m].
+    #[inline]
+    fn ground_points(&self, ground: &Ground, disc: &Disc, left_m: f64) -> [Vector2<f64>; STATIONS] {
+        let foot = disc.hub_m + disc.left * left_m - disc.up * self.radius_m;
+        let mut heights_m = [0.0; STATIONS];
+        let n = self.stations_m.len();
+        let first = foot + disc.ahead * self.stations_m[0];
+        let step = disc.ahead * self.spacing_m();
+        ground.run_m([first.x, first.y], [step.x, step.y], &mut heights_m[..n]);
+        let mut points = [Vector2::zeros(); STATIONS];
+        for i in 0..n {
+            let ahead_m = self.stations_m[i];
+            points[i] = Vector2::new(ahead_m, (heights_m[i] - foot.z) * disc.up.z - self.radius_m);
+        }
+        points
     }
 
     /// Ends a place under a disc.
@@ -254,10 +275,8 @@ impl Envelope {
         place: &mut Pressure,
         contacts: &mut [Pressure; CONTACTS],
     ) {
-        if place.weight > 0.0 {
-            place.cross = place.weight * self.cross_slope(ground, disc, left_m, place);
-            gather(&std::mem::take(place), contacts);
-        }
+        place.cross = place.weight * self.cross_slope(ground, disc, left_m, place);
+        gather(&std::mem::take(place), contacts);
     }
 
     /// Force of a straight piece of ground, from back to front, on a disc: the integral of (r - rho) times the direction to the hub over the part
@@ -267,7 +286,7 @@ impl Envelope {
         let r = self.radius_m;
         let run = end - start;
         let squares = [start.norm_squared(), end.norm_squared()];
-        // Most pieces lie outside: told without roots and divisions.
+        // Pieces that lie outside are told without roots and divisions.
         let beside = start.dot(&run) * end.dot(&run) >= 0.0;
         if beside && squares[0] >= r * r && squares[1] >= r * r {
             return None;
@@ -316,6 +335,19 @@ impl Envelope {
         let run_m = (2.0 * beside_m + rise_m * disc.left.z).max(0.2 * beside_m);
         (rise_m * disc.up.z / run_m).clamp(-CROSS_SLOPE_MAX, CROSS_SLOPE_MAX)
     }
+}
+
+/// How far below the hub straight ground between two stations may lie at their places and touch the disc [m]: the rim's
+/// depth, and as much as the rim hangs below its own chord.
+fn reach_m(radius_m: f64, [start_m, end_m]: &[f64; 2]) -> [f64; 2] {
+    let rim_m = |ahead_m: f64| (radius_m * radius_m - ahead_m * ahead_m).max(0.0).sqrt();
+    let [start_rim_m, end_rim_m] = [rim_m(*start_m), rim_m(*end_m)];
+    let slope = (end_rim_m - start_rim_m) / (end_m - start_m);
+    // The rim hangs lowest below its chord where it runs along it.
+    let lowest_rim_m = radius_m / slope.hypot(1.0);
+    let chord_m = start_rim_m + slope * (-slope * lowest_rim_m - start_m);
+    let sag_m = lowest_rim_m - chord_m;
+    [start_rim_m + sag_m, end_rim_m + sag_m]
 }
 
 /// Places of discs along the axle that resist rolling over like the whole tread does: the second moment of

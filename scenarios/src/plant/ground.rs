@@ -16,6 +16,8 @@ pub(crate) struct Ground {
     world: Arc<World>,
 }
 
+/// A cell in fixed point.
+const ONE_CELL: f64 = 4_294_967_296.0;
 /// A surface raised by more than this belongs to an obstacle [m].
 const RAISED_MIN_M: f64 = 1e-3;
 
@@ -44,7 +46,42 @@ impl Ground {
         };
         let (col, u) = place(x_m, self.first_centre_m[0], self.n_cols);
         let (row, v) = place(y_m, self.first_centre_m[1], self.n_rows);
+        self.in_square(row, col, u, v)
+    }
+
+    /// The same at points `step_m` apart.
+    #[inline]
+    pub(crate) fn run_m(&self, first_m: [f64; 2], step_m: [f64; 2], heights_m: &mut [f64]) {
+        let first = [0, 1].map(|axis| (first_m[axis] - self.first_centre_m[axis]) * self.cells_per_m);
+        let step = step_m.map(|step_m| step_m * self.cells_per_m);
+        let n = heights_m.len() as f64 - 1.0;
+        let is_inside = |start: f64, step: f64, n_centres: usize| {
+            let [low, high] = [start.min(start + n * step), start.max(start + n * step)];
+            low >= 0.0 && high < (n_centres - 1) as f64
+        };
+        if !(is_inside(first[0], step[0], self.n_cols) && is_inside(first[1], step[1], self.n_rows)) {
+            for (k, height_m) in heights_m.iter_mut().enumerate() {
+                let [x_m, y_m] = [0, 1].map(|axis| first_m[axis] + k as f64 * step_m[axis]);
+                *height_m = self.height_m(x_m, y_m);
+            }
+            return;
+        }
+        // Whole numbers of 2^-32 cells, so that no step converts or checks a number.
+        let [mut col, mut row] = first.map(|first| (first * ONE_CELL) as i64);
+        let [col_step, row_step] = step.map(|step| (step * ONE_CELL) as i64);
+        for height_m in heights_m {
+            let share = |place: i64| f64::from(place as u32) * (1.0 / ONE_CELL);
+            *height_m = self.in_square((row >> 32) as usize, (col >> 32) as usize, share(col), share(row));
+            col += col_step;
+            row += row_step;
+        }
+    }
+
+    /// Height in the square whose south-west corner is this centre, at these shares of the way east and north.
+    #[inline(always)]
+    fn in_square(&self, row: usize, col: usize, u: f64, v: f64) -> f64 {
         let start = row * self.n_cols + col;
+        // One check of the bounds for all four.
         let south = &self.surface_m[start..start + self.n_cols + 2];
         let [south_west, south_east] = [south[0], south[1]].map(f64::from);
         let [north_west, north_east] = [south[self.n_cols], south[self.n_cols + 1]].map(f64::from);
