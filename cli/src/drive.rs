@@ -240,11 +240,9 @@ fn reason(outcome: Outcome, tally: &Tally, (pose, is_scripted): (&terrain::Pose,
             Some((reason, count)) => format!("{reason:?} in {count} cycles {place}"),
             None => place,
         },
-        Outcome::Stuck
-        | Outcome::OutOfBounds
-        | Outcome::Timeout
-        | Outcome::Collision
-        | Outcome::InWater => place,
+        Outcome::Stuck | Outcome::OutOfBounds | Outcome::Timeout | Outcome::Collision | Outcome::InWater => {
+            place
+        }
     }
 }
 

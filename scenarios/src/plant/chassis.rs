@@ -246,7 +246,8 @@ impl Chassis {
     }
 
     fn is_at_obstacle(&self, hull: &Hull, ground: &Ground) -> bool {
-        let touching = self.physics.contact_pairs_with(hull.collider).filter(|pair| pair.has_any_active_contact());
+        let touching =
+            self.physics.contact_pairs_with(hull.collider).filter(|pair| pair.has_any_active_contact());
         let mut places_m = touching.flat_map(|pair| {
             let first = *self.physics.colliders[pair.collider1].position();
             let points = pair.solver_manifolds().iter().flat_map(|manifold| &manifold.points);
