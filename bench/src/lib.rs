@@ -1,7 +1,7 @@
 //! What things cost on this machine, and the tables that are published: one update of the controller ([`control`]), a
 //! risk map of the physics prior ([`prior_map`]) and of what was learned ([`learned_map`]), learning ([`learning`],
-//! [`traction_map`]), navigation ([`navigation`]) and diagnoses ([`gap_score`], [`gap_closed_loop`]). A part of
-//! [Surefoot](../cli/index.html).
+//! [`traction_map`]), navigation ([`navigation`]), diagnoses ([`gap_score`], [`gap_closed_loop`]) and the plant itself
+//! ([`plant`]). A part of [Surefoot](../cli/index.html).
 //!
 //! All of it goes through the interfaces that a drive uses. [`closed_loop`] puts plant and planner together;
 //! `examples/drive_own_world.rs` drives in a world and with a vehicle of one's own.
@@ -15,6 +15,7 @@ pub mod gap_score;
 pub mod learned_map;
 pub mod learning;
 pub mod navigation;
+pub mod plant;
 pub mod prior_map;
 mod spread;
 mod stopwatch;

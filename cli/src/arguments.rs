@@ -9,6 +9,7 @@ mod gap;
 mod gap_check;
 mod inspect;
 mod learned_map;
+mod plant;
 mod replay;
 mod train;
 mod up;
@@ -28,6 +29,7 @@ pub use gap::{GapApplyArguments, GapCommand, GapDiagnoseArguments, GapEffectsArg
 pub use gap_check::{GapScoreArguments, GapSealArguments};
 pub use inspect::InspectArguments;
 pub use learned_map::{BenchLearnedMapArguments, NetworkSizes};
+pub use plant::BenchPlantArguments;
 pub use replay::ReplayArguments;
 pub use train::{TrainArguments, TrainCommand};
 pub use up::{UpArguments, UpRole};

@@ -4,6 +4,7 @@ mod gap;
 mod learned_map;
 mod learning;
 mod navigation;
+mod plant;
 
 use ::bench::{BenchError, control, prior_map};
 use serde::Serialize;
@@ -14,6 +15,7 @@ pub(crate) use gap::run_gap;
 pub(crate) use learned_map::run_learned_map;
 pub(crate) use learning::run_learning;
 pub(crate) use navigation::run_navigation;
+pub(crate) use plant::run_plant;
 
 pub(crate) fn run_control(arguments: &BenchControlArguments) -> anyhow::Result<()> {
     let json = arguments.json.as_deref();

@@ -136,6 +136,7 @@ fn dispatch(command: Command) -> anyhow::Result<()> {
         Command::Bench { command: BenchCommand::LearnedMap(learned_map) } => {
             bench::run_learned_map(&learned_map)
         }
+        Command::Bench { command: BenchCommand::Plant(plant) } => bench::run_plant(&plant),
         Command::Bench { command: BenchCommand::Gap(gap) } => bench::run_gap(&gap),
         Command::Bench { command: BenchCommand::Learning(learning) } => bench::run_learning(&learning),
         Command::Bench { command: BenchCommand::Navigation(navigation) } => {

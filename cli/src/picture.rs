@@ -13,6 +13,7 @@ mod legend;
 mod loss_curves;
 mod map;
 mod navigation_table;
+mod plant;
 mod relief;
 mod signatures;
 mod strips;
@@ -36,6 +37,7 @@ pub use gap_score::draw_gap_score;
 pub use learning::{draw_learning, learning_svg};
 pub use loss_curves::draw_loss_curves;
 pub use navigation_table::draw_navigation_table;
+pub use plant::draw_plant;
 pub use signatures::draw_signatures;
 pub use traction_map::draw_traction_map;
 

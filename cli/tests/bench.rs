@@ -53,6 +53,31 @@ fn prior_map_reports_whole_and_changed_maps() {
 }
 
 #[test]
+fn plant_writes_its_curves_and_labels() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let out = folder.path().join("out");
+    let words = ["bench", "plant", "--vehicle", "rc_car", "--out", out.to_str().expect("UTF-8")];
+    let output = surefoot(&words);
+    assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+    let told = String::from_utf8_lossy(&output.stdout);
+    assert!(told.contains("rc_car") && told.contains("times real time"), "{told}");
+    let written: Value =
+        serde_json::from_slice(&std::fs::read(out.join("plant.json")).expect("the file")).expect("JSON");
+    for row in written["cornering"].as_array().expect("rows") {
+        let expected = row["closed_form"].as_f64().expect("a number");
+        for found in row["plant"].as_array().expect("one of each speed") {
+            assert!((found.as_f64().expect("a number") - expected).abs() < 0.03, "{row}");
+        }
+    }
+    assert!(written["times_real_time"].as_f64().is_some_and(|times| times > 0.0));
+    assert!(std::fs::read(out.join("plant.png")).expect("the picture").starts_with(b"\x89PNG"));
+
+    let refused = surefoot(&["bench", "plant", "--vehicle", "no_such_machine"]);
+    assert_eq!(refused.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&refused.stderr).contains("no_such_machine"));
+}
+
+#[test]
 fn navigation_writes_table_and_picture() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let path = |name: &str| folder.path().join(name);

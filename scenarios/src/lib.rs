@@ -16,6 +16,7 @@ mod layers;
 mod motion;
 mod pair;
 mod plant;
+pub mod published_tyre;
 mod random;
 mod rock_field;
 mod sealed;
@@ -37,7 +38,7 @@ pub use friction::Stribeck;
 pub use layers::{LayerConfig, LayersError, WorldLayers, world_from_layers};
 pub use motion::Motion;
 pub use pair::{End, Pair, PairError, PairWish, check_pair, feasible_pair};
-pub use plant::{Collision, CommandError, Plant, PlantError, WheelState};
+pub use plant::{Collision, CommandError, Plant, PlantError, WheelState, steady_friction};
 pub use random::{seed_of, stream};
 pub use rock_field::{
     MAPS_PER_SPLIT, RockFieldConfig, RockFieldError, RockMap, RockPopulation, Split, rock_field,

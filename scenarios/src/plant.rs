@@ -50,6 +50,7 @@ use receiver::Receiver;
 use rest::{Rest, Stance};
 use servo::SteeringServo;
 use strut::Strut;
+pub use tyre::steady_friction;
 pub(crate) use vegetation::vegetation_resistance;
 use wheel::{RunningGear, Wheel, WheelInput};
 

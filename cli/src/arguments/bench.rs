@@ -21,6 +21,9 @@ pub enum BenchCommand {
     /// Drives over the default rock field, with every method and risk tolerance
     #[command(long_about = NAVIGATION_ABOUT)]
     Navigation(BenchNavigationArguments),
+    /// The simulated machine: its tyre, what its drives teach, and how fast it runs
+    #[command(long_about = super::plant::LONG_ABOUT)]
+    Plant(super::BenchPlantArguments),
     /// Drives of plants with a gap, with nominal, repaired and true models
     #[command(long_about = super::bench_gap::LONG_ABOUT)]
     Gap(super::BenchGapArguments),

@@ -16,12 +16,14 @@ use bicycle::Vehicle;
 use nalgebra::Vector2;
 
 use crate::friction::{holding, load_factor};
-use crate::{Deviation, Stribeck};
+use crate::{Deviation, Plant, Stribeck};
 
 /// Rolling speed at which the tread's damping has half of its effect [m/s].
 const ROLLING_SPEED_MPS: f64 = 0.03;
 /// Damping of the standing tread over critical, for a quarter of the vehicle [-].
 const DAMPING: f64 = 0.3;
+/// Bristles that a tyre of everyday size rolls over at walking speed have settled after this [s].
+const SETTLING_S: f64 = 3.0;
 
 /// What the tyre is made of.
 #[derive(Clone, Copy, Debug)]
@@ -123,6 +125,29 @@ impl Tyre {
 fn capped(value: Vector2<f64>, limit: f64) -> Vector2<f64> {
     let norm = value.norm();
     if norm > limit { value * (limit / norm) } else { value }
+}
+
+/// Friction over load, forward and left [-], that a tyre under a quarter of a vehicle settles at on a test bench: it rolls
+/// at `rolling_mps` and its tread moves over the ground at `slip_mps`, forward and left [m/s].
+pub fn steady_friction(
+    vehicle: &Vehicle,
+    ground: Stribeck,
+    rolling_mps: f64,
+    slip_mps: [f64; 2],
+) -> [f64; 2] {
+    let mass_kg = vehicle.body.mass_kg + 4.0 * vehicle.wheel.mass_kg;
+    let load_n = 0.25 * mass_kg * super::GRAVITY_MPS2;
+    let footing = Footing { slip_mps: slip_mps.into(), rolling_mps, load_n, friction: ground };
+    settled(&Tyre::new(vehicle, load_n), &footing).into()
+}
+
+/// Force over load after as long as bristles take to settle, from loose ones.
+fn settled(tyre: &Tyre, footing: &Footing) -> Vector2<f64> {
+    let (mut bristles, mut force_n) = (Bristles::default(), Vector2::zeros());
+    for _ in 0..(SETTLING_S / Plant::STEP_S).round() as usize {
+        force_n = tyre.grip(&mut bristles, footing, Plant::STEP_S).force_n;
+    }
+    force_n / footing.load_n
 }
 
 #[cfg(test)]

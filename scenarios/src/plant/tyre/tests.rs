@@ -32,14 +32,9 @@ fn after(tyre: &Tyre, footing: &Footing, duration_s: f64) -> Vector2<f64> {
     force_n / footing.load_n
 }
 
-/// The same once it has settled.
-fn steady(tyre: &Tyre, footing: &Footing) -> Vector2<f64> {
-    after(tyre, footing, 3.0)
-}
-
 /// Lateral friction at a slip angle, free of slip along.
 fn cornering(tyre: &Tyre, angle_rad: f64, speed_mps: f64) -> f64 {
-    -steady(tyre, &rolling(Vector2::new(0.0, angle_rad.tan() * speed_mps), speed_mps)).y
+    -settled(tyre, &rolling(Vector2::new(0.0, angle_rad.tan() * speed_mps), speed_mps)).y
 }
 
 #[test]
@@ -47,10 +42,10 @@ fn small_slip_is_answered_alike_at_every_speed_and_in_every_direction() {
     for speed_mps in [1.0, 5.0, 15.0] {
         // A ten-thousandth of slip, of which the brush gives away C s / (3 m) = 0.04 %, and the standing tread's
         // damping adds at most 1 s/m 0.03 m/s = 0.03 of 12.
-        let along = -steady(&tyre(), &rolling(Vector2::new(1e-4 * speed_mps, 0.0), speed_mps)).x / 1e-4;
+        let along = -settled(&tyre(), &rolling(Vector2::new(1e-4 * speed_mps, 0.0), speed_mps)).x / 1e-4;
         let across = cornering(&tyre(), 1e-4, speed_mps) / 1e-4;
         assert!((along - 12.0).abs() < 0.04 && (across - 12.0).abs() < 0.04, "{along} {across}");
-        let back = steady(&tyre(), &rolling(Vector2::new(0.0, 1e-4 * speed_mps), -speed_mps)).y / -1e-4;
+        let back = settled(&tyre(), &rolling(Vector2::new(0.0, 1e-4 * speed_mps), -speed_mps)).y / -1e-4;
         assert!((back - across).abs() < 1e-6, "{back} {across}");
     }
 }
@@ -72,14 +67,14 @@ fn what_slides_slides_by_the_law_of_its_speed() {
     // Locked: all slides. Up to 3.18 m/s the ground holds 0.98, at 20 m/s 0.70 is left. At 5 m/s, x = 5 / 4.5:
     // 2.3316 0.28 exp(-1.2346) 1.1111 + 0.70 = 0.9111.
     for (slip_mps, expected) in [(1.0, 0.98), (3.1, 0.98), (5.0, 0.9111), (20.0, 0.70)] {
-        let found = steady(&tyre(), &rolling(Vector2::new(slip_mps, 0.0), 0.0)).x;
+        let found = settled(&tyre(), &rolling(Vector2::new(slip_mps, 0.0), 0.0)).x;
         assert!((found + expected).abs() < 1e-4, "{slip_mps} m/s: {found}");
     }
     // Dirt slides harder than it holds: 0.68 at first, then 0.76 and 0.009 s/m: at 10 m/s, x = 1.25, less
     // 2.3316 0.08 exp(-1.5625) 1.25 = 0.0489.
     for (slip_mps, expected) in [(0.1, 0.68), (10.0, 0.76 + 0.09 - 0.0489)] {
         let footing = Footing { friction: Stribeck::DIRT, ..rolling(Vector2::new(slip_mps, 0.0), 0.0) };
-        let found = steady(&tyre(), &footing).x;
+        let found = settled(&tyre(), &footing).x;
         assert!((found + expected).abs() < 1e-4, "{slip_mps} m/s: {found}");
     }
 }
@@ -98,7 +93,7 @@ fn force_builds_up_over_the_relaxation_length_at_every_speed() {
     for speed_mps in [1.0, 3.0, 10.0] {
         // After 0.3 m, in whole steps of 1 ms, the force stands at 1 - 1/e = 0.632 of its end.
         let footing = rolling(Vector2::new(0.0, 1e-3 * speed_mps), speed_mps);
-        let share = after(&tyre(), &footing, 0.3 / speed_mps).y / steady(&tyre(), &footing).y;
+        let share = after(&tyre(), &footing, 0.3 / speed_mps).y / settled(&tyre(), &footing).y;
         assert!((share - (1.0 - 1.0 / E)).abs() < 0.01, "{speed_mps} m/s: {share}");
     }
 }
@@ -107,7 +102,7 @@ fn force_builds_up_over_the_relaxation_length_at_every_speed() {
 fn combined_slip_pulls_straight_back_within_the_circle() {
     // Slip 0.06 along and 0.08 across make 0.1 of the 0.245 at which all slides: 0.98 (1 - 0.5918^3) = 0.7769,
     // four fifths of it across.
-    let found = steady(&tyre(), &rolling(Vector2::new(0.12, 0.16), 2.0));
+    let found = settled(&tyre(), &rolling(Vector2::new(0.12, 0.16), 2.0));
     let expected = 0.98 * (1.0 - (1.0f64 - 0.1 / 0.245).powi(3));
     assert!((expected - 0.7769).abs() < 1e-4);
     assert!((found + Vector2::new(0.6, 0.8) * expected).norm() < 0.004, "{found}");
@@ -115,7 +110,7 @@ fn combined_slip_pulls_straight_back_within_the_circle() {
     for angle in 0..12 {
         let direction = Vector2::new(f64::from(angle).cos(), f64::from(angle).sin());
         for slip in [0.01, 0.1, 0.3, 1.0] {
-            let friction = steady(&tyre(), &rolling(direction * slip * 2.0, 2.0));
+            let friction = settled(&tyre(), &rolling(direction * slip * 2.0, 2.0));
             assert!(friction.norm() < 0.98 + 1e-6);
             assert!((friction.normalize() + direction).norm() < 1e-6, "{angle} {slip}: {friction}");
         }
@@ -126,7 +121,7 @@ fn combined_slip_pulls_straight_back_within_the_circle() {
 fn friction_falls_with_load_and_little_slip_does_not_feel_it() {
     let across = |angle_rad: f64, load_n: f64| {
         let slip_mps = Vector2::new(0.0, angle_rad.tan() * 2.0);
-        steady(&tyre(), &Footing { load_n, ..rolling(slip_mps, 2.0) }).y
+        settled(&tyre(), &Footing { load_n, ..rolling(slip_mps, 2.0) }).y
     };
     let sliding = across(0.4, 2.0 * LOAD_N) / across(0.4, LOAD_N);
     assert!((sliding - 0.8).abs() < 1e-6, "{sliding}");
@@ -179,62 +174,13 @@ fn soft_tyres_answer_small_slip_less_and_slide_with_the_same_friction() {
     }
 }
 
-/// The tyre of CommonRoad's vehicle models, as they give it to vehicle 2, a BMW 320i: Magic Formula PAC2002 of the ADAMS
-/// handbook, Althoff and Wuersching, "CommonRoad: Vehicle Models" (2020), table 7; package commonroad-vehicle-models
-/// 3.0.2, `utils/tire_model.py`, at no camber and 4 kN.
+/// Against a tyre of others.
 mod published {
     use super::*;
+    use crate::published_tyre::{ACROSS, ALONG, COMBINED, PEAK, STIFFNESS};
 
-    /// Peak friction across and along [-].
-    const PEAK: [f64; 2] = [1.0489, 1.1739];
-    /// Stiffness across and along [-].
-    const STIFFNESS: [f64; 2] = [21.92, 22.303];
     /// Rolling where it matters: at 10 m/s.
     const SPEED_MPS: f64 = 10.0;
-
-    /// Slip angle [degrees] and lateral force over load.
-    const ACROSS: [[f64; 2]; 10] = [
-        [0.5, 0.1891],
-        [1.0, 0.3659],
-        [2.0, 0.6507],
-        [3.0, 0.8348],
-        [4.0, 0.9414],
-        [6.0, 1.0292],
-        [8.0, 1.0483],
-        [10.0, 1.0461],
-        [15.0, 1.0223],
-        [20.0, 1.0005],
-    ];
-    /// Braking slip, one minus circumferential speed over that of the hub, and longitudinal force over load.
-    const ALONG: [[f64; 2]; 12] = [
-        [0.005, 0.0971],
-        [0.01, 0.2060],
-        [0.02, 0.4101],
-        [0.03, 0.5876],
-        [0.05, 0.8505],
-        [0.08, 1.0591],
-        [0.10, 1.1237],
-        [0.15, 1.1733],
-        [0.20, 1.1631],
-        [0.30, 1.1067],
-        [0.50, 1.0037],
-        [0.80, 0.9096],
-    ];
-    /// Slip angle [degrees], braking slip, force over load along and across.
-    const COMBINED: [[f64; 4]; 12] = [
-        [2.0, 0.02, 0.3466, 0.6555],
-        [2.0, 0.05, 0.7480, 0.6384],
-        [2.0, 0.10, 1.0479, 0.5611],
-        [2.0, 0.20, 1.1347, 0.3774],
-        [4.0, 0.02, 0.2647, 0.9440],
-        [4.0, 0.05, 0.5975, 0.9226],
-        [4.0, 0.10, 0.9092, 0.8328],
-        [4.0, 0.20, 1.0709, 0.5980],
-        [8.0, 0.02, 0.1601, 1.0505],
-        [8.0, 0.05, 0.3832, 1.0380],
-        [8.0, 0.10, 0.6536, 0.9795],
-        [8.0, 0.20, 0.9012, 0.7935],
-    ];
 
     /// A tyre of that stiffness and peak on asphalt.
     fn alike(stiffness: f64, peak: f64) -> Tyre {
@@ -244,7 +190,7 @@ mod published {
     /// Friction against a slip angle and a braking slip, along and across.
     fn friction(tyre: &Tyre, angle_deg: f64, braking: f64) -> [f64; 2] {
         let slip_mps = SPEED_MPS * Vector2::new(braking, angle_deg.to_radians().tan());
-        let found = -steady(tyre, &rolling(slip_mps, SPEED_MPS * (1.0 - braking)));
+        let found = -settled(tyre, &rolling(slip_mps, SPEED_MPS * (1.0 - braking)));
         println!("{angle_deg} {braking} {:.4} {:.4}", found.x, found.y);
         [found.x, found.y]
     }
