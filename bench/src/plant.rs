@@ -185,9 +185,9 @@ fn labels_on(
 fn label_at(vehicle: &Vehicle, world: &Arc<World>, speed_mps: f64) -> Result<f64, PlantBenchError> {
     let mut vehicle = vehicle.clone();
     vehicle.limits.speed_max_mps = vehicle.limits.speed_max_mps.max(speed_mps);
-    let mut plant = Plant::new(&vehicle, Arc::clone(world), [-10.0, 0.0, 0.0])?;
+    let mut plant = Plant::new(&vehicle, Arc::clone(world), [-45.0, 0.0, 0.0])?;
     plant.set_command(Command { speed_mps: speed_mps as f32, steering_rad: 0.0 })?;
-    plant.advance(RUN_UP_M / speed_mps + 2.0);
+    plant.advance(RUN_UP_M / speed_mps + 6.0);
     let before = plant.pose();
     let duration_s = LABEL_M / speed_mps;
     plant.advance(duration_s);

@@ -21,6 +21,8 @@ const TRACTION_MIN: f64 = 0.1;
 /// The search reaches this far around start and goal: a share of their distance, and never less than this [m].
 const DETOUR_SHARE: f64 = 0.75;
 const DETOUR_MIN_LENGTHS: f64 = 5.0;
+/// Poses of a manoeuvre that are looked at.
+const PASSED: usize = 4;
 /// Pairs that are drawn, and pairs between which a way is searched, before none is found.
 const ATTEMPTS: usize = 400;
 const SEARCHES: usize = 12;
@@ -123,8 +125,9 @@ pub struct Pair {
 }
 
 /// Whether the vehicle can stand at the start as it heads, stand at the goal in some heading, and get there: by a
-/// search over poses in which it keeps nine tenths of its attitude limits, touches no obstacle and finds traction.
-/// The search turns on the spot, so it is a necessary condition.
+/// search over poses in which it keeps nine tenths of its attitude limits, touches no obstacle and finds traction. It
+/// turns as its front wheels steer, forwards and backwards. The poses are those of a lattice, at rest and one by one:
+/// who gets there all the same drives well.
 pub fn check_pair(world: &Arc<World>, vehicle: &Vehicle, pair: &Pair) -> Result<(), PairError> {
     Checker::new(world, vehicle).check(pair)
 }
@@ -260,33 +263,70 @@ impl<'a> Checker<'a> {
             && stand.linear_traction >= TRACTION_MIN
     }
 
-    /// Best-first search over cells and headings: forwards or backwards along the heading, or an eighth of a turn.
+    /// Best-first search over cells and headings, of manoeuvres that a vehicle with front steering can drive.
     fn connects(&self, pair: &Pair, within_m: f64) -> bool {
         let lattice = Lattice::around(pair, within_m, self.spacing_m);
+        let manoeuvres = self.manoeuvres();
+        let mut safe = vec![None; lattice.n_nodes()];
         let mut seen = vec![false; lattice.n_nodes()];
         let mut open = BinaryHeap::new();
-        let first = lattice.start;
-        seen[lattice.index(first)] = true;
-        open.push((Reverse(0), first));
-        while let Some((_, Node { cell, heading })) = open.pop() {
-            if lattice.steps_to_goal(cell) <= 1 {
+        seen[lattice.index(lattice.start)] = true;
+        open.push((Reverse(0), lattice.start));
+        while let Some((_, node)) = open.pop() {
+            if lattice.steps_to_goal(node.cell) <= 1 {
                 return true;
             }
-            let [east, north] = STEPS[heading];
-            let moved = |sign: i64| Node { cell: [cell[0] + sign * east, cell[1] + sign * north], heading };
-            let turned = |by: usize| Node { cell, heading: (heading + by) % 8 };
-            for next in [moved(1), moved(-1), turned(1), turned(7)] {
-                let [x_m, y_m] = lattice.at_m(next.cell);
-                if !lattice.holds(next.cell) || std::mem::replace(&mut seen[lattice.index(next)], true) {
-                    continue;
-                }
-                let stands = || self.truth.traversability(x_m, y_m, heading_rad(next.heading));
-                if self.map.contains(x_m, y_m) && self.is_safe(&stands()) {
-                    open.push((Reverse(lattice.steps_to_goal(next.cell)), next));
+            for manoeuvre in &manoeuvres[node.heading] {
+                let poses = manoeuvre.map(|pose| pose.from(node.cell));
+                let Some(&end) = poses.last().filter(|end| lattice.holds(end.cell)) else { continue };
+                if !seen[lattice.index(end)]
+                    && poses.iter().all(|&pose| self.passes(&lattice, &mut safe, pose))
+                {
+                    seen[lattice.index(end)] = true;
+                    open.push((Reverse(lattice.steps_to_goal(end.cell)), end));
                 }
             }
         }
         false
+    }
+
+    /// Whether the vehicle keeps its limits in a pose, asked of the truth once.
+    fn passes(&self, lattice: &Lattice, safe: &mut [Option<bool>], pose: Node) -> bool {
+        if !lattice.holds(pose.cell) {
+            return false;
+        }
+        *safe[lattice.index(pose)].get_or_insert_with(|| {
+            let [x_m, y_m] = lattice.at_m(pose.cell);
+            let stand = || self.truth.traversability(x_m, y_m, heading_rad(pose.heading));
+            self.map.contains(x_m, y_m) && self.is_safe(&stand())
+        })
+    }
+
+    /// Of each heading: a cell forwards or backwards, and an eighth of a turn to either side in either gear, on the
+    /// smallest circle that the front wheels steer.
+    fn manoeuvres(&self) -> [Vec<[Node; PASSED]>; 8] {
+        let radius_m = self.vehicle.geometry.wheelbase_m / self.vehicle.limits.steering_max_rad.tan();
+        std::array::from_fn(|heading| {
+            let straight =
+                [1, -1].map(|gear| [Node { cell: STEPS[heading].map(|n| gear * n), heading }; PASSED]);
+            let gears_and_sides = [(1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)];
+            let turns = gears_and_sides.map(|(gear, side)| self.turn(heading, gear, side * radius_m));
+            straight.into_iter().chain(turns).collect()
+        })
+    }
+
+    /// Poses passed on an eighth of a turn from cell 0 about a centre `radius_m` to the left.
+    fn turn(&self, heading: usize, gear: f64, radius_m: f64) -> [Node; PASSED] {
+        let whole_rad = gear * radius_m.signum() * TAU / 8.0;
+        std::array::from_fn(|i| {
+            let turned_rad = whole_rad * (i + 1) as f64 / PASSED as f64;
+            let [ahead_m, left_m] = [radius_m * turned_rad.sin(), radius_m * (1.0 - turned_rad.cos())];
+            let (sin, cos) = heading_rad(heading).sin_cos();
+            let way_m = [ahead_m * cos - left_m * sin, ahead_m * sin + left_m * cos];
+            let eighths = (turned_rad / TAU * 8.0).round() as i64;
+            let heading = (heading as i64 + eighths).rem_euclid(8) as usize;
+            Node { cell: way_m.map(|way_m| (way_m / self.spacing_m).round() as i64), heading }
+        })
     }
 }
 
@@ -295,6 +335,13 @@ impl<'a> Checker<'a> {
 struct Node {
     cell: [i64; 2],
     heading: usize,
+}
+
+impl Node {
+    /// The same pose seen from the world, given from a cell.
+    fn from(self, cell: [i64; 2]) -> Self {
+        Self { cell: [cell[0] + self.cell[0], cell[1] + self.cell[1]], ..self }
+    }
 }
 
 /// The poses that a search may visit.

@@ -65,6 +65,17 @@ fn a_command_of_zero_is_stuck_after_five_seconds() {
 }
 
 #[test]
+fn what_it_was_told_to_stop_does_not_make_it_stuck() {
+    let mut episode = episode(flat());
+    let three_s_of_stop = |observation: &Observation| match observation.valid_at_ns {
+        2_000_000_000..5_000_000_000 => Decision::Stop(StopReason::StaleScan),
+        _ => Decision::Drive(Command::default()),
+    };
+    assert_eq!(episode.run(three_s_of_stop, |_| ControlFlow::Continue(())).unwrap(), Outcome::Stuck);
+    assert!((episode.time_s() - 8.0).abs() < 0.11, "{}", episode.time_s());
+}
+
+#[test]
 fn a_hold_is_stuck_too_and_a_stop_is_stopped() {
     assert_eq!(outcome(flat(), Decision::Hold(HoldReason::NoMap)).0, Outcome::Stuck);
     let (stopped, episode) = outcome(flat(), Decision::Stop(StopReason::StaleScan));

@@ -32,6 +32,7 @@ fn coasting_distance_follows_from_rolling_resistance() {
     let squares = first.velocity_mps[0].powi(2) - last.velocity_mps[0].powi(2);
     let expected_m = squares * (1.0 + 4.0 * 5.0 / 0.44f64.powi(2) / 1500.0) / (2.0 * 0.02 * G);
     let found_m = last.pose.x_m - first.pose.x_m;
+    println!("coasting: {found_m:.2} m, expected {expected_m:.2} m");
     assert!(expected_m > 20.0, "{expected_m} m is too short to tell");
     assert!((found_m / expected_m - 1.0).abs() < 0.03, "{found_m} m, expected {expected_m} m");
 }
@@ -55,6 +56,7 @@ fn locked_wheels_stop_within_v2_over_2_mu_g() {
     for friction in [0.3, 0.6] {
         let [found_m, speed_mps] = stopping(&vehicle, friction, 10.0);
         let expected_m = speed_mps * speed_mps / (2.0 * f64::from(friction) * G);
+        println!("locked wheels, mu {friction}: {found_m:.2} m, expected {expected_m:.2} m");
         assert!((speed_mps - 10.0).abs() < 0.2, "{speed_mps} m/s");
         assert!(
             (found_m / expected_m - 1.0).abs() < 0.04,
@@ -92,6 +94,9 @@ fn the_steepest_slope_climbed_is_atan_mu() {
             let slope_rad = f64::from(friction).atan() + beyond_rad;
             let found_mps2 = climbing_mps2(&vehicle, friction, slope_rad);
             let expected_mps2 = G * (f64::from(friction) * slope_rad.cos() - slope_rad.sin());
+            println!(
+                "climb, mu {friction}, {slope_rad:.3} rad: {found_mps2:.3}, expected {expected_mps2:.3} m/s2"
+            );
             let error_mps2 = (found_mps2 - expected_mps2).abs();
             assert!(
                 error_mps2 < 0.05,
@@ -152,6 +157,7 @@ fn limit_of_cornering(differential: Differential) -> f64 {
 fn cornering_ends_at_v2_over_r_equal_mu_g_where_the_differential_lets_it() {
     let [open, limited, locked] =
         [Differential::Open, Differential::LimitedSlip, Differential::Locked].map(limit_of_cornering);
+    println!("limit of cornering over mu g, open, limited slip, locked: {open:.3} {limited:.3} {locked:.3}");
     // An open one asks nothing of the tyres: the centre of gravity lies half way, and both axles give all they have. But
     // the outer front wheel carries 3 kN more and drags, 0.12 rad across the way, by 0.4 0.12 0.775 m of that: 110 N m
     // against the 3679 N m that the front makes, which the rear must leave unused: (1 + (3679 - 110) / 3679) / 2.
@@ -187,6 +193,10 @@ fn locked_wheels_widen_a_slow_turn_by_track_squared_over_wheelbase_squared() {
         (rear_driven, 0.839),
     ] {
         let found = gain(&vehicle, 1.0);
+        println!(
+            "turn over geometry, {:?}: {found:.3}, expected {expected}",
+            vehicle.drivetrain.differential
+        );
         assert!((found - expected).abs() < 0.01, "{:?}: {found}", vehicle.drivetrain.differential);
     }
 }

@@ -76,6 +76,7 @@ fn a_braked_vehicle_slides_where_the_slope_exceeds_the_friction() {
     plant.advance(3.0);
     let found_mps2 = (before_mps - plant.motion().velocity_mps[0]) / 3.0;
     let expected_mps2 = G * (slope_rad.sin() - 0.4 * slope_rad.cos());
+    println!("sliding down with brakes: {found_mps2:.3}, expected {expected_mps2:.3} m/s2");
     assert!((found_mps2 - expected_mps2).abs() < 0.02, "{found_mps2} m/s2, expected {expected_mps2} m/s2");
 }
 

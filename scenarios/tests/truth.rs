@@ -103,6 +103,52 @@ fn traction_ends_where_the_slope_beats_friction() {
     assert!(row.windows(2).all(|pair| pair[0] > pair[1]), "{row:?}");
 }
 
+/// What the truth says and the plant does across a plane that rises to the left: linear traction, and the way down the
+/// slope over the way along it.
+fn across(incline_deg: f64, friction: f32) -> ([f64; 2], f64) {
+    let coulomb = Stribeck {
+        static_friction: friction,
+        dynamic_friction: friction,
+        viscous_friction: 0.0,
+        stribeck_speed_mps: 0.25,
+    };
+    let mut vehicle = full_size();
+    vehicle.tyre.load_sensitivity = 0.0;
+    let grade = incline_deg.to_radians().tan();
+    let world = ground(move |_, y| grade * y, move |_, _| Patch::open(coulomb));
+    let said = Truth::new(&vehicle, Arc::clone(&world)).traversability(0.0, 0.0, 0.0).linear_traction;
+    let mut plant = Plant::new(&vehicle, world, [-6.0, 8.0, 0.0]).unwrap();
+    plant.set_command(Command { speed_mps: 1.0, steering_rad: 0.0 }).unwrap();
+    plant.advance(2.0);
+    let before = plant.pose();
+    plant.advance(3.0);
+    let after = plant.pose();
+    let ahead_m = after.x_m - before.x_m;
+    println!(
+        "{incline_deg} deg, {friction}: truth {said:.3}, plant {:.3}, down {:.3} m",
+        ahead_m / 3.0,
+        before.y_m - after.y_m
+    );
+    ([said, ahead_m / 3.0], (before.y_m - after.y_m) / ahead_m)
+}
+
+#[test]
+fn across_a_slope_the_wheels_hold_up_to_their_friction_and_creep_by_side_slip() {
+    for (incline_deg, friction) in [(10.0, 0.6), (20.0, 0.6), (25.0, 0.68), (28.0, 0.9)] {
+        let ([said, found], drift) = across(incline_deg, friction);
+        assert!((said - found).abs() < 0.04, "{incline_deg} deg on {friction}: truth {said}, plant {found}");
+        // The brush holds tan(incline) of the load by a side slip of 3 m / 12 (1 - cbrt(1 - tan / m)); the body turns
+        // downhill by as much again at most.
+        let held = f64::from(friction);
+        let slip = held / 4.0 * (1.0 - (1.0 - incline_deg.to_radians().tan() / held).cbrt());
+        assert!(drift > 0.5 * slip && drift < 6.0 * slip, "{incline_deg} deg: {drift}, side slip {slip}");
+    }
+    // tan(24 degrees) = 0.445: wheels with a friction of 0.4 go down there, whichever way they roll.
+    let ([said, _], drift) = across(24.0, 0.4);
+    assert_eq!(said, 0.0);
+    assert!(drift > 0.5, "{drift}");
+}
+
 #[test]
 fn a_motor_too_weak_stalls_and_plants_too_tall_hold() {
     let mut weak = full_size();

@@ -26,7 +26,8 @@ use crate::drive::scene::{self, Machine};
 use crate::summary::revision;
 use crate::{UsageError, WorkFailed, interrupt};
 
-/// Longest that the vehicle may stand before the drive counts as over: processes are restarted meanwhile [s].
+/// Longest that the vehicle may stand still because it is told to stop, or not yet to drive, before the drive counts as
+/// over: processes are started meanwhile [s].
 const STANDING_MAX_S: f64 = 30.0;
 
 /// Reads everything that the processes will, so that bad input is refused before they start.
@@ -200,7 +201,7 @@ fn run_plant(arguments: &UpArguments, machine: &Machine, ages: AgeLimits) -> any
     let mut episode = EpisodeConfig::for_vehicle(&machine.vehicle);
     episode.rules.time_limit_s = arguments.drive.time_limit;
     episode.deviations = arguments.drive.deviation.iter().map(|asked| asked.deviation).collect();
-    episode.rules.immobile_s = STANDING_MAX_S;
+    episode.rules.startup_s = STANDING_MAX_S;
     episode.rules.stopped_s = STANDING_MAX_S;
     let setup = PlantSetup {
         task,

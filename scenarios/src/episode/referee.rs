@@ -55,7 +55,7 @@ pub struct Rules {
     pub time_limit_s: f64,
     /// Whoever moves less than this [m] ...
     pub immobile_m: f64,
-    /// ... within this time [s] is stuck.
+    /// ... within this time [s] is stuck; what it was told to stop does not count.
     pub immobile_s: f64,
     /// Stop decisions for this long without a break end the episode once the vehicle stands [s].
     pub stopped_s: f64,
@@ -110,7 +110,9 @@ pub(super) struct Referee {
     rules: Rules,
     limits: Limits,
     outcome: Option<Outcome>,
-    /// Time and place at the end of each cycle within the last `immobile_s`.
+    /// Time in which it was not told to stop [s].
+    free_s: f64,
+    /// That time and the place at the end of each cycle within its last `immobile_s`.
     places: VecDeque<(f64, [f64; 2])>,
     stopping_s: f64,
     /// Whether the vehicle was ever told to drive.
@@ -127,6 +129,7 @@ impl Referee {
             rules,
             limits,
             outcome: None,
+            free_s: 0.0,
             places: VecDeque::new(),
             stopping_s: 0.0,
             has_begun: false,
@@ -202,8 +205,9 @@ impl Referee {
         }
         let is_stop = matches!(decision, Decision::Stop(_));
         self.stopping_s = if is_stop { self.stopping_s + cycle_s } else { 0.0 };
+        self.free_s += if is_stop { 0.0 } else { cycle_s };
         let here_m = [motion.pose.x_m, motion.pose.y_m];
-        let is_immobile = self.is_immobile(here_m, time_s);
+        let is_immobile = !is_stop && self.is_immobile(here_m);
         if self.outcome.is_some() {
             return;
         }
@@ -217,9 +221,10 @@ impl Referee {
     }
 
     /// Whether every place of the last `immobile_s` lies within `immobile_m` of here.
-    fn is_immobile(&mut self, here_m: [f64; 2], time_s: f64) -> bool {
-        let since_s = time_s - self.rules.immobile_s;
-        self.places.push_back((time_s, here_m));
+    fn is_immobile(&mut self, here_m: [f64; 2]) -> bool {
+        // A thousandth against the rounding of sums of cycles.
+        let since_s = self.free_s - 0.999 * self.rules.immobile_s;
+        self.places.push_back((self.free_s, here_m));
         // One place from before stays: the window must be covered in full.
         while self.places.get(1).is_some_and(|(then_s, _)| *then_s <= since_s) {
             self.places.pop_front();

@@ -72,8 +72,25 @@ impl Truth {
         }
         let [linear_traction, angular_traction] = self.statics.traction(&Footing {
             stand: &stand,
+            left_slope: self.left_slope(&stand, yaw_rad),
             patch: stand.contact_m.map(|[x_m, y_m]| self.world.patch(x_m, y_m)),
         });
         Traversability { linear_traction, angular_traction, roll_rad, pitch_rad, is_blocked: false }
+    }
+
+    /// Rise of the ground under the wheels across the heading, weighted by load [-].
+    fn left_slope(&self, stand: &stand::Stand, yaw_rad: f64) -> f64 {
+        let width_m = self.statics.vehicle.wheel.width_m;
+        let (sin, cos) = yaw_rad.sin_cos();
+        let step_m = [-sin * width_m, cos * width_m];
+        let rise_m = |i: usize| {
+            let [x_m, y_m] = stand.contact_m[i];
+            let [right_m, left_m] =
+                self.ground.run_m::<2>([x_m - 0.5 * step_m[0], y_m - 0.5 * step_m[1]], step_m);
+            left_m - right_m
+        };
+        let load_n = stand.load_n;
+        let rise_nm: f64 = (0..4).map(|i| load_n[i] * rise_m(i)).sum();
+        rise_nm / (width_m * load_n.iter().sum::<f64>().max(f64::MIN_POSITIVE))
     }
 }

@@ -19,6 +19,8 @@ const STEERING_LOAD_SHARE: f64 = 0.3;
 /// The vehicle at rest and what it stands on.
 pub(super) struct Footing<'a> {
     pub stand: &'a Stand,
+    /// Rise of the ground across the heading, weighted by the wheels' loads [-].
+    pub left_slope: f64,
     /// Ground under each wheel.
     pub patch: [&'a Patch; 4],
 }
@@ -27,7 +29,7 @@ impl Statics {
     /// Linear and angular traction, each in [0, 1].
     pub(super) fn traction(&self, footing: &Footing) -> [f64; 2] {
         let resistance_n = self.resistance_n(footing);
-        if self.thrust_n(footing, 1.0) < resistance_n {
+        if !self.holds_across(footing) || self.thrust_n(footing, 1.0) < resistance_n {
             return [0.0; 2];
         }
         let use_share = self.friction_use(footing, resistance_n);
@@ -158,10 +160,23 @@ impl Statics {
     }
 
     /// Largest friction of a wheel under its load [-].
-    fn adhesion(&self, footing: &Footing, i: usize) -> f64 {
+    fn friction(&self, footing: &Footing, i: usize) -> f64 {
         let load = footing.stand.load_n[i] / (0.25 * self.weight_n);
         let factor = load_factor(self.vehicle.tyre.load_sensitivity, load);
         factor * f64::from(footing.patch[i].friction.static_friction)
+    }
+
+    /// What of it is left along the wheel: a circle, of which each takes as much across as the slope asks of all [-].
+    fn adhesion(&self, footing: &Footing, i: usize) -> f64 {
+        let friction = self.friction(footing, i);
+        (friction * friction - footing.left_slope.powi(2)).max(0.0).sqrt()
+    }
+
+    /// Whether the wheels hold the vehicle on the slope across its heading; else it goes down that, wherever it steers.
+    fn holds_across(&self, footing: &Footing) -> bool {
+        let load_n = footing.stand.load_n;
+        let held_n: f64 = (0..4).map(|i| self.friction(footing, i) * load_n[i]).sum();
+        held_n > footing.left_slope.abs() * load_n.iter().sum::<f64>()
     }
 
     fn is_driven(&self, i: usize) -> bool {
@@ -183,8 +198,9 @@ impl Statics {
     /// the ground, and differentials that want to go straight.
     fn steering_share(&self, footing: &Footing, use_share: f64) -> f64 {
         let [friction, driven_share] = self.driven(footing);
-        let across = footing.stand.left_rise / friction.max(1e-3);
-        let grip = (1.0 - use_share * use_share - across * across).max(0.0).sqrt();
+        let across = footing.left_slope / friction.max(1e-3);
+        // A share of what the cross slope leaves.
+        let grip = ((1.0 - use_share * use_share) * (1.0 - across * across).max(0.0)).sqrt();
         let front_n = footing.stand.load_n[0] + footing.stand.load_n[1];
         let pressed = (front_n / (STEERING_LOAD_SHARE * self.front_rest_n())).min(1.0);
         grip * pressed / (1.0 + driven_share * self.tightness())

@@ -44,6 +44,7 @@ fn small_slip_is_answered_alike_at_every_speed_and_in_every_direction() {
         // damping adds at most 1 s/m 0.03 m/s = 0.03 of 12.
         let along = -settled(&tyre(), &rolling(Vector2::new(1e-4 * speed_mps, 0.0), speed_mps)).x / 1e-4;
         let across = cornering(&tyre(), 1e-4, speed_mps) / 1e-4;
+        println!("stiffness at {speed_mps} m/s: {along:.3} along, {across:.3} across");
         assert!((along - 12.0).abs() < 0.04 && (across - 12.0).abs() < 0.04, "{along} {across}");
         let back = settled(&tyre(), &rolling(Vector2::new(0.0, 1e-4 * speed_mps), -speed_mps)).y / -1e-4;
         assert!((back - across).abs() < 1e-6, "{back} {across}");
@@ -94,6 +95,7 @@ fn force_builds_up_over_the_relaxation_length_at_every_speed() {
         // After 0.3 m, in whole steps of 1 ms, the force stands at 1 - 1/e = 0.632 of its end.
         let footing = rolling(Vector2::new(0.0, 1e-3 * speed_mps), speed_mps);
         let share = after(&tyre(), &footing, 0.3 / speed_mps).y / settled(&tyre(), &footing).y;
+        println!("share of the force after the relaxation length at {speed_mps} m/s: {share:.4}");
         assert!((share - (1.0 - 1.0 / E)).abs() < 0.01, "{speed_mps} m/s: {share}");
     }
 }
@@ -105,6 +107,7 @@ fn combined_slip_pulls_straight_back_within_the_circle() {
     let found = settled(&tyre(), &rolling(Vector2::new(0.12, 0.16), 2.0));
     let expected = 0.98 * (1.0 - (1.0f64 - 0.1 / 0.245).powi(3));
     assert!((expected - 0.7769).abs() < 1e-4);
+    println!("combined slip: {:.4}, expected {expected:.4}", found.norm());
     assert!((found + Vector2::new(0.6, 0.8) * expected).norm() < 0.004, "{found}");
     // However it slips, the force opposes the slip and stays in the circle of 0.98.
     for angle in 0..12 {
