@@ -16,6 +16,9 @@ pub struct PriorConfig {
     /// Height of vegetation at which traction is gone (equation 16) [m]. The paper takes 0.2 m for wheels of
     /// 0.15 m diameter; see [`PriorConfig::for_vehicle`].
     pub vegetation_height_max_m: f64,
+    /// Friction of the ground lies anywhere between these two, each value as likely [-]. A vehicle across a slope needs
+    /// part of it to stay there: the tangent of its roll.
+    pub friction: [f64; 2],
     /// Pseudo-count of the prior in a Dirichlet posterior; the paper takes the number of bins.
     pub evidence: f64,
     /// Half-width of the triangle around the estimated angle that takes the place of the uniform distribution
@@ -41,6 +44,10 @@ pub struct PriorConfig {
     pub obstacle_margin_m: f64,
 }
 
+/// Friction that is expected of natural ground: earth from wet, 0.55, to dry, 0.68, and gravel, 0.6, as peaks (Wong,
+/// Theory of Ground Vehicles, on road adhesion), and as far again to either side for what neither is.
+const FRICTION_OF_EARTH: [f64; 2] = [0.5, 0.8];
+
 impl Default for PriorConfig {
     fn default() -> Self {
         Self {
@@ -48,6 +55,7 @@ impl Default for PriorConfig {
             linear_slope_max_rad: 30f64.to_radians(),
             angular_slope_max_rad: 15f64.to_radians(),
             vegetation_height_max_m: 0.2,
+            friction: FRICTION_OF_EARTH,
             evidence: traversability::N_BINS as f64,
             attitude_spread_rad: 15f64.to_radians(),
             unknown_share_max: 0.5,
@@ -102,7 +110,10 @@ impl PriorConfig {
         check(&positive, "a finite number > 0", |v| v > 0.0)?;
         let clearances = [("high_centred_clearances", self.high_centred_clearances)];
         check(&clearances, "a finite number > 1", |v| v > 1.0)?;
-        check(&[("obstacle_margin_m", self.obstacle_margin_m)], "a finite number >= 0", |v| v >= 0.0)
+        check(&[("obstacle_margin_m", self.obstacle_margin_m)], "a finite number >= 0", |v| v >= 0.0)?;
+        let [least, most] = self.friction;
+        check(&[("friction[0]", least)], "a finite number > 0", |v| v > 0.0)?;
+        check(&[("friction[1]", most)], "a finite number above friction[0]", |v| v > least)
     }
 }
 
@@ -139,6 +150,10 @@ mod tests {
             (PriorConfig { wheel_envelope: 1.5, ..default }, "wheel_envelope"),
             (PriorConfig { high_centred_clearances: 1.0, ..default }, "high_centred_clearances"),
             (PriorConfig { obstacle_margin_m: -1.0, ..default }, "obstacle_margin_m"),
+            (PriorConfig { friction: [0.0, 0.8], ..default }, "friction[0]"),
+            (PriorConfig { friction: [f64::NAN, 0.8], ..default }, "friction[0]"),
+            (PriorConfig { friction: [0.6, 0.6], ..default }, "friction[1]"),
+            (PriorConfig { friction: [0.6, f64::INFINITY], ..default }, "friction[1]"),
         ];
         for (config, field) in wrong {
             assert_eq!(config.validate().unwrap_err().field, field);

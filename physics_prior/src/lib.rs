@@ -12,6 +12,10 @@
 //! - A slope works against a turn as often as for it, and a yaw rate is a speed times a curvature: angular traction is
 //!   the linear one times `1 - s / s_max` or `1 + s / s_max`, each with probability one half. The paper's `1 - s /
 //!   s_max` alone says that nobody can turn on ground on which vehicles do turn.
+//! - A slope across the heading takes its tangent t of the friction, to keep the vehicle where it is. Friction is
+//!   uncertain: with the probability that it is less than t the vehicle slides down and has no traction at all; else
+//!   `sqrt(1 - (t / friction)^2)` is left of the circle of friction to drive and steer with: the slope at which
+//!   equation 15 ends shrinks to that share, and so does the angular traction. It is the slope of the contacts: whoever leans on level ones does not slide.
 //! - Equation 17 takes the absolute angle; roll from the wheel pairs of each axle, pitch from those of each side.
 //! - A wheel stands on the first ground that a ball of its radius touches, not on the height under its centre;
 //!   contact heights and gradients are taken there.

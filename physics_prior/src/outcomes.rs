@@ -5,6 +5,11 @@
 //! often as into it, and load that leaves the steered axle uphill returns downhill. Equation 15 for angular traction,
 //! `1 - s / s_max`, is the first half of that alone; here both halves are outcomes of equal probability,
 //! `linear (1 - s / s_max)` and `linear (1 + s / s_max)`, which ends at 1.
+//!
+//! Slopes across the heading, which these equations leave out, are judged by the circle of friction. Of the friction
+//! mu, the slope t across takes t; the rest, `sqrt(1 - (t / mu)^2)` of it, drives and steers: s_max of the linear
+//! traction shrinks to that share, and so does the angular traction. Friction is equally likely anywhere in a range.
+//! What of it lies below t does not hold the vehicle, which slides; what lies above stands for its mean.
 
 use bicycle::lanes::{Lanes, Real};
 use traversability::{Bins, N_BINS};
@@ -26,6 +31,8 @@ pub(crate) struct Outcomes<L: Lanes> {
     /// Traction, linear and angular, of each wheel on vegetation.
     pub vegetation: [Real<L>; 4],
     pub vegetation_probability: [Real<L>; 4],
+    /// Of known ground that does not hold the vehicle: it slides down the slope, without any traction.
+    pub sliding_probability: Real<L>,
     /// Traction, linear and angular, on unknown ground.
     pub unknown: Real<L>,
     pub unknown_probability: Real<L>,
@@ -43,12 +50,23 @@ pub(crate) struct Equations {
     pub unknown_bins: f32,
     per_slope: [f32; 2],
     per_vegetation_m: f32,
+    friction: [f32; 2],
+    per_friction_range: f32,
     spread_bins: f32,
     unknown_share_max: f32,
     unknown_traction: f32,
     per_belly_depth_m: f32,
     /// Over the distance of each wheel pair [1/m].
     per_distance: [f32; 4],
+}
+
+/// How a vehicle holds on a slope across its heading.
+struct Hold<L: Lanes> {
+    /// Of friction that is less than the slope asks for.
+    sliding_probability: Real<L>,
+    /// Share of the mean of the other friction that is left for driving and turning, and one over it.
+    share: Real<L>,
+    per_share: Real<L>,
 }
 
 /// Wheel pairs of equation 17, wheels counted from 0 as front left, rear left, rear right, front right: two for
@@ -68,6 +86,8 @@ impl Equations {
             unknown_bins: config.unknown_attitude_rad as f32 / Bins::ATTITUDE_WIDTH_RAD,
             per_slope: slopes_rad.map(|slope_rad| (1.0 / libm::tan(slope_rad)) as f32),
             per_vegetation_m: (1.0 / config.vegetation_height_max_m) as f32,
+            friction: config.friction.map(|friction| friction as f32),
+            per_friction_range: (1.0 / (config.friction[1] - config.friction[0])) as f32,
             spread_bins: config.attitude_spread_rad as f32 / Bins::ATTITUDE_WIDTH_RAD,
             unknown_share_max: config.unknown_share_max as f32,
             unknown_traction: config.unknown_traction as f32,
@@ -91,22 +111,28 @@ impl Equations {
         let freedom = (one - pose.belly_depth_m * per_belly_depth_m).max(zero);
         let per_wheel = lanes.real_single(0.25 * (1.0 - self.uniform_weight));
         let [per_linear, per_angular] = self.per_slope;
-        let (per_linear, per_angular) = (lanes.real_single(per_linear), lanes.real_single(per_angular));
+        let hold = self.hold(lanes, pose.across);
+        let per_linear = lanes.real_single(per_linear) * hold.per_share;
+        let per_angular = lanes.real_single(per_angular);
         let per_vegetation_m = lanes.real_single(self.per_vegetation_m);
         let mut known = [zero; 4];
         let (mut linear_dirt, mut angular_dirt) = ([[zero; 4]; 1], [[zero; 4]; 2]);
         let (mut dirt_probability, mut vegetation_probability) = ([zero; 4], [zero; 4]);
-        let (mut vegetation, mut unknown_probability) = ([zero; 4], zero);
+        let mut vegetation = [zero; 4];
+        let (mut sliding_probability, mut unknown_probability) = (zero, zero);
         for (wheel, ground) in pose.wheels.iter().enumerate() {
             known[wheel] = zero.or_else(all_unknown, one - ground.unknown);
             let (linear, angular) = (ground.slope * per_linear, ground.slope * per_angular);
             let speed = (one - linear).max(zero) * freedom;
             linear_dirt[0][wheel] = speed;
-            angular_dirt[0][wheel] = speed * (one - angular).max(zero);
-            angular_dirt[1][wheel] = (speed * (one + angular)).min(one);
+            let turn = speed * hold.share;
+            angular_dirt[0][wheel] = turn * (one - angular).max(zero);
+            angular_dirt[1][wheel] = (turn * (one + angular)).min(one);
             let on_vegetation = one - ground.vegetation_m * per_vegetation_m;
             vegetation[wheel] = on_vegetation.max(zero).min(one) * freedom;
-            let probability = per_wheel * known[wheel];
+            let stood_on = per_wheel * known[wheel];
+            sliding_probability = sliding_probability + stood_on * hold.sliding_probability;
+            let probability = stood_on * (one - hold.sliding_probability);
             dirt_probability[wheel] = probability * (one - pose.vegetation_share);
             vegetation_probability[wheel] = probability * pose.vegetation_share;
             unknown_probability = unknown_probability + per_wheel * (one - known[wheel]);
@@ -118,10 +144,28 @@ impl Equations {
             dirt_probability,
             vegetation,
             vegetation_probability,
+            sliding_probability,
             unknown: lanes.real_single(self.unknown_traction) * freedom,
             unknown_probability,
             angles,
             unknown_angle_probability,
+        }
+    }
+
+    /// What a slope across the heading leaves of the circle of friction.
+    #[inline(always)]
+    fn hold<L: Lanes>(&self, lanes: L, across: Real<L>) -> Hold<L> {
+        let (zero, one) = (lanes.real(0.0), lanes.real(1.0));
+        let [least, most] = self.friction;
+        let (least, most) = (lanes.real_single(least), lanes.real_single(most));
+        let beyond = (across - least).max(zero);
+        let mean = lanes.real(0.5) * (across.max(least) + most);
+        let taken = across / mean;
+        let share = (one - taken * taken).max(zero).sqrt();
+        Hold {
+            sliding_probability: (beyond * lanes.real_single(self.per_friction_range)).min(one),
+            share,
+            per_share: one / share.max(lanes.real_single(SHARE_LEAST)),
         }
     }
 
@@ -166,6 +210,9 @@ impl Equations {
         Triangles { centre: arc_tangent(lanes, tangent) * real(BINS_PER_RAD), around: [sharp, spread] }
     }
 }
+
+/// What is left of the circle of friction counts as no less [-].
+const SHARE_LEAST: f32 = 1e-6;
 
 const BINS_PER_RAD: f32 = 1.0 / Bins::ATTITUDE_WIDTH_RAD;
 const SQRT_6: f32 = 2.449_489_7;

@@ -19,6 +19,8 @@ pub(crate) struct WheelGround<L: Lanes> {
     pub vegetation_m: Real<L>,
     /// |slope| along the heading [-].
     pub slope: Real<L>,
+    /// Slope to the left of the heading, signed [-].
+    pub left_slope: Real<L>,
     /// Share of it that is unknown.
     pub unknown: Real<L>,
 }
@@ -33,6 +35,8 @@ pub(crate) struct PoseGround<L: Lanes> {
     pub vegetation_share: Real<L>,
     /// Share of the footprint that is unknown.
     pub unknown_share: Real<L>,
+    /// |slope| across the heading, the mean under the wheels: the axles hold together [-].
+    pub across: Real<L>,
     /// How far the ground between the axles would reach into the body, 0 where it does not [m].
     pub belly_depth_m: Real<L>,
 }
@@ -64,11 +68,14 @@ impl<L: Lanes> Placed<'_, L> {
         let n_unknown = self.count(&self.ground.unknown);
         let n_known = (n_cells - n_unknown).max(self.lanes.real(1.0));
         let per_known = self.lanes.real_single(VEGETATION_SHARES) * n_known;
+        let left_slopes =
+            wheels[0].left_slope + wheels[1].left_slope + wheels[2].left_slope + wheels[3].left_slope;
         PoseGround {
             wheels,
             n_obstacles: self.n_obstacles(),
             vegetation_share: self.count(&self.ground.vegetation) / per_known,
             unknown_share: n_unknown / n_cells,
+            across: (self.lanes.real_single(0.25) * left_slopes).abs(),
             belly_depth_m: self.belly_depth_m(&wheels, lengths),
         }
     }
@@ -91,13 +98,15 @@ impl<L: Lanes> Placed<'_, L> {
     #[inline(always)]
     fn wheel(&self, tap: &WheelTap) -> WheelGround<L> {
         let [east, north] = self.stencil.heading;
-        let along_east = self.interpolated(Contact::GRADIENT_EAST, tap) * self.lanes.real_single(east);
-        let along_north = self.interpolated(Contact::GRADIENT_NORTH, tap) * self.lanes.real_single(north);
+        let (east, north) = (self.lanes.real_single(east), self.lanes.real_single(north));
+        let rise_east = self.interpolated(Contact::GRADIENT_EAST, tap);
+        let rise_north = self.interpolated(Contact::GRADIENT_NORTH, tap);
         WheelGround {
             height_m: self.interpolated(Contact::HEIGHT, tap),
             variance_m2: self.interpolated(Contact::VARIANCE, tap),
             vegetation_m: self.interpolated(Contact::VEGETATION, tap),
-            slope: (along_east + along_north).abs(),
+            slope: (rise_east * east + rise_north * north).abs(),
+            left_slope: rise_north * east - rise_east * north,
             unknown: self.interpolated(Contact::UNKNOWN, tap),
         }
     }

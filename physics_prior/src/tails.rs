@@ -43,6 +43,9 @@ impl Tails {
                 add_shortfall(lanes, &mut common, outcomes.vegetation[wheel], probability);
             }
         }
+        if lanes.any(lanes.real(0.0).less(outcomes.sliding_probability)) {
+            add_shortfall(lanes, &mut common, lanes.real(0.0), outcomes.sliding_probability);
+        }
         if lanes.any(lanes.real(0.0).less(outcomes.unknown_probability)) {
             add_shortfall(lanes, &mut common, outcomes.unknown, outcomes.unknown_probability);
         }
@@ -139,6 +142,7 @@ pub(crate) fn distribution(equations: &Equations, outcomes: &Outcomes<Scalar>) -
             let on_vegetation = outcomes.vegetation_probability[wheel].1;
             add_atom(&mut quad, lane, outcomes.vegetation[wheel].1, on_vegetation);
         }
+        add_atom(&mut quad, lane, 0.0, outcomes.sliding_probability.1);
         add_atom(&mut quad, lane, outcomes.unknown.1, outcomes.unknown_probability.1);
     }
     let unknown_excess = unknown_excess(equations).map(|excess| Real(Scalar, excess));
