@@ -23,7 +23,7 @@ use crate::lanes::Lanes;
 use definition::{Commanding, Constants, Definition, Stage, Values};
 
 /// Standard gravity [m/s2].
-const STANDARD_GRAVITY_MPS2: f64 = 9.80665;
+pub(crate) const STANDARD_GRAVITY_MPS2: f64 = 9.80665;
 
 /// An effect whose parameters cannot be.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

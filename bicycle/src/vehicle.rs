@@ -4,6 +4,8 @@
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 
+use crate::effect::STANDARD_GRAVITY_MPS2;
+
 /// A four-wheeled vehicle with front steering.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -265,6 +267,36 @@ impl Vehicle {
         ];
         check(&angles, "an angle in radians below pi/2", |v| v < std::f64::consts::FRAC_PI_2)?;
         self.geometry.validate()
+    }
+}
+
+/// Roll and pitch of a body over those of the ground are told up to this; beyond, hardly anything keeps it upright.
+const LEAN_MOST: f64 = 3.0;
+
+impl Vehicle {
+    /// Roll and pitch of the body over those of the ground that it stands on, 1 on stiff springs [-].
+    ///
+    /// On a slope of angle t the weight overturns the body, which leans by L t, with the moment m g h L t, and springs
+    /// and tyres of the angular stiffness K hold it with K (L - 1) t: L = K / (K - m g h) (Gillespie, Fundamentals of
+    /// Vehicle Dynamics, chapter 6, with the roll axis on the ground).
+    pub fn lean(&self) -> [f64; 2] {
+        let track_m = self.geometry.track_m;
+        let tyre_n_per_m = self.tyre.radial_stiffness_n_per_m;
+        let in_series = |strut_n_per_m: f64| strut_n_per_m * tyre_n_per_m / (strut_n_per_m + tyre_n_per_m);
+        let ahead_m = [self.geometry.wheelbase_m - self.body.cog_ahead_m, -self.body.cog_ahead_m];
+        let mut stiffness_nm_per_rad = [0.0; 2];
+        for (axle, ahead_m) in [&self.front, &self.rear].into_iter().zip(ahead_m) {
+            let spring_n_per_m = axle.suspension.stiffness_n_per_m;
+            let bar_n_per_m = 2.0 * axle.anti_roll_nm_per_rad / (track_m * track_m);
+            let roll_n_per_m = in_series(spring_n_per_m + bar_n_per_m);
+            stiffness_nm_per_rad[0] += 0.5 * track_m * track_m * roll_n_per_m;
+            stiffness_nm_per_rad[1] += 2.0 * ahead_m * ahead_m * in_series(spring_n_per_m);
+        }
+        let overturning_nm_per_rad = self.body.mass_kg * STANDARD_GRAVITY_MPS2 * self.body.cog_height_m;
+        stiffness_nm_per_rad.map(|stiffness| {
+            let left = stiffness - overturning_nm_per_rad;
+            if left * LEAN_MOST < stiffness { LEAN_MOST } else { stiffness / left }
+        })
     }
 }
 

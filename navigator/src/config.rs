@@ -86,7 +86,7 @@ impl Config {
                 n_yaws: 16,
                 recentre_m: 4.0 * risk_m,
             },
-            prior: PriorConfig::for_vehicle(&vehicle.geometry),
+            prior: PriorConfig { lean: vehicle.lean(), ..PriorConfig::for_vehicle(&vehicle.geometry) },
             cost_to_go: cost_to_go(length_m),
             controller,
             guard: GuardConfig::default(),

@@ -25,6 +25,9 @@ pub struct PriorConfig {
     /// for roll and pitch [rad]. Over the whole range of 60 degrees, the uniform one would break a limit of
     /// 30 degrees on level ground.
     pub attitude_spread_rad: f64,
+    /// Roll and pitch of the body over those of the ground under its wheels, from 1 on: springs give way on the lower
+    /// side; see [`bicycle::Vehicle::lean`].
+    pub lean: [f64; 2],
     /// A footprint of which more than this share is unknown is judged as unknown ground, in [0, 1].
     pub unknown_share_max: f64,
     /// Traction, linear and angular, expected of a wheel on unknown ground: low, so that known ground is
@@ -58,6 +61,7 @@ impl Default for PriorConfig {
             friction: FRICTION_OF_EARTH,
             evidence: traversability::N_BINS as f64,
             attitude_spread_rad: 15f64.to_radians(),
+            lean: [1.0; 2],
             unknown_share_max: 0.5,
             unknown_traction: 0.3,
             unknown_attitude_rad: 25f64.to_radians(),
@@ -111,6 +115,8 @@ impl PriorConfig {
         let clearances = [("high_centred_clearances", self.high_centred_clearances)];
         check(&clearances, "a finite number > 1", |v| v > 1.0)?;
         check(&[("obstacle_margin_m", self.obstacle_margin_m)], "a finite number >= 0", |v| v >= 0.0)?;
+        let leans = [("lean[0]", self.lean[0]), ("lean[1]", self.lean[1])];
+        check(&leans, "a number from 1 to 10", |v| (1.0..=10.0).contains(&v))?;
         let [least, most] = self.friction;
         check(&[("friction[0]", least)], "a finite number > 0", |v| v > 0.0)?;
         check(&[("friction[1]", most)], "a finite number above friction[0]", |v| v > least)
@@ -150,6 +156,8 @@ mod tests {
             (PriorConfig { wheel_envelope: 1.5, ..default }, "wheel_envelope"),
             (PriorConfig { high_centred_clearances: 1.0, ..default }, "high_centred_clearances"),
             (PriorConfig { obstacle_margin_m: -1.0, ..default }, "obstacle_margin_m"),
+            (PriorConfig { lean: [0.9, 1.0], ..default }, "lean[0]"),
+            (PriorConfig { lean: [1.0, f64::NAN], ..default }, "lean[1]"),
             (PriorConfig { friction: [0.0, 0.8], ..default }, "friction[0]"),
             (PriorConfig { friction: [f64::NAN, 0.8], ..default }, "friction[0]"),
             (PriorConfig { friction: [0.6, 0.6], ..default }, "friction[1]"),

@@ -16,6 +16,7 @@
 //!   uncertain: with the probability that it is less than t the vehicle slides down and has no traction at all; else
 //!   `sqrt(1 - (t / friction)^2)` is left of the circle of friction to drive and steer with: the slope at which
 //!   equation 15 ends shrinks to that share, and so does the angular traction. It is the slope of the contacts: whoever leans on level ones does not slide.
+//! - Springs let the body lean further than the ground, by a factor that the description of the vehicle gives.
 //! - Equation 17 takes the absolute angle; roll from the wheel pairs of each axle, pitch from those of each side.
 //! - A wheel stands on the first ground that a ball of its radius touches, not on the height under its centre;
 //!   contact heights and gradients are taken there.

@@ -58,6 +58,8 @@ pub(crate) struct Equations {
     per_belly_depth_m: f32,
     /// Over the distance of each wheel pair [1/m].
     per_distance: [f32; 4],
+    /// Angle of the body over that of each wheel pair [bins/rad].
+    lean: [f32; 4],
 }
 
 /// How a vehicle holds on a slope across its heading.
@@ -92,6 +94,7 @@ impl Equations {
             unknown_share_max: config.unknown_share_max as f32,
             unknown_traction: config.unknown_traction as f32,
             per_belly_depth_m,
+            lean: [0, 0, 1, 1].map(|axis| BINS_PER_RAD * config.lean[axis] as f32),
             per_distance: distances_m.map(|distance_m| (1.0 / distance_m) as f32),
         }
     }
@@ -207,7 +210,7 @@ impl Equations {
         let spread = (real(self.spread_bins * self.spread_bins) + noise * noise).sqrt();
         let sharp = Triangle::new(lanes, noise, probability * real(1.0 - self.uniform_weight));
         let spread = Triangle::new(lanes, spread, probability * real(self.uniform_weight));
-        Triangles { centre: arc_tangent(lanes, tangent) * real(BINS_PER_RAD), around: [sharp, spread] }
+        Triangles { centre: arc_tangent(lanes, tangent) * real(self.lean[pair]), around: [sharp, spread] }
     }
 }
 

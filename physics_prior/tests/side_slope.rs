@@ -3,6 +3,7 @@
 
 mod surfaces;
 
+use std::f64::consts::FRAC_PI_2;
 use std::sync::Arc;
 
 use bicycle::{Command, Vehicle};
@@ -116,4 +117,30 @@ fn the_plant_turns_no_less_than_the_prior_says() {
         }
     }
     assert!(n_compared > 10, "{n_compared}");
+}
+
+#[test]
+fn the_body_leans_on_its_springs_as_the_vehicle_says() {
+    let vehicle = full_size();
+    let [roll, pitch] = vehicle.lean();
+    for slope_rad in [5f64, 15.0, 22.0].map(f64::to_radians) {
+        let stand = |yaw_rad: f64| {
+            let world = plane(slope_rad.tan(), 0.9);
+            Plant::new(&vehicle, world, [0.0, 0.0, yaw_rad]).unwrap().pose()
+        };
+        let leans = [(stand(0.0).roll_rad, roll), (stand(FRAC_PI_2).pitch_rad, pitch)];
+        for (found_rad, lean) in leans {
+            let found = found_rad.abs() / slope_rad;
+            assert!((found - lean).abs() < 0.03, "{slope_rad}: {found} against {lean}");
+        }
+    }
+    let ground = surface(window(0.2, 80, 80), |_, y_m| open(0.3 * y_m));
+    let believed = |lean: [f64; 2]| {
+        let prior = PriorConfig { uniform_weight: 0.0, lean, ..PriorConfig::default() };
+        let assumption = Assumption::Physics { prior, level: level(1.0) };
+        let belief = prior_map(&vehicle.geometry, &assumption, &ground, 4).belief(8.0, 8.0, 0.4).unwrap();
+        [belief.roll, belief.pitch].map(|pmf| f64::from(pmf.mean(&Bins::ATTITUDE)))
+    };
+    let (stiff, soft) = (believed([1.0; 2]), believed([roll, pitch]));
+    assert!((soft[0] / stiff[0] - roll).abs() < 1e-3 && (soft[1] / stiff[1] - pitch).abs() < 1e-3);
 }
