@@ -10,7 +10,7 @@ use rand::RngExt;
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 use crate::random::stream;
-use crate::{Bounds, Traversability, Truth, World};
+use crate::{Bounds, Plant, Traversability, Truth, World};
 
 /// Headings in which the vehicle is tried: every 45 degrees, along the lattice's rows, columns and diagonals.
 const STEPS: [[i64; 2]; 8] = [[1, 0], [1, 1], [0, 1], [-1, 1], [-1, 0], [-1, -1], [0, -1], [1, -1]];
@@ -18,6 +18,9 @@ const STEPS: [[i64; 2]; 8] = [[1, 0], [1, 1], [0, 1], [-1, 1], [-1, 0], [-1, -1]
 const LIMIT_SHARE: f64 = 0.9;
 /// Traction below which a place counts as one the vehicle cannot leave.
 const TRACTION_MIN: f64 = 0.1;
+/// A parked vehicle is watched for this long, and may move by this share of its length.
+const REST_S: f64 = 2.0;
+const REST_SHARE: f64 = 0.01;
 /// The search reaches this far around start and goal: a share of their distance, and never less than this [m].
 const DETOUR_SHARE: f64 = 0.75;
 const DETOUR_MIN_LENGTHS: f64 = 5.0;
@@ -96,6 +99,17 @@ pub enum PairError {
         /// Where it is [m].
         at_m: [f64; 2],
     },
+    /// The parked vehicle slides away.
+    #[error(
+        "start: expected ground on which the parked vehicle stays, found that it moves {moved_m:.2} m in {REST_S:.0} s at \
+         ({:.1}, {:.1}) m", at_m[0], at_m[1]
+    )]
+    Slides {
+        /// Where it starts [m].
+        at_m: [f64; 2],
+        /// How far it comes [m].
+        moved_m: f64,
+    },
     /// There is no way that keeps the limits.
     #[error(
         "goal: expected a way from the start on which the vehicle keeps its limits, found none within {within_m:.0} m \
@@ -124,10 +138,10 @@ pub struct Pair {
     pub goal_m: [f64; 2],
 }
 
-/// Whether the vehicle can stand at the start as it heads, stand at the goal in some heading, and get there: by a
-/// search over poses in which it keeps nine tenths of its attitude limits, touches no obstacle and finds traction. It
-/// turns as its front wheels steer, forwards and backwards. The poses are those of a lattice, at rest and one by one:
-/// who gets there all the same drives well.
+/// Whether the vehicle can stand at the start as it heads, where the plant stays parked, stand at the goal in some
+/// heading, and get there: by a search over poses in which it keeps nine tenths of its attitude limits, touches no
+/// obstacle and finds traction. It turns as its front wheels steer, forwards and backwards. The poses are those of a
+/// lattice, at rest and one by one: who gets there all the same drives well.
 pub fn check_pair(world: &Arc<World>, vehicle: &Vehicle, pair: &Pair) -> Result<(), PairError> {
     Checker::new(world, vehicle).check(pair)
 }
@@ -187,6 +201,7 @@ fn candidate(wish: &PairWish, map: &Bounds, rng: &mut Xoshiro256PlusPlus) -> Pai
 }
 
 struct Checker<'a> {
+    world: Arc<World>,
     truth: Truth,
     vehicle: &'a Vehicle,
     /// Where the rear axle's centre may be: the vehicle's reach inside the world.
@@ -204,7 +219,8 @@ impl<'a> Checker<'a> {
             north_east_m: north_east_m.map(|v| v - reach_m),
         };
         let spacing_m = (geometry.track_m.min(geometry.wheelbase_m) / 3.0).max(world.geometry().resolution_m);
-        Self { truth: Truth::new(vehicle, Arc::clone(world)), vehicle, map, spacing_m }
+        let truth = Truth::new(vehicle, Arc::clone(world));
+        Self { world: Arc::clone(world), truth, vehicle, map, spacing_m }
     }
 
     fn check(&self, pair: &Pair) -> Result<(), PairError> {
@@ -215,7 +231,44 @@ impl<'a> Checker<'a> {
     fn check_ends(&self, pair: &Pair) -> Result<(), PairError> {
         let [x_m, y_m, yaw_rad] = pair.start;
         self.check_end(End::Start, [x_m, y_m], &[yaw_rad])?;
-        self.check_end(End::Goal, pair.goal_m, &std::array::from_fn::<_, 8, _>(heading_rad))
+        self.check_end(End::Goal, pair.goal_m, &std::array::from_fn::<_, 8, _>(heading_rad))?;
+        self.check_rest(pair.start)
+    }
+
+    /// Whether the plant, which finds its own balance, stays where it is parked and keeps the limits there. What is
+    /// wrong with the vehicle itself is not for a pair to tell.
+    fn check_rest(&self, start: [f64; 3]) -> Result<(), PairError> {
+        let at_m = [start[0], start[1]];
+        let Ok(mut plant) = Plant::new(self.vehicle, Arc::clone(&self.world), start) else { return Ok(()) };
+        let before = plant.pose();
+        plant.advance(REST_S);
+        let after = plant.pose();
+        let moved_m = (after.x_m - before.x_m).hypot(after.y_m - before.y_m);
+        // False for a place that is no number, too.
+        let stays = moved_m <= REST_SHARE * self.vehicle.geometry.length_m;
+        if !stays {
+            return Err(PairError::Slides { at_m, moved_m });
+        }
+        let stand = [after.roll_rad, after.pitch_rad];
+        if self.keeps_limits(stand) { Ok(()) } else { Err(self.too_steep(End::Start, at_m, stand)) }
+    }
+
+    fn keeps_limits(&self, [roll_rad, pitch_rad]: [f64; 2]) -> bool {
+        let limits = &self.vehicle.limits;
+        roll_rad.abs() <= LIMIT_SHARE * limits.roll_max_rad
+            && pitch_rad.abs() <= LIMIT_SHARE * limits.pitch_max_rad
+    }
+
+    fn too_steep(&self, end: End, at_m: [f64; 2], [roll_rad, pitch_rad]: [f64; 2]) -> PairError {
+        let limits = &self.vehicle.limits;
+        PairError::TooSteep {
+            end,
+            at_m,
+            roll_deg: roll_rad.abs().to_degrees(),
+            pitch_deg: pitch_rad.abs().to_degrees(),
+            roll_max_deg: (LIMIT_SHARE * limits.roll_max_rad).to_degrees(),
+            pitch_max_deg: (LIMIT_SHARE * limits.pitch_max_rad).to_degrees(),
+        }
     }
 
     fn check_way(&self, pair: &Pair) -> Result<(), PairError> {
@@ -245,21 +298,12 @@ impl<'a> Checker<'a> {
         if steepness(best) <= LIMIT_SHARE {
             return Err(PairError::NoTraction { end, at_m });
         }
-        Err(PairError::TooSteep {
-            end,
-            at_m,
-            roll_deg: best.roll_rad.abs().to_degrees(),
-            pitch_deg: best.pitch_rad.abs().to_degrees(),
-            roll_max_deg: (LIMIT_SHARE * limits.roll_max_rad).to_degrees(),
-            pitch_max_deg: (LIMIT_SHARE * limits.pitch_max_rad).to_degrees(),
-        })
+        Err(self.too_steep(end, at_m, [best.roll_rad, best.pitch_rad]))
     }
 
     fn is_safe(&self, stand: &Traversability) -> bool {
-        let limits = &self.vehicle.limits;
         !stand.is_blocked
-            && stand.roll_rad.abs() <= LIMIT_SHARE * limits.roll_max_rad
-            && stand.pitch_rad.abs() <= LIMIT_SHARE * limits.pitch_max_rad
+            && self.keeps_limits([stand.roll_rad, stand.pitch_rad])
             && stand.linear_traction >= TRACTION_MIN
     }
 

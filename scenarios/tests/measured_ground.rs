@@ -212,6 +212,25 @@ fn ends_on_obstacles_slopes_and_ice_are_refused_with_the_reason() {
 }
 
 #[test]
+fn a_start_where_the_parked_vehicle_slides_is_refused() {
+    // Down 21.8 degrees, where statics ask for no pull.
+    let start = |friction: f32| {
+        let constant = Stribeck {
+            static_friction: friction,
+            dynamic_friction: friction,
+            viscous_friction: 0.0,
+            stribeck_speed_mps: 0.25,
+        };
+        let bank = ground(|x, _| -0.4 * x.min(14.0), |_, _| Patch::open(constant));
+        check_pair(&bank, &full_size(), &ACROSS)
+    };
+    let Err(PairError::Slides { at_m: [8.0, 20.0], moved_m }) = start(0.3) else { panic!("it slides") };
+    // From rest with g (sin - 0.3 cos) = 0.91 m/s2, for 1.5 s of settling before the 2 s.
+    assert!((2.0..6.0).contains(&moved_m), "{moved_m}");
+    assert!(!matches!(start(0.6), Err(PairError::Slides { .. })), "it stays");
+}
+
+#[test]
 fn a_wall_cuts_off_and_a_gate_lets_through() {
     let walled = |gate_m: f64| {
         let wall = move |x: f64, y: f64| (24.0..24.5).contains(&x) && (y - 30.0).abs() > 0.5 * gate_m;
