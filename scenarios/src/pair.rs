@@ -1,7 +1,7 @@
 //! Start and goal: whether a vehicle can stand there and get from one to the other.
 
-use std::cmp::Reverse;
-use std::collections::BinaryHeap;
+mod way;
+
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
@@ -11,9 +11,8 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 
 use crate::random::stream;
 use crate::{Bounds, Plant, Traversability, Truth, World};
+use way::{Way, heading_rad};
 
-/// Headings in which the vehicle is tried: every 45 degrees, along the lattice's rows, columns and diagonals.
-const STEPS: [[i64; 2]; 8] = [[1, 0], [1, 1], [0, 1], [-1, 1], [-1, 0], [-1, -1], [0, -1], [1, -1]];
 /// Share of the attitude limits that counts as safe to stand on.
 const LIMIT_SHARE: f64 = 0.9;
 /// Traction below which a place counts as one the vehicle cannot leave.
@@ -24,8 +23,6 @@ const REST_SHARE: f64 = 0.01;
 /// The search reaches this far around start and goal: a share of their distance, and never less than this [m].
 const DETOUR_SHARE: f64 = 0.75;
 const DETOUR_MIN_LENGTHS: f64 = 5.0;
-/// Poses of a manoeuvre that are looked at.
-const PASSED: usize = 4;
 /// Pairs that are drawn, and pairs between which a way is searched, before none is found.
 const ATTEMPTS: usize = 400;
 const SEARCHES: usize = 12;
@@ -274,7 +271,16 @@ impl<'a> Checker<'a> {
     fn check_way(&self, pair: &Pair) -> Result<(), PairError> {
         let distance_m = (pair.goal_m[0] - pair.start[0]).hypot(pair.goal_m[1] - pair.start[1]);
         let within_m = (DETOUR_SHARE * distance_m).max(DETOUR_MIN_LENGTHS * self.vehicle.geometry.length_m);
-        if self.connects(pair, within_m) { Ok(()) } else { Err(PairError::Unreachable { within_m }) }
+        let geometry = &self.vehicle.geometry;
+        let way = Way {
+            spacing_m: self.spacing_m,
+            radius_m: geometry.wheelbase_m / self.vehicle.limits.steering_max_rad.tan(),
+            within_m,
+        };
+        let passes = |x_m: f64, y_m: f64, yaw_rad: f64| {
+            self.map.contains(x_m, y_m) && self.is_safe(&self.truth.traversability(x_m, y_m, yaw_rad))
+        };
+        if way.connects(pair, passes) { Ok(()) } else { Err(PairError::Unreachable { within_m }) }
     }
 
     /// Whether the vehicle can stand at a point in one of the headings; else what is wrong with the best of them.
@@ -306,136 +312,4 @@ impl<'a> Checker<'a> {
             && self.keeps_limits([stand.roll_rad, stand.pitch_rad])
             && stand.linear_traction >= TRACTION_MIN
     }
-
-    /// Best-first search over cells and headings, of manoeuvres that a vehicle with front steering can drive.
-    fn connects(&self, pair: &Pair, within_m: f64) -> bool {
-        let lattice = Lattice::around(pair, within_m, self.spacing_m);
-        let manoeuvres = self.manoeuvres();
-        let mut safe = vec![None; lattice.n_nodes()];
-        let mut seen = vec![false; lattice.n_nodes()];
-        let mut open = BinaryHeap::new();
-        seen[lattice.index(lattice.start)] = true;
-        open.push((Reverse(0), lattice.start));
-        while let Some((_, node)) = open.pop() {
-            if lattice.steps_to_goal(node.cell) <= 1 {
-                return true;
-            }
-            for manoeuvre in &manoeuvres[node.heading] {
-                let poses = manoeuvre.map(|pose| pose.from(node.cell));
-                let Some(&end) = poses.last().filter(|end| lattice.holds(end.cell)) else { continue };
-                if !seen[lattice.index(end)]
-                    && poses.iter().all(|&pose| self.passes(&lattice, &mut safe, pose))
-                {
-                    seen[lattice.index(end)] = true;
-                    open.push((Reverse(lattice.steps_to_goal(end.cell)), end));
-                }
-            }
-        }
-        false
-    }
-
-    /// Whether the vehicle keeps its limits in a pose, asked of the truth once.
-    fn passes(&self, lattice: &Lattice, safe: &mut [Option<bool>], pose: Node) -> bool {
-        if !lattice.holds(pose.cell) {
-            return false;
-        }
-        *safe[lattice.index(pose)].get_or_insert_with(|| {
-            let [x_m, y_m] = lattice.at_m(pose.cell);
-            let stand = || self.truth.traversability(x_m, y_m, heading_rad(pose.heading));
-            self.map.contains(x_m, y_m) && self.is_safe(&stand())
-        })
-    }
-
-    /// Of each heading: a cell forwards or backwards, and an eighth of a turn to either side in either gear, on the
-    /// smallest circle that the front wheels steer.
-    fn manoeuvres(&self) -> [Vec<[Node; PASSED]>; 8] {
-        let radius_m = self.vehicle.geometry.wheelbase_m / self.vehicle.limits.steering_max_rad.tan();
-        std::array::from_fn(|heading| {
-            let straight =
-                [1, -1].map(|gear| [Node { cell: STEPS[heading].map(|n| gear * n), heading }; PASSED]);
-            let gears_and_sides = [(1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)];
-            let turns = gears_and_sides.map(|(gear, side)| self.turn(heading, gear, side * radius_m));
-            straight.into_iter().chain(turns).collect()
-        })
-    }
-
-    /// Poses passed on an eighth of a turn from cell 0 about a centre `radius_m` to the left.
-    fn turn(&self, heading: usize, gear: f64, radius_m: f64) -> [Node; PASSED] {
-        let whole_rad = gear * radius_m.signum() * TAU / 8.0;
-        std::array::from_fn(|i| {
-            let turned_rad = whole_rad * (i + 1) as f64 / PASSED as f64;
-            let [ahead_m, left_m] = [radius_m * turned_rad.sin(), radius_m * (1.0 - turned_rad.cos())];
-            let (sin, cos) = heading_rad(heading).sin_cos();
-            let way_m = [ahead_m * cos - left_m * sin, ahead_m * sin + left_m * cos];
-            let eighths = (turned_rad / TAU * 8.0).round() as i64;
-            let heading = (heading as i64 + eighths).rem_euclid(8) as usize;
-            Node { cell: way_m.map(|way_m| (way_m / self.spacing_m).round() as i64), heading }
-        })
-    }
-}
-
-/// A pose of the search.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-struct Node {
-    cell: [i64; 2],
-    heading: usize,
-}
-
-impl Node {
-    /// The same pose seen from the world, given from a cell.
-    fn from(self, cell: [i64; 2]) -> Self {
-        Self { cell: [cell[0] + self.cell[0], cell[1] + self.cell[1]], ..self }
-    }
-}
-
-/// The poses that a search may visit.
-struct Lattice {
-    south_west_m: [f64; 2],
-    spacing_m: f64,
-    n: [i64; 2],
-    start: Node,
-    goal: [i64; 2],
-}
-
-impl Lattice {
-    fn around(pair: &Pair, within_m: f64, spacing_m: f64) -> Self {
-        let [x_m, y_m, yaw_rad] = pair.start;
-        let low_m = [0, 1].map(|k| pair.start[k].min(pair.goal_m[k]) - within_m);
-        let high_m = [0, 1].map(|k| pair.start[k].max(pair.goal_m[k]) + within_m);
-        let cell = |at_m: [f64; 2]| [0, 1].map(|k| ((at_m[k] - low_m[k]) / spacing_m).round() as i64);
-        let start = cell([x_m, y_m]);
-        Self {
-            // The start lies on the lattice.
-            south_west_m: [x_m - start[0] as f64 * spacing_m, y_m - start[1] as f64 * spacing_m],
-            spacing_m,
-            n: [0, 1].map(|k| ((high_m[k] - low_m[k]) / spacing_m).ceil() as i64 + 1),
-            start: Node { cell: start, heading: (yaw_rad / TAU * 8.0).round().rem_euclid(8.0) as usize },
-            goal: cell(pair.goal_m),
-        }
-    }
-
-    fn n_nodes(&self) -> usize {
-        8 * (self.n[0] * self.n[1]) as usize
-    }
-
-    fn holds(&self, cell: [i64; 2]) -> bool {
-        (0..2).all(|k| (0..self.n[k]).contains(&cell[k]))
-    }
-
-    fn index(&self, node: Node) -> usize {
-        8 * (node.cell[1] * self.n[0] + node.cell[0]) as usize + node.heading
-    }
-
-    fn at_m(&self, cell: [i64; 2]) -> [f64; 2] {
-        [0, 1].map(|k| self.south_west_m[k] + cell[k] as f64 * self.spacing_m)
-    }
-
-    /// Moves of a chess king to the goal.
-    fn steps_to_goal(&self, cell: [i64; 2]) -> i64 {
-        (0..2).map(|k| (cell[k] - self.goal[k]).abs()).max().unwrap_or(0)
-    }
-}
-
-fn heading_rad(heading: usize) -> f64 {
-    heading as f64 * TAU / 8.0
 }
