@@ -144,3 +144,16 @@ fn the_body_leans_on_its_springs_as_the_vehicle_says() {
     let (stiff, soft) = (believed([1.0; 2]), believed([roll, pitch]));
     assert!((soft[0] / stiff[0] - roll).abs() < 1e-3 && (soft[1] / stiff[1] - pitch).abs() < 1e-3);
 }
+
+#[test]
+fn stiff_springs_do_not_lean_and_what_hardly_stands_leans_no_further_than_told() {
+    let mut stiff = full_size();
+    stiff.tyre.radial_stiffness_n_per_m = 1e9;
+    for axle in [&mut stiff.front, &mut stiff.rear] {
+        axle.suspension.stiffness_n_per_m = 1e9;
+    }
+    assert!(stiff.lean().iter().all(|lean| (1.0..1.001).contains(lean)), "{:?}", stiff.lean());
+    let mut tall = full_size();
+    tall.body.cog_height_m = 5.0;
+    assert_eq!(tall.lean()[0], 3.0, "it falls over on level ground");
+}

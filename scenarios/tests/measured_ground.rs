@@ -231,6 +231,25 @@ fn a_start_where_the_parked_vehicle_slides_is_refused() {
 }
 
 #[test]
+fn a_vehicle_with_a_turning_circle_leaves_a_yard_ahead_and_not_to_the_side() {
+    // A yard in which the vehicle could turn on the spot, with its farthest corner 3.1 m from the rear axle, and a lane
+    // that leaves it. Its tightest circle has a radius of 4.3 m.
+    let through_lane = |heading_rad: f64| {
+        let is_free = move |x: f64, y: f64| {
+            let (x, y) = (x - 24.0, y - 20.0);
+            let ahead = x * heading_rad.cos() + y * heading_rad.sin();
+            let left = y * heading_rad.cos() - x * heading_rad.sin();
+            x.hypot(y) < 3.6 || (ahead > 0.0 && left.abs() < 2.0)
+        };
+        let yard = ground(|_, _| 0.0, move |x, y| if is_free(x, y) { ROCK } else { ROCK.obstructed(2.0) });
+        let goal_m = [24.0 + 12.0 * heading_rad.cos(), 20.0 + 12.0 * heading_rad.sin()];
+        check_pair(&yard, &full_size(), &Pair { start: [24.0, 20.0, 0.0], goal_m })
+    };
+    assert_eq!(through_lane(0.0), Ok(()));
+    assert!(matches!(through_lane(std::f64::consts::FRAC_PI_2), Err(PairError::Unreachable { .. })));
+}
+
+#[test]
 fn a_wall_cuts_off_and_a_gate_lets_through() {
     let walled = |gate_m: f64| {
         let wall = move |x: f64, y: f64| (24.0..24.5).contains(&x) && (y - 30.0).abs() > 0.5 * gate_m;
