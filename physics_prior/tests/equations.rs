@@ -4,7 +4,7 @@ mod surfaces;
 
 use std::f64::consts::TAU;
 
-use physics_prior::{Assumption, PriorBelief, PriorConfig};
+use physics_prior::{Assumption, PriorConfig};
 use proptest::prelude::*;
 use surfaces::*;
 use terrain::{GridGeometry, GridMap, SurfaceCell, TerrainClass, height_at};
@@ -71,100 +71,6 @@ fn the_estimate_stands_in_the_bins_beside_it_and_nowhere_else() {
             assert!((p - q).abs() < 2e-4, "{pmf:?} {expected:?}");
         }
     }
-}
-
-/// What the prior without its spread says of a plane, at 2 m east and north of its corner.
-fn on_plane([east, north]: [f64; 2], yaw_rad: f64, friction: [f64; 2]) -> PriorBelief {
-    let ground = surface(window(0.1, 40, 40), |x, y| open(east * x + north * y));
-    let prior = PriorConfig { uniform_weight: 0.0, friction, ..PriorConfig::default() };
-    let assumption = Assumption::Physics { prior, level: level(1.0) };
-    prior_map(&CAR, &assumption, &ground, 4).belief(2.0, 2.0, yaw_rad).unwrap()
-}
-
-#[test]
-fn ground_that_is_level_across_the_heading_asks_nothing_of_the_friction() {
-    let slippery = [0.01, 0.02];
-    for (gradient, yaw_rad) in [([0.0, 0.0], 0.7), ([0.3, 0.0], 0.0), ([0.0, -0.2], 0.25 * TAU)] {
-        let [usual, slippery] = [[0.5, 0.8], slippery].map(|friction| on_plane(gradient, yaw_rad, friction));
-        assert_eq!(usual, slippery, "{gradient:?}");
-    }
-    assert_ne!(on_plane([0.0, 0.3], 0.0, slippery), on_plane([0.0, 0.3], 0.0, [0.5, 0.8]));
-}
-
-#[test]
-fn nothing_is_left_where_the_slope_across_exceeds_the_friction() {
-    let known = [0.6, 0.600_001];
-    for side in [-1.0, 1.0] {
-        // Nearly all of the friction is needed to stay: rolling on takes nothing, turning has hardly any left.
-        let holding = on_plane([0.0, side * 0.599], 0.0, known);
-        assert_eq!(holding.linear.probabilities()[11], 1.0);
-        assert!(holding.angular.mean(&Bins::TRACTION) < 0.06, "{holding:?}");
-        assert_eq!(holding.angular.probabilities()[3..], [0.0; 9]);
-        let sliding = on_plane([0.0, side * 0.61], 0.0, known);
-        assert_eq!([sliding.linear.probabilities()[0], sliding.angular.probabilities()[0]], [1.0; 2]);
-    }
-}
-
-#[test]
-fn the_vehicle_slides_with_the_probability_of_too_little_friction() {
-    for (across, sliding) in [(0.45f64, 0.0), (0.56, 0.2), (0.65, 0.5), (0.77, 0.9), (0.85, 1.0)] {
-        let belief = on_plane([0.0, across], 0.0, [0.5, 0.8]);
-        let linear = belief.linear.probabilities();
-        assert!((f64::from(linear[0]) - sliding).abs() < 1e-4, "{across}: {linear:?}");
-        assert!((f64::from(linear[11]) - (1.0 - sliding)).abs() < 1e-4, "{across}: {linear:?}");
-        // What holds has the mean of its friction.
-        let taken = across / (0.5 * (across.max(0.5) + 0.8));
-        let angular = (1.0 - sliding) * (1.0 - taken * taken).max(0.0).sqrt();
-        assert!(
-            (f64::from(belief.angular.mean(&Bins::TRACTION)) - angular).abs() < 2e-4,
-            "{across}: {angular}"
-        );
-    }
-    // Grass of half the largest height holds no better.
-    let green = surface(window(0.1, 40, 40), |_, y| {
-        SurfaceCell::certain((0.65 * y) as f32, TerrainClass::Vegetation, 0.1)
-    });
-    let linear = prior_map(&CAR, &sharp(), &green, 4).belief(2.0, 2.0, 0.0).unwrap().linear;
-    assert!(
-        (linear.probabilities()[0] - 0.5).abs() < 1e-4 && (linear.mean(&Bins::TRACTION) - 0.25).abs() < 1e-4
-    );
-}
-
-#[test]
-fn a_slope_across_leaves_the_rest_of_the_circle_of_friction_to_the_climb() {
-    // Across 0.39 of 0.65: sqrt(1 - 0.6^2) = 0.8 of the circle is left, so that 0.8 tan 30 = 0.4619 takes everything.
-    for (along, linear) in [(0.0, 1.0), (0.1, 1.0 - 0.1 / 0.4619), (0.3, 1.0 - 0.3 / 0.4619), (0.47, 0.0)] {
-        let belief = on_plane([along, 0.39], 0.0, [0.5, 0.8]);
-        assert!((belief.linear.mean(&Bins::TRACTION) - linear).abs() < 2e-4, "{along}: {linear}");
-        for mirrored in [[along, -0.39], [-along, 0.39]] {
-            let mirrored = on_plane(mirrored, 0.0, [0.5, 0.8]);
-            let means = [&belief, &mirrored]
-                .map(|belief| [&belief.linear, &belief.angular].map(|pmf| pmf.mean(&Bins::TRACTION)));
-            assert!((0..2).all(|k| (means[0][k] - means[1][k]).abs() < 1e-5), "{means:?}");
-        }
-    }
-}
-
-#[test]
-fn a_vehicle_that_leans_on_level_contacts_does_not_slide() {
-    // The left wheels stand on a table of 0.1 m, which leans the car by 27 degrees; it slides where they stand on a bank.
-    let on_ground = |height_m: fn(f64) -> f64| {
-        let ground = surface(window(0.02, 100, 100), |_, y| open(height_m(y)));
-        let prior = PriorConfig {
-            uniform_weight: 0.0,
-            friction: [0.2, 0.21],
-            wheel_envelope: 0.0,
-            ..PriorConfig::default()
-        };
-        let assumption = Assumption::Physics { prior, level: level(1.0) };
-        prior_map(&CAR, &assumption, &ground, 4).belief(1.0, 1.0, 0.0).unwrap()
-    };
-    let table = on_ground(|y| if y > 1.0 { 0.1 } else { 0.0 });
-    let bank = on_ground(|y| 0.5 * y);
-    assert!(table.roll.mean(&Bins::ATTITUDE) > 25f32.to_radians(), "{table:?}");
-    assert!((table.roll.mean(&Bins::ATTITUDE) - bank.roll.mean(&Bins::ATTITUDE)).abs() < 1e-3);
-    assert_eq!(table.linear.probabilities()[0], 0.0);
-    assert_eq!(bank.linear.probabilities()[0], 1.0);
 }
 
 #[test]
