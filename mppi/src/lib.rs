@@ -43,6 +43,7 @@ mod config;
 mod controller;
 mod cost_to_go;
 mod diagnostics;
+mod driven;
 mod judgement;
 mod kernel;
 mod lag;
@@ -62,5 +63,6 @@ pub use config::{Actuation, Config, ConfigError, Costs, Recovery, SampleSpace, S
 pub use controller::{Controller, Phase};
 pub use cost_to_go::{CostToGo, CostToGoConfig, CostToGoError, CostToGoView, Neighbourhood};
 pub use diagnostics::{CostTerm, Diagnostics};
+pub use driven::Driven;
 pub use objective::{Input, Objective, ReferencePath, Terminal};
 pub use replay::Rollout;

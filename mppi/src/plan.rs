@@ -3,7 +3,6 @@
 
 use crate::config::{Config, SampleSpace};
 use crate::sampling::{Control, SampleStep};
-use bicycle::Command;
 
 /// Nominal controls and the constants of their perturbation.
 #[derive(Clone, Debug)]
@@ -50,20 +49,9 @@ impl Plan {
         }
     }
 
-    /// To standstill with the wheels as they are.
-    pub(crate) fn stop(&mut self) {
-        let steering_rad = self.nominal[0][1];
-        self.nominal.fill([0.0, steering_rad]);
-    }
-
     /// The same control for the whole horizon.
     pub(crate) fn hold(&mut self, control: Control) {
         self.nominal.fill(control);
-    }
-
-    /// The command of a step.
-    pub(crate) fn command(&self, t: usize) -> Command {
-        Command { speed_mps: self.nominal[t][0], steering_rad: self.nominal[t][1] }
     }
 
     /// Lets `steps` steps, whole or not, pass; the last control is held.

@@ -8,10 +8,10 @@ mod stage;
 
 use crate::chunk::Chunk;
 use crate::diagnostics::CostTerm;
-use crate::kernel::{CHUNK, Kernel, Row, Work};
+use crate::kernel::{self, CHUNK, Kernel, Row, Work};
 use crate::objective::{ReferenceStep, TerminalField};
-use bicycle::lanes::Real;
-use bicycle::{GroundSample, LaneState, Stepper};
+use bicycle::lanes::{Instructions, Real};
+use bicycle::{Extent, GroundSample, LaneState, MotionStepper};
 use motion::{Bare, Leaving, Motion, Plain, Whole};
 use stage::{PathTask, Stage};
 use traversability::{Ground, Risk};
@@ -20,10 +20,9 @@ use traversability::{Ground, Risk};
 pub(crate) const MAX_SLOTS: usize = 64;
 
 /// Everything that all rollouts of an iteration share.
-#[derive(Clone, Copy)]
-pub(crate) struct Scene<'a> {
+pub(crate) struct Scene<'a, S> {
     /// The model in steps of the horizon, lengths in cells.
-    pub(crate) stepper: &'a Stepper,
+    pub(crate) stepper: &'a S,
     pub(crate) grid: Grid<'a>,
     pub(crate) start: Start,
     /// |roll| and |pitch| where the vehicle stands, if beyond a limit [rad]: it may leave.
@@ -51,7 +50,8 @@ pub(crate) struct Start {
     pub(crate) y_cells: f64,
     pub(crate) turns: f64,
     pub(crate) speed_mps: f64,
-    pub(crate) steering_rad: f64,
+    /// Steering angle [rad] or yaw rate [rad/s].
+    pub(crate) turn: f64,
 }
 
 /// What things cost, and limits.
@@ -99,13 +99,26 @@ pub(crate) struct GoalTask<'a> {
     pub(crate) field: Option<TerminalField<'a>>,
 }
 
-/// Rolls out one chunk.
-pub(crate) struct RollOut<'a> {
-    pub(crate) scene: &'a Scene<'a>,
+/// One chunk to roll out, and on which instructions.
+pub struct Job<'a, S> {
+    pub(crate) instructions: Instructions,
+    pub(crate) scene: &'a Scene<'a, S>,
     pub(crate) chunk: &'a mut Chunk,
 }
 
-impl Work for RollOut<'_> {
+impl<S: MotionStepper> Job<'_, S> {
+    pub(crate) fn run(self) {
+        kernel::run(self.instructions, RollOut { scene: self.scene, chunk: self.chunk });
+    }
+}
+
+/// Rolls out one chunk.
+pub(crate) struct RollOut<'a, S> {
+    pub(crate) scene: &'a Scene<'a, S>,
+    pub(crate) chunk: &'a mut Chunk,
+}
+
+impl<S: MotionStepper> Work for RollOut<'_, S> {
     type Output = ();
     #[inline(always)]
     fn run<K: Kernel>(self, kernel: K) {
@@ -119,12 +132,18 @@ impl Work for RollOut<'_> {
 
 /// To a goal, with no more of a step than the model and the prices ask for.
 #[inline(always)]
-fn roll_to<K: Kernel>(kernel: K, scene: &Scene<'_>, goal: &GoalTask<'_>, chunk: &mut Chunk) {
-    let is_plain = !scene.stepper.has_effects() && scene.tilted_start.is_none();
-    if is_plain && scene.stepper.has_instant_actuators() && !scene.prices.has_manoeuvres() {
-        roll_chunk::<K, _, Bare>(kernel, scene, goal, chunk);
+fn roll_to<K: Kernel, P: MotionStepper>(
+    kernel: K,
+    scene: &Scene<'_, P>,
+    goal: &GoalTask<'_>,
+    chunk: &mut Chunk,
+) {
+    let extent = scene.stepper.extent();
+    let is_plain = extent != Extent::Whole && scene.tilted_start.is_none();
+    if is_plain && extent == Extent::Bare && !scene.prices.has_manoeuvres() {
+        roll_chunk::<K, P, _, Bare>(kernel, scene, goal, chunk);
     } else if is_plain {
-        roll_chunk::<K, _, Plain>(kernel, scene, goal, chunk);
+        roll_chunk::<K, P, _, Plain>(kernel, scene, goal, chunk);
     } else {
         roll_along(kernel, scene, goal, chunk);
     }
@@ -132,19 +151,29 @@ fn roll_to<K: Kernel>(kernel: K, scene: &Scene<'_>, goal: &GoalTask<'_>, chunk: 
 
 /// Whatever the task and the model.
 #[inline(always)]
-fn roll_along<K: Kernel, S: Stage<K>>(kernel: K, scene: &Scene<'_>, stage: &S, chunk: &mut Chunk) {
+fn roll_along<K: Kernel, P: MotionStepper, S: Stage<K>>(
+    kernel: K,
+    scene: &Scene<'_, P>,
+    stage: &S,
+    chunk: &mut Chunk,
+) {
     match scene.tilted_start {
-        None => roll_chunk::<K, S, Whole>(kernel, scene, stage, chunk),
-        Some(_) => roll_chunk::<K, S, Leaving>(kernel, scene, stage, chunk),
+        None => roll_chunk::<K, P, S, Whole>(kernel, scene, stage, chunk),
+        Some(_) => roll_chunk::<K, P, S, Leaving>(kernel, scene, stage, chunk),
     }
 }
 
 #[inline(always)]
-fn roll_chunk<K: Kernel, S: Stage<K>, M: Motion>(kernel: K, scene: &Scene<'_>, stage: &S, chunk: &mut Chunk) {
+fn roll_chunk<K: Kernel, P: MotionStepper, S: Stage<K>, M: Motion>(
+    kernel: K,
+    scene: &Scene<'_, P>,
+    stage: &S,
+    chunk: &mut Chunk,
+) {
     if K::IN_FLIGHT == 2 {
-        roll_packs::<K, S, M, 2>(kernel, scene, stage, chunk);
+        roll_packs::<K, P, S, M, 2>(kernel, scene, stage, chunk);
     } else {
-        roll_packs::<K, S, M, 1>(kernel, scene, stage, chunk);
+        roll_packs::<K, P, S, M, 1>(kernel, scene, stage, chunk);
     }
 }
 
@@ -177,7 +206,7 @@ impl<K: Kernel> Flight<K> {
             y: kernel.real(start.y_cells),
             turns: kernel.real(start.turns).wrap_turns(),
             speed: kernel.real(start.speed_mps),
-            steering: kernel.real(start.steering_rad),
+            steering: kernel.real(start.turn),
         };
         let under_way = zero.less(kernel.real(1.0));
         Self {
@@ -243,9 +272,9 @@ impl<K: Kernel> Index<K> {
 }
 
 #[inline(always)]
-fn roll_packs<K: Kernel, S: Stage<K>, M: Motion, const G: usize>(
+fn roll_packs<K: Kernel, P: MotionStepper, S: Stage<K>, M: Motion, const G: usize>(
     kernel: K,
-    scene: &Scene<'_>,
+    scene: &Scene<'_, P>,
     stage: &S,
     chunk: &mut Chunk,
 ) {
@@ -266,29 +295,28 @@ fn roll_packs<K: Kernel, S: Stage<K>, M: Motion, const G: usize>(
                 fly.step::<M>(&mut flights[1], &mut memory[1], first + K::WIDTH);
             }
         }
-        settle::<K, M>(scene, (stage.finish(&flights[0]), &flights[0]), chunk, first);
+        settle::<K, P, M>(scene, (stage.finish(&flights[0]), &flights[0]), chunk, first);
         if G == 2 {
-            settle::<K, M>(scene, (stage.finish(&flights[1]), &flights[1]), chunk, first + K::WIDTH);
+            settle::<K, P, M>(scene, (stage.finish(&flights[1]), &flights[1]), chunk, first + K::WIDTH);
         }
     }
 }
 
 /// What the packs in flight share in one step.
-struct Fly<'a, K: Kernel, S: Stage<K>> {
-    scene: &'a Scene<'a>,
+struct Fly<'a, K: Kernel, P, S: Stage<K>> {
+    scene: &'a Scene<'a, P>,
     index: &'a Index<K>,
     stage: &'a S,
     controls: &'a [Row; 2],
     t: usize,
 }
 
-impl<K: Kernel, S: Stage<K>> Fly<'_, K, S> {
+impl<K: Kernel, P: MotionStepper, S: Stage<K>> Fly<'_, K, P, S> {
     #[inline(always)]
     fn step<M: Motion>(&self, flight: &mut Flight<K>, memory: &mut Memory<K>, first: usize) {
         let kernel = flight.state.x.0;
-        let [speed, steering] = self.controls;
-        let command = [Real(kernel, kernel.load(speed, first)), Real(kernel, kernel.load(steering, first))];
-        advance::<K, M>(self.scene, self.index, flight, command, (memory, self.t));
+        let command = self.controls.each_ref().map(|row| Real(kernel, kernel.load(row, first)));
+        advance::<K, P, M>(self.scene, self.index, flight, command, (memory, self.t));
         self.stage.step(self.t, flight);
     }
 }
@@ -303,8 +331,8 @@ fn recall<K: Kernel>(kernel: K, slots: &[f32], memory: &mut Memory<K>) {
 
 /// One step of one pack: the model over the ground where it stands, and the limits.
 #[inline(always)]
-fn advance<K: Kernel, M: Motion>(
-    scene: &Scene<'_>,
+fn advance<K: Kernel, P: MotionStepper, M: Motion>(
+    scene: &Scene<'_, P>,
     index: &Index<K>,
     flight: &mut Flight<K>,
     command: [Real<K>; 2],
@@ -321,7 +349,7 @@ fn advance<K: Kernel, M: Motion>(
         (ground.gradient, ground.class) = ([east, north], class);
     }
     let rates = M::step(scene.stepper, &mut flight.state, command, &ground, memory);
-    watch_attitude::<K, M>(scene, flight, [roll, pitch]);
+    watch_attitude::<K, P, M>(scene, flight, [roll, pitch]);
     if M::HAS_MANOEUVRES {
         let prices = &scene.prices;
         let sideways = (rates.speed * rates.yaw_rate).abs().exceeds(kernel.real(prices.lateral_max_mps2));
@@ -335,8 +363,8 @@ fn advance<K: Kernel, M: Motion>(
 /// Counts the poses beyond a limit. A vehicle that stands beyond one may leave: its first poses break a limit only when
 /// they are worse than where it stands. The same rule as [`crate::judgement::Judge::breaks_limits`].
 #[inline(always)]
-fn watch_attitude<K: Kernel, M: Motion>(
-    scene: &Scene<'_>,
+fn watch_attitude<K: Kernel, P, M: Motion>(
+    scene: &Scene<'_, P>,
     flight: &mut Flight<K>,
     [roll, pitch]: [Real<K>; 2],
 ) {
@@ -357,8 +385,8 @@ fn watch_attitude<K: Kernel, M: Motion>(
 
 /// Writes the costs of a pack that has arrived.
 #[inline(always)]
-fn settle<K: Kernel, M: Motion>(
-    scene: &Scene<'_>,
+fn settle<K: Kernel, P, M: Motion>(
+    scene: &Scene<'_, P>,
     (terminal, flight): (Real<K>, &Flight<K>),
     chunk: &mut Chunk,
     first: usize,

@@ -4,7 +4,7 @@
 use super::*;
 use crate::kernel::CHUNK;
 use crate::{Costs, Objective, Terminal};
-use bicycle::{GroundSample, Limits};
+use bicycle::{Command, Effect, GroundSample, Limits, State, Stepper};
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use traversability::{GridGeometry, Risk, RiskMap};
@@ -83,11 +83,15 @@ fn obstacles(random: &mut Xoshiro256PlusPlus, n: usize) -> RiskMap {
 /// Whether the judge says that a rollout breaks a limit in the poses that the rollouts look at: all after the start but
 /// the last. None where a millimetre or a tenth of a milliradian at the start would change the answer.
 fn judged(controller: &Controller, map: &RiskMap, (chunk, lane): (usize, usize)) -> Option<bool> {
-    let judge = Judge { stepper: &controller.stepper, limits: &controller.model.limits, map: map.view() };
+    let judge = controller.judge_over(map.view());
     let breaks = |east_m: f64, north_m: f64, left_rad: f64| {
-        let State { x_m, y_m, yaw_rad, .. } = controller.start;
-        let start =
-            State { x_m: x_m + east_m, y_m: y_m + north_m, yaw_rad: yaw_rad + left_rad, ..controller.start };
+        let MotionState { x_m, y_m, yaw_rad, .. } = controller.start;
+        let start = MotionState {
+            x_m: x_m + east_m,
+            y_m: y_m + north_m,
+            yaw_rad: yaw_rad + left_rad,
+            ..controller.start
+        };
         let controls = controller.chunks[chunk].controls_of(lane).take(controller.config.n_steps - 1);
         let mut memory = controller.slots.map(f64::from);
         judge.breaks_limits(&start, controls, &mut memory)

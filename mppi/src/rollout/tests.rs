@@ -1,11 +1,13 @@
 //! Rollouts against a plain f64 loop over equation 2 and the map's own lookup, on every instruction set.
 #![allow(clippy::unwrap_used, reason = "a test that cannot be set up has failed")]
 
+mod skid_steer;
+
 use super::*;
 use crate::cost_to_go::CostToGoView;
 use crate::kernel;
 use bicycle::lanes::Instructions;
-use bicycle::{Command, Effect, Limits, Model, State};
+use bicycle::{Command, Effect, Limits, Model, State, Stepper};
 use traversability::{GridGeometry, Ground, RiskMap};
 
 const N_STEPS: usize = 40;
@@ -131,14 +133,14 @@ fn goal<'a>(map: &RiskMap, distance_s_per_m: f64, field: Option<TerminalField<'a
     }
 }
 
-fn scene<'a>(map: &'a RiskMap, stepper: &'a Stepper, task: Task<'a>) -> Scene<'a> {
+fn scene<'a>(map: &'a RiskMap, stepper: &'a Stepper, task: Task<'a>) -> Scene<'a, Stepper> {
     let corner_m = map.geometry().south_west_m();
     let start = Start {
         x_cells: (START[0] - corner_m[0]) / 0.5,
         y_cells: (START[1] - corner_m[1]) / 0.5,
         turns: START[2] / std::f64::consts::TAU,
         speed_mps: 0.0,
-        steering_rad: 0.0,
+        turn: 0.0,
     };
     Scene { stepper, grid: grid(map), start, tilted_start: None, slots: &[], prices: PRICES, task }
 }
@@ -337,7 +339,7 @@ fn rollouts_of_a_whole_model_go_where_one_vehicle_goes() {
         let [x_cells, y_cells] = [0, 1].map(|axis| (goal_m[axis] - corner_m[axis]) / 0.5);
         let task = Task::Goal(GoalTask { x_cells, y_cells, ..goal(&map, 0.0, None) });
         let mut scene = scene(&map, &stepper, task);
-        (scene.slots, scene.start.speed_mps, scene.start.steering_rad) = (&slots, 0.8, 0.1);
+        (scene.slots, scene.start.speed_mps, scene.start.turn) = (&slots, 0.8, 0.1);
         for machine in machines() {
             let mut chunk = chunk();
             kernel::run(machine, RollOut { scene: &scene, chunk: &mut chunk });
