@@ -6,6 +6,7 @@ mod tests;
 
 use crate::chunk::Chunk;
 use crate::config::{Actuation, Config, ConfigError};
+use crate::cost::{Future, RolloutCost, StepCost};
 use crate::diagnostics::Diagnostics;
 use crate::driven::Driven;
 use crate::judgement::Judge;
@@ -52,7 +53,7 @@ pub enum Phase {
 /// Each cycle: shift the plan, predict the start, then sample, roll out, weigh and average; then judge the plan.
 /// A decision is a function of the inputs since [`Controller::new`] or [`Controller::reset`], the configuration and
 /// the seed, bit for bit, for any number of threads.
-pub struct Controller<M: Driven = Model> {
+pub struct Controller<M: Driven = Model, S = (), R = ()> {
     pub(crate) config: Config,
     pub(crate) limits: MotionLimits,
     seed: u64,
@@ -84,6 +85,11 @@ pub struct Controller<M: Driven = Model> {
     pub(crate) start: MotionState,
     temperature_s: f32,
     diagnostics: Diagnostics,
+    step_cost: S,
+    rollout_cost: R,
+    /// Room for what whole rollouts cost.
+    futures: Vec<Future>,
+    added_s: Vec<f32>,
 }
 
 impl<M: Driven> Controller<M> {
@@ -92,6 +98,21 @@ impl<M: Driven> Controller<M> {
     /// # Errors
     /// A configuration or model out of range, an instruction set that the machine lacks, or a refused thread.
     pub fn new(config: Config, model: M, seed: u64) -> Result<Self, ConfigError> {
+        Self::with_costs(config, model, ((), ()), seed)
+    }
+}
+
+impl<M: Driven, S: StepCost, R: RolloutCost> Controller<M, S, R> {
+    /// [`Controller::new`] with costs of one's own: of every step, and of whole rollouts.
+    ///
+    /// # Errors
+    /// As [`Controller::new`].
+    pub fn with_costs(
+        config: Config,
+        model: M,
+        (step_cost, rollout_cost): (S, R),
+        seed: u64,
+    ) -> Result<Self, ConfigError> {
         config.validate()?;
         model.validate()?;
         let instructions = Instructions::find(config.isa)?;
@@ -128,6 +149,10 @@ impl<M: Driven> Controller<M> {
             start: MotionState::default(),
             temperature_s: 1.0,
             diagnostics: Diagnostics::new(instructions.isa()),
+            futures: vec![Future::default(); if R::IS_NOTHING { 0 } else { config.n_rollouts }],
+            added_s: vec![0.0; if R::IS_NOTHING { 0 } else { config.n_rollouts }],
+            step_cost,
+            rollout_cost,
             config,
             limits,
             seed,
@@ -159,6 +184,16 @@ impl<M: Driven> Controller<M> {
     /// What the last cycle that sampled tells about itself.
     pub fn diagnostics(&self) -> &Diagnostics {
         &self.diagnostics
+    }
+
+    /// The cost of every step, to be changed between decisions.
+    pub fn step_cost_mut(&mut self) -> &mut S {
+        &mut self.step_cost
+    }
+
+    /// The cost of whole rollouts, to be changed between decisions.
+    pub fn rollout_cost_mut(&mut self) -> &mut R {
+        &mut self.rollout_cost
     }
 
     /// The configuration.
@@ -287,6 +322,7 @@ impl<M: Driven> Controller<M> {
             self.sample(functions::key(self.seed, number), mode);
             observe(Phase::Noise);
             self.roll_out(input, task);
+            self.add_rollout_cost(input);
             observe(Phase::Rollout);
             summary = self.weigh();
             self.average(&summary);

@@ -8,19 +8,19 @@ pub trait Driven: MotionModel {
     /// Rolls out some futures. Models of this crate override it with the same, so that their loops are compiled here
     /// and once.
     #[doc(hidden)]
-    fn roll_out(job: Job<'_, Self::Stepper>) {
+    fn roll_out(job: Job<'_, Self::Stepper, ()>) {
         job.run();
     }
 }
 
 impl Driven for Model {
-    fn roll_out(job: Job<'_, Self::Stepper>) {
+    fn roll_out(job: Job<'_, Self::Stepper, ()>) {
         job.run();
     }
 }
 
 impl Driven for SkidSteer {
-    fn roll_out(job: Job<'_, Self::Stepper>) {
+    fn roll_out(job: Job<'_, Self::Stepper, ()>) {
         job.run();
     }
 }

@@ -41,6 +41,7 @@
 mod chunk;
 mod config;
 mod controller;
+mod cost;
 mod cost_to_go;
 mod diagnostics;
 mod driven;
@@ -61,6 +62,7 @@ mod weights;
 pub use bicycle::lanes::Isa;
 pub use config::{Actuation, Config, ConfigError, Costs, Recovery, SampleSpace, Sampling, Temperature};
 pub use controller::{Controller, Phase};
+pub use cost::{Future, Place, RolloutCost, Step, StepCost};
 pub use cost_to_go::{CostToGo, CostToGoConfig, CostToGoError, CostToGoView, Neighbourhood};
 pub use diagnostics::{CostTerm, Diagnostics};
 pub use driven::Driven;

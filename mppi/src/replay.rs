@@ -1,6 +1,7 @@
 //! Trajectories of the last decision, computed only when somebody asks.
 
 use crate::controller::Controller;
+use crate::cost::{RolloutCost, StepCost};
 use crate::driven::Driven;
 use crate::sampling::Control;
 use bicycle::{MotionState, State};
@@ -15,7 +16,7 @@ pub struct Rollout<S = State> {
     pub states: Vec<S>,
 }
 
-impl<M: Driven> Controller<M> {
+impl<M: Driven, S: StepCost, R: RolloutCost> Controller<M, S, R> {
     /// The commands of the plan, one per step, the one just decided first.
     pub fn plan(&self) -> impl ExactSizeIterator<Item = M::Command> + '_ {
         self.plan.nominal.iter().copied().map(M::Command::from)

@@ -2,8 +2,10 @@
 
 use super::{Controller, LONGEST_STEPS};
 use crate::config::{Actuation, Temperature};
+use crate::cost::{Frame, RolloutCost, StepCost};
+use crate::diagnostics::CostTerm;
 use crate::driven::Driven;
-use crate::kernel;
+use crate::kernel::{self, CHUNK};
 use crate::objective::{Input, Objective, ReferencePath, ReferenceStep, Terminal, TerminalField};
 use crate::recovery::Mode;
 use crate::rollout::{GoalTask, Grid, Job, MAX_SLOTS, Prices, Scene, Start, Task};
@@ -22,7 +24,7 @@ pub(super) enum TaskOrder<'a> {
     Path(ReferencePath<'a>),
 }
 
-impl<M: Driven> Controller<M> {
+impl<M: Driven, S: StepCost, R: RolloutCost> Controller<M, S, R> {
     /// The measured state, carried over the known delay by the commands that are already on their way.
     pub(super) fn predict_start(&self, input: &Input<'_, MotionState>) -> MotionState {
         let mut state = input.state;
@@ -144,8 +146,9 @@ impl<M: Driven> Controller<M> {
 
     pub(super) fn roll_out(&mut self, input: &Input<'_, MotionState>, order: TaskOrder<'_>) {
         let geometry = &input.map.geometry;
-        let (corner_m, cell_m) = (geometry.south_west_m(), geometry.resolution_m);
-        let cells = |at_m: [f64; 2]| [0, 1].map(|axis| (at_m[axis] - corner_m[axis]) / cell_m);
+        let frame = Frame { corner_m: geometry.south_west_m(), cell_m: geometry.resolution_m };
+        let cell_m = frame.cell_m;
+        let cells = |at_m: [f64; 2]| frame.cells(at_m);
         if let TaskOrder::Path(path) = order {
             let passed_m = path.project([self.start.x_m, self.start.y_m]);
             let (costs, step_s) = (&self.config.costs, self.config.step_s);
@@ -191,13 +194,39 @@ impl<M: Driven> Controller<M> {
             slots: &self.slots[..self.cell_stepper.n_slots()],
             prices: self.prices(),
             task,
+            cost: &self.step_cost,
+            frame,
+            keeps_ends: !R::IS_NOTHING,
         };
         let (instructions, n_used) = (self.instructions, self.n_used);
         self.workers.run(&mut self.chunks, |index, chunk| {
             if index < n_used {
-                M::roll_out(Job { instructions, scene: &scene, chunk });
+                S::roll_out::<M>(Job { instructions, scene: &scene, chunk });
             }
         });
+    }
+
+    /// Asks what whole rollouts cost.
+    pub(super) fn add_rollout_cost(&mut self, input: &Input<'_, MotionState>) {
+        if R::IS_NOTHING {
+            return;
+        }
+        let geometry = &input.map.geometry;
+        let frame = Frame { corner_m: geometry.south_west_m(), cell_m: geometry.resolution_m };
+        let n = self.n_rollouts();
+        let (futures, added_s) = (&mut self.futures[..n], &mut self.added_s[..n]);
+        for (number, future) in futures.iter_mut().enumerate() {
+            *future = self.chunks[number / CHUNK].future(number % CHUNK, &frame);
+        }
+        added_s.fill(0.0);
+        self.rollout_cost.add(futures, added_s);
+        for (number, added_s) in added_s.iter().enumerate() {
+            let (chunk, lane) = (&mut self.chunks[number / CHUNK], number % CHUNK);
+            let term_s = &mut chunk.terms[CostTerm::Added as usize].0[lane];
+            // Without a step cost nobody has written the term of this cycle.
+            *term_s = added_s + if S::IS_NOTHING { 0.0 } else { *term_s };
+            chunk.costs.0[lane] += added_s;
+        }
     }
 
     fn prices(&self) -> Prices {

@@ -133,7 +133,7 @@ fn goal<'a>(map: &RiskMap, distance_s_per_m: f64, field: Option<TerminalField<'a
     }
 }
 
-fn scene<'a>(map: &'a RiskMap, stepper: &'a Stepper, task: Task<'a>) -> Scene<'a, Stepper> {
+fn scene<'a>(map: &'a RiskMap, stepper: &'a Stepper, task: Task<'a>) -> Scene<'a, Stepper, ()> {
     let corner_m = map.geometry().south_west_m();
     let start = Start {
         x_cells: (START[0] - corner_m[0]) / 0.5,
@@ -142,7 +142,18 @@ fn scene<'a>(map: &'a RiskMap, stepper: &'a Stepper, task: Task<'a>) -> Scene<'a
         speed_mps: 0.0,
         turn: 0.0,
     };
-    Scene { stepper, grid: grid(map), start, tilted_start: None, slots: &[], prices: PRICES, task }
+    Scene {
+        stepper,
+        grid: grid(map),
+        start,
+        tilted_start: None,
+        slots: &[],
+        prices: PRICES,
+        task,
+        cost: &(),
+        frame: Frame { corner_m, cell_m: 0.5 },
+        keeps_ends: false,
+    }
 }
 
 /// Lanes whose f64 path comes within 1e-4 of an edge are left out: there the last bit decides.

@@ -64,6 +64,9 @@ fn rollouts_of_a_skid_steered_vehicle_go_where_one_vehicle_goes() {
                 slots: &[],
                 prices: PRICES,
                 task,
+                cost: &(),
+                frame: Frame { corner_m, cell_m: 0.5 },
+                keeps_ends: false,
             };
             for machine in machines() {
                 let mut chunk = chunk();
