@@ -1,18 +1,18 @@
 //! The controller: one decision per cycle.
 
+mod settings;
 mod steps;
 #[cfg(test)]
 mod tests;
 
 use crate::chunk::Chunk;
-use crate::config::{Actuation, Config, ConfigError};
+use crate::config::{Config, ConfigError};
 use crate::cost::{Future, RolloutCost, StepCost};
 use crate::diagnostics::Diagnostics;
 use crate::driven::Driven;
 use crate::judgement::Judge;
 use crate::kernel::workers::Workers;
 use crate::kernel::{CHUNK, functions};
-use crate::lag;
 use crate::ledger::Ledger;
 use crate::objective::{Input, ReferenceStep};
 use crate::plan::Plan;
@@ -26,6 +26,7 @@ use bicycle::lanes::Instructions;
 use bicycle::{
     Decision, HoldReason, Model, MotionCommand, MotionLimits, MotionState, MotionStepper, StopReason,
 };
+use settings::Prepared;
 use traversability::RiskMapView;
 
 /// A cycle that took more of the model's steps than this tells nothing of a single one.
@@ -55,6 +56,7 @@ pub enum Phase {
 /// the seed, bit for bit, for any number of threads.
 pub struct Controller<M: Driven = Model, S = (), R = ()> {
     pub(crate) config: Config,
+    model: M,
     pub(crate) limits: MotionLimits,
     seed: u64,
     instructions: Instructions,
@@ -116,17 +118,7 @@ impl<M: Driven, S: StepCost, R: RolloutCost> Controller<M, S, R> {
         config.validate()?;
         model.validate()?;
         let instructions = Instructions::find(config.isa)?;
-        let limits = model.motion_limits();
-        let stepper = model.stepper(config.step_s, 1.0);
-        let stepper = match config.actuation {
-            Actuation::Instant => stepper.with_instant_actuators(),
-            Actuation::Limited => stepper,
-        };
-        let n_slots = stepper.n_slots();
-        if n_slots > MAX_SLOTS {
-            return Err(ConfigError::EffectMemory { found: n_slots, step_s: config.step_s });
-        }
-        let lag_s = lag::of_actuators(&stepper, limits.rates, config.step_s);
+        let Prepared { limits, stepper, lag_s } = Prepared::new(&config, &model)?;
         let reach_s = config.delay_s + LONGEST_STEPS * config.step_s + stepper.past_s();
         let ledger = Ledger::new(reach_s, config.period_min_s);
         let n_chunks = config.n_rollouts / CHUNK;
@@ -155,6 +147,7 @@ impl<M: Driven, S: StepCost, R: RolloutCost> Controller<M, S, R> {
             rollout_cost,
             config,
             limits,
+            model,
             seed,
             instructions,
         })

@@ -25,8 +25,8 @@ struct Noise {
     space: SampleSpace,
 }
 
-impl Plan {
-    pub(crate) fn new(config: &Config) -> Self {
+impl Noise {
+    fn new(config: &Config) -> Self {
         let sampling = &config.sampling;
         let per_step = match sampling.space {
             SampleSpace::Controls => 1.0,
@@ -38,15 +38,26 @@ impl Plan {
             0.0
         };
         Self {
+            std: [sampling.speed_std, sampling.steering_std].map(|std| std * per_step),
+            correlation,
+            space: sampling.space,
+        }
+    }
+}
+
+impl Plan {
+    pub(crate) fn new(config: &Config) -> Self {
+        Self {
             nominal: vec![[0.0; 2]; config.n_steps],
             steps: vec![SampleStep::default(); config.n_steps],
             scores: vec![[0.0; 2]; config.n_steps + 1],
-            noise: Noise {
-                std: [sampling.speed_std, sampling.steering_std].map(|std| std * per_step),
-                correlation,
-                space: sampling.space,
-            },
+            noise: Noise::new(config),
         }
+    }
+
+    /// Perturbs as another configuration says from now on.
+    pub(crate) fn set_noise(&mut self, config: &Config) {
+        self.noise = Noise::new(config);
     }
 
     /// The same control for the whole horizon.

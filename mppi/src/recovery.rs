@@ -30,6 +30,11 @@ impl Watch {
         Self { config, mode: Mode::Onward, anchor_m: None, waited_s: 0.0 }
     }
 
+    /// Goes by another configuration from now on.
+    pub(crate) fn set(&mut self, config: Recovery) {
+        self.config = config;
+    }
+
     /// Forgets what was; to be called when the vehicle is not meant to move.
     pub(crate) fn reset(&mut self) {
         (self.mode, self.anchor_m, self.waited_s) = (Mode::Onward, None, 0.0);

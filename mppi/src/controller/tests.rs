@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
 use super::*;
+use crate::config::Actuation;
 use crate::kernel::CHUNK;
 use crate::{Costs, Objective, Terminal};
 use bicycle::{Command, Effect, GroundSample, Limits, State, Stepper};
