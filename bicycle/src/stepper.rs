@@ -28,9 +28,12 @@ impl<L: Lanes> LaneState<L> {
     #[inline(always)]
     pub(crate) fn carry_on(&mut self, advance: Real<L>, yaw_rate: Real<L>, turn: Constant) {
         let (sine, cosine) = self.turns.sin_cos_turns();
-        self.x = advance.mul_add(cosine, self.x);
+        let turns = yaw_rate.mul_add(Real::constant(self.x.0, turn), self.turns);
+        // A yaw rate that is not finite shows in the position where it does not show in the yaw.
+        let [turns, x] = turns.wrap_witnessed(yaw_rate, self.x);
+        self.x = advance.mul_add(cosine, x);
         self.y = advance.mul_add(sine, self.y);
-        self.turns = yaw_rate.mul_add(Real::constant(self.x.0, turn), self.turns).wrap_turns();
+        self.turns = turns;
     }
 }
 
