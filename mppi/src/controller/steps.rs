@@ -5,7 +5,7 @@ use crate::config::{Actuation, Temperature};
 use crate::cost::{Frame, RolloutCost, StepCost};
 use crate::diagnostics::CostTerm;
 use crate::driven::Driven;
-use crate::kernel::{self, CHUNK};
+use crate::kernel::CHUNK;
 use crate::objective::{Input, Objective, ReferencePath, ReferenceStep, Terminal, TerminalField};
 use crate::recovery::Mode;
 use crate::rollout::{GoalTask, Grid, Job, MAX_SLOTS, Prices, Scene, Start, Task};
@@ -122,7 +122,7 @@ impl<M: Driven, S: StepCost, R: RolloutCost> Controller<M, S, R> {
         let (instructions, n_used) = (self.instructions, self.n_used);
         self.workers.run(&mut self.chunks, |index, chunk| {
             if index < n_used {
-                kernel::run(instructions, Sample { sampler: &sampler, index, chunk });
+                Sample { sampler: &sampler, index, chunk }.on(instructions);
             }
         });
     }
@@ -247,7 +247,7 @@ impl<M: Driven, S: StepCost, R: RolloutCost> Controller<M, S, R> {
             temperature: self.config.temperature,
             last_s: self.temperature_s,
         };
-        let summary = kernel::run(self.instructions, work);
+        let summary = work.on(self.instructions);
         self.temperature_s = summary.temperature_s;
         summary
     }
@@ -257,7 +257,7 @@ impl<M: Driven, S: StepCost, R: RolloutCost> Controller<M, S, R> {
         let (instructions, n_used) = (self.instructions, self.n_used);
         self.workers.run(&mut self.chunks, |index, chunk| {
             if index < n_used {
-                kernel::run(instructions, Accumulate { chunk });
+                Accumulate { chunk }.on(instructions);
             }
         });
         self.plan.nominal.fill([0.0; 2]);
