@@ -408,11 +408,9 @@ fn is_finite(command: impl Into<Control>, after_s: f64) -> bool {
     command.into().iter().all(|channel| channel.is_finite()) && after_s.is_finite()
 }
 
-/// Whether the arrays have the shape that the geometry says.
+/// Whether there is anything in the map, and no more than a lane's index counts.
 fn is_usable(map: &RiskMapView<'_>) -> bool {
-    let n_cells = map.geometry.n_cells();
     let resolution_m = map.geometry.resolution_m;
     let indexable = i32::try_from(map.risks.len()).is_ok();
-    let shaped = map.risks.len() == n_cells * map.n_yaws && map.ground.len() == n_cells;
-    !map.risks.is_empty() && shaped && indexable && resolution_m.is_finite() && resolution_m > 0.0
+    !map.risks.is_empty() && indexable && resolution_m.is_finite() && resolution_m > 0.0
 }

@@ -149,8 +149,7 @@ fn any_number_of_threads_gives_the_same_bits() {
 #[test]
 fn half_the_traction_takes_twice_the_time() {
     let mut map = level();
-    map.arrays_mut().0.fill(Risk { linear_traction: 0.5, ..Risk::NONE });
-    map.close_border();
+    map.fill(|risks, _| risks.fill(Risk { linear_traction: 0.5, ..Risk::NONE }));
     let drive = drive(&config(), &map, goal([10.0, 0.0]), 200);
     let time_s = (drive.states.len() - 1) as f64 * STEP_S;
     assert!(has_arrived(&drive) && (9.5 + 0.5..13.0).contains(&time_s), "{time_s} s");

@@ -142,7 +142,7 @@ impl Navigator {
             self.assessor.note_stuck(pose);
             // The pose is of now; a map of before a jump takes it in when it is renewed.
             if let Some(map) = self.map.as_mut().filter(|_| !self.is_map_behind) {
-                self.assessor.amend(map.arrays_mut().0);
+                map.fill(|risks, _| self.assessor.amend(risks));
             }
         }
         decision
@@ -207,7 +207,7 @@ impl Navigator {
         let map =
             self.map.get_or_insert_with(|| RiskMap::constant(known.geometry, known.n_yaws, Risk::OUTSIDE));
         take_over(map, &known);
-        self.assessor.amend(map.arrays_mut().0);
+        map.fill(|risks, _| self.assessor.amend(risks));
         self.assessor.time_to_goal(map.view(), self.destination.goal_m)?;
         Ok(())
     }
@@ -216,7 +216,8 @@ impl Navigator {
 fn take_over(map: &mut RiskMap, known: &RiskMapView<'_>) {
     let GridGeometry { origin, .. } = known.geometry;
     map.place_at(origin);
-    let (risks, ground) = map.arrays_mut();
-    risks.copy_from_slice(known.risks);
-    ground.copy_from_slice(known.ground);
+    map.fill(|risks, ground| {
+        risks.copy_from_slice(known.risks);
+        ground.copy_from_slice(known.ground);
+    });
 }

@@ -42,16 +42,17 @@ fn stepper(resolution_m: f64) -> Stepper {
 /// Ground whose risk changes by cell and yaw.
 fn map() -> RiskMap {
     let mut map = RiskMap::constant(GridGeometry::centred(0.5, 60, 50, 1.0, -2.0), 13, Risk::NONE);
-    for (index, risk) in map.arrays_mut().0.iter_mut().enumerate() {
-        let wave = |factor: usize| ((index * factor) % 101) as f32 / 100.0;
-        *risk = Risk {
-            linear_traction: 0.5 + 0.5 * wave(7),
-            angular_traction: 0.4 + 0.6 * wave(13),
-            roll_rad: 0.55 * wave(29),
-            pitch_rad: 0.53 * wave(43),
-        };
-    }
-    map.close_border();
+    map.fill(|risks, _| {
+        for (index, risk) in risks.iter_mut().enumerate() {
+            let wave = |factor: usize| ((index * factor) % 101) as f32 / 100.0;
+            *risk = Risk {
+                linear_traction: 0.5 + 0.5 * wave(7),
+                angular_traction: 0.4 + 0.6 * wave(13),
+                roll_rad: 0.55 * wave(29),
+                pitch_rad: 0.53 * wave(43),
+            };
+        }
+    });
     map
 }
 
@@ -270,14 +271,16 @@ fn whole_model() -> Model {
 /// Slopes and plants that change from cell to cell.
 fn hilly() -> RiskMap {
     let mut map = map();
-    for (index, ground) in map.arrays_mut().1.iter_mut().enumerate() {
-        let wave = |factor: usize| ((index * factor) % 97) as f32 / 96.0 - 0.5;
-        *ground = Ground {
-            gradient: [0.3 * wave(5), 0.3 * wave(11)],
-            class: (index % 3) as u8,
-            ..Ground::default()
-        };
-    }
+    map.fill(|_, grounds| {
+        for (index, ground) in grounds.iter_mut().enumerate() {
+            let wave = |factor: usize| ((index * factor) % 97) as f32 / 96.0 - 0.5;
+            *ground = Ground {
+                gradient: [0.3 * wave(5), 0.3 * wave(11)],
+                class: (index % 3) as u8,
+                ..Ground::default()
+            };
+        }
+    });
     map
 }
 
@@ -378,16 +381,17 @@ fn rollouts_of_a_whole_model_go_where_one_vehicle_goes() {
 fn broken(field: usize, number: f32) -> RiskMap {
     let mut map = RiskMap::constant(GridGeometry::centred(0.5, 60, 50, 1.0, -2.0), 13, Risk::NONE);
     let geometry = *map.geometry();
-    let (risks, grounds) = map.arrays_mut();
-    for (index, (risks, ground)) in risks.chunks_exact_mut(13).zip(grounds).enumerate() {
-        if geometry.centre_m(geometry.cell(index))[0] > 3.0 {
-            match field {
-                0 => risks.iter_mut().for_each(|risk| risk.linear_traction = number),
-                1 => risks.iter_mut().for_each(|risk| risk.angular_traction = number),
-                _ => ground.gradient = [number, 0.1],
+    map.fill(|risks, grounds| {
+        for (index, (risks, ground)) in risks.chunks_exact_mut(13).zip(grounds).enumerate() {
+            if geometry.centre_m(geometry.cell(index))[0] > 3.0 {
+                match field {
+                    0 => risks.iter_mut().for_each(|risk| risk.linear_traction = number),
+                    1 => risks.iter_mut().for_each(|risk| risk.angular_traction = number),
+                    _ => ground.gradient = [number, 0.1],
+                }
             }
         }
-    }
+    });
     map
 }
 
