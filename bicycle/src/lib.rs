@@ -46,7 +46,9 @@ pub use effect::{Effect, SensorModel};
 pub use model::{GroundSample, Model, ModelError};
 pub use motion::{Command, ImuSample, Odometry, State};
 pub use motion_model::{Extent, MotionCommand, MotionLimits, MotionModel, MotionState, MotionStepper};
-pub use skid_steer::{SkidSteer, SkidSteerCommand, SkidSteerLimits, SkidSteerState, SkidSteerStepper};
+pub use skid_steer::{
+    SkidSteer, SkidSteerCommand, SkidSteerLimits, SkidSteerState, SkidSteerStepper, SkidSteerVehicle,
+};
 pub use stepper::{Asked, LaneState, Rates, Stepper};
 pub use vehicle::{
     Axle, Body, Drivetrain, Geometry, Limits, Servo, Suspension, Tyre, Vehicle, VehicleError, Wheel,

@@ -2,7 +2,7 @@
 
 use crate::effect::{Effect, EffectError};
 use crate::lanes::STEERING_DOMAIN_RAD;
-use crate::{Command, Limits, MotionLimits, MotionModel, State, Stepper, Vehicle};
+use crate::{Command, Limits, MotionLimits, MotionModel, Odometry, SensorModel, State, Stepper, Vehicle};
 use serde::{Deserialize, Serialize};
 
 /// What the ground under a pose does to the vehicle.
@@ -153,6 +153,20 @@ impl MotionModel for Model {
         let lateral_max_mps2 = limits.lateral_acceleration_max_mps2;
         let lateral_acceleration_max_mps2 = self.effects.iter().map(safe).fold(lateral_max_mps2, f64::min);
         MotionLimits { lateral_acceleration_max_mps2, ..limits.into() }
+    }
+
+    fn with_attitude_share(mut self, share: f64) -> Self {
+        self.limits.roll_max_rad *= share;
+        self.limits.pitch_max_rad *= share;
+        self
+    }
+
+    fn sensors(&self) -> SensorModel {
+        SensorModel::of(&self.effects)
+    }
+
+    fn measured_state(&self, odometry: &Odometry) -> State {
+        odometry.state()
     }
 }
 

@@ -6,7 +6,7 @@
 //! instances of them.
 
 use crate::lanes::{Lanes, Real, Scalar};
-use crate::{GroundSample, LaneState, ModelError, Rates};
+use crate::{GroundSample, LaneState, ModelError, Odometry, Rates, SensorModel};
 use std::f64::consts::TAU;
 use std::fmt::Debug;
 
@@ -16,6 +16,12 @@ pub trait MotionCommand:
 {
     /// What a vehicle is told that shall stand still and was told this before.
     fn at_standstill(self) -> Self;
+
+    /// The first channel [m/s].
+    fn speed_mps(self) -> f32 {
+        let [speed_mps, _] = self.into();
+        speed_mps
+    }
 }
 
 /// State of a model in the terms that all models share.
@@ -53,6 +59,13 @@ pub struct MotionLimits {
     pub pitch_max_rad: f64,
 }
 
+impl MotionLimits {
+    /// With a share of the limits of roll and pitch.
+    pub fn with_attitude_share(self, share: f64) -> Self {
+        Self { roll_max_rad: share * self.roll_max_rad, pitch_max_rad: share * self.pitch_max_rad, ..self }
+    }
+}
+
 /// How much of a step there is to compute.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Extent {
@@ -84,6 +97,17 @@ pub trait MotionModel: Clone + Debug + Send + Sync + 'static {
 
     /// What the vehicle can or may do.
     fn motion_limits(&self) -> MotionLimits;
+
+    /// With a share of its limits of roll and pitch.
+    fn with_attitude_share(self, share: f64) -> Self;
+
+    /// What is believed of the sensors: what they measure is corrected by it.
+    fn sensors(&self) -> SensorModel {
+        SensorModel::NEUTRAL
+    }
+
+    /// The state that a corrected measurement stands for.
+    fn measured_state(&self, odometry: &Odometry) -> Self::State;
 }
 
 /// A model made ready for one step length and one unit of length.

@@ -1,19 +1,24 @@
 //! A vehicle that turns by driving its sides at different speeds, taken for a unicycle on ground that takes a share of
 //! both of its motions (Cai et al., EVORA, the unicycle with linear and angular traction):
 //! x' = l1 v cos(yaw), y' = l1 v sin(yaw), yaw' = l2 w.
+//!
+//! It turns about a point between its axles, while poses are those of the rear axle's centre, as everywhere: where the
+//! point lies ahead of it, a turn takes the rear axle sideways.
 
 use crate::lanes::{Constant, Lanes, Real};
 use crate::model::{CHANGE_MOST, SPEED_MOST_MPS, check};
 use crate::stepper::{ENDLESS, towards};
 use crate::{
-    Extent, GroundSample, LaneState, ModelError, MotionCommand, MotionLimits, MotionModel, MotionState,
-    MotionStepper, Rates,
+    Extent, Geometry, GroundSample, LaneState, ModelError, MotionCommand, MotionLimits, MotionModel,
+    MotionState, MotionStepper, Odometry, Rates,
 };
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 
 /// Quickest turning of anything on wheels or tracks [rad/s].
 const YAW_RATE_MOST_RADPS: f64 = 100.0;
+/// Farthest that a vehicle turns about a point ahead of its rear axle, or behind it [m].
+const TURNING_POINT_MOST_M: f64 = 100.0;
 /// Longest lag of a drive [s].
 const LAG_MOST_S: f64 = 10.0;
 
@@ -46,7 +51,7 @@ impl MotionCommand for SkidSteerCommand {
     }
 }
 
-/// State of the skid-steered model: pose of the point that it turns about and what the drives have reached.
+/// State of the skid-steered model: pose of the rear axle's centre and what the drives have reached.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SkidSteerState {
     /// East [m].
@@ -109,6 +114,27 @@ pub struct SkidSteer {
     /// First-order response time of the yaw rate, 0 = none [s].
     #[serde(default)]
     pub yaw_rate_lag_s: f64,
+    /// From the rear axle's centre ahead to the point that the vehicle turns about [m].
+    #[serde(default)]
+    pub turning_point_ahead_m: f64,
+}
+
+/// Description of a skid-steered machine, as a planner needs it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SkidSteerVehicle {
+    /// Name, for reports.
+    pub name: String,
+    /// Lengths; the body frame sits at the rear axle's centre.
+    pub geometry: Geometry,
+    /// How it moves.
+    pub model: SkidSteer,
+}
+
+impl AsRef<Geometry> for SkidSteerVehicle {
+    fn as_ref(&self) -> &Geometry {
+        &self.geometry
+    }
 }
 
 impl MotionModel for SkidSteer {
@@ -136,7 +162,9 @@ impl MotionModel for SkidSteer {
         ];
         check(&changes, "a number > 0 of at most 1e6", |value| value > 0.0 && value <= CHANGE_MOST)?;
         let lags = [("speed_lag_s", self.speed_lag_s), ("yaw_rate_lag_s", self.yaw_rate_lag_s)];
-        check(&lags, "a time from 0 to 10 s", |value| (0.0..=LAG_MOST_S).contains(&value))
+        check(&lags, "a time from 0 to 10 s", |value| (0.0..=LAG_MOST_S).contains(&value))?;
+        let ahead = [("turning_point_ahead_m", self.turning_point_ahead_m)];
+        check(&ahead, "a length from -100 to 100 m", |value| value.abs() <= TURNING_POINT_MOST_M)
     }
 
     fn stepper(&self, step_s: f64, unit_m: f64) -> SkidSteerStepper {
@@ -146,16 +174,32 @@ impl MotionModel for SkidSteer {
         let share = |lag_s: f64| if lag_s > 0.0 { -libm::expm1(-step_s / lag_s) } else { 1.0 };
         SkidSteerStepper {
             advance: Constant::new(step_s / unit_m),
+            aside: Constant::new(self.turning_point_ahead_m * step_s / unit_m),
             turn: Constant::new(step_s / TAU),
             changes: rates.map(|rate| Constant::new(rate * step_s)),
             shares: lags_s.map(|lag_s| Constant::new(share(lag_s))),
             has_lag: lags_s != [0.0; 2],
             step_s,
+            ahead_m: self.turning_point_ahead_m,
         }
     }
 
     fn motion_limits(&self) -> MotionLimits {
         (&self.limits).into()
+    }
+
+    fn with_attitude_share(mut self, share: f64) -> Self {
+        self.limits.roll_max_rad *= share;
+        self.limits.pitch_max_rad *= share;
+        self
+    }
+
+    /// The yaw rate is that of the body: what the drives have reached beyond what the ground lets through is not
+    /// measured.
+    fn measured_state(&self, odometry: &Odometry) -> SkidSteerState {
+        let ([x_m, y_m, _], [_, _, yaw_rad]) = (odometry.position_m, odometry.attitude_rad);
+        let (speed_mps, yaw_rate_radps) = (odometry.wheel_speed_mps, odometry.yaw_rate_radps);
+        SkidSteerState { x_m, y_m, yaw_rad, speed_mps, yaw_rate_radps }
     }
 }
 
@@ -177,6 +221,8 @@ impl From<&SkidSteerLimits> for MotionLimits {
 #[derive(Clone, Debug)]
 pub struct SkidSteerStepper {
     advance: Constant,
+    /// What a yaw rate takes the rear axle to the right in a step [unit s/rad].
+    aside: Constant,
     turn: Constant,
     /// Largest changes in a step.
     changes: [Constant; 2],
@@ -184,6 +230,7 @@ pub struct SkidSteerStepper {
     shares: [Constant; 2],
     has_lag: bool,
     step_s: f64,
+    ahead_m: f64,
 }
 
 impl SkidSteerStepper {
@@ -193,6 +240,10 @@ impl SkidSteerStepper {
         let speed = state.speed;
         let advance = speed * ground.linear_traction * Real::constant(state.x.0, self.advance);
         let yaw_rate = state.steering * ground.angular_traction;
+        let (sine, cosine) = state.turns.sin_cos_turns();
+        let aside = yaw_rate * Real::constant(state.x.0, self.aside);
+        state.x = aside.mul_add(sine, state.x);
+        state.y = state.y - aside * cosine;
         state.carry_on(advance, yaw_rate, self.turn);
         Rates { speed, yaw_rate }
     }
@@ -256,5 +307,6 @@ impl MotionStepper for SkidSteerStepper {
 
     fn rescale(&mut self, unit_m: f64) {
         self.advance = Constant::new(self.step_s / unit_m);
+        self.aside = Constant::new(self.ahead_m * self.step_s / unit_m);
     }
 }

@@ -24,7 +24,7 @@ fn model() -> SkidSteer {
         roll_max_rad: 0.5,
         pitch_max_rad: 0.5,
     };
-    SkidSteer { limits, speed_lag_s: 0.0, yaw_rate_lag_s: 0.0 }
+    SkidSteer { limits, speed_lag_s: 0.0, yaw_rate_lag_s: 0.0, turning_point_ahead_m: 0.0 }
 }
 
 fn instant() -> SkidSteerStepper {
@@ -107,6 +107,26 @@ fn the_drives_follow_within_their_limits() {
     }
 }
 
+/// Turning where it stands, the vehicle keeps the place of the point that it turns about: the rear axle goes around it.
+/// A step is a side of the polygon, 5 mrad of it.
+#[test]
+fn the_rear_axle_goes_around_the_turning_point() {
+    let long = SkidSteer { turning_point_ahead_m: 0.6, ..model() };
+    for (unit_m, angular) in [(1.0, 1.0), (1.0, 0.5), (0.25, 1.0)] {
+        let mut stepper = long.stepper(0.005, 1.0).with_instant_actuators();
+        stepper.rescale(unit_m);
+        for state in run(&stepper, [0.0, 1.0], &ground(1.0, angular), 400).iter().skip(1) {
+            let (sine, cosine) = state.yaw_rad.sin_cos();
+            let point_m = [state.x_m * unit_m + 0.6 * cosine, state.y_m * unit_m + 0.6 * sine];
+            assert!((point_m[0] - 0.6).hypot(point_m[1]) < 0.004, "{point_m:?}");
+        }
+    }
+    // Driving straight, it makes no difference.
+    let (near, far) = (instant(), long.stepper(STEP_S, 1.0).with_instant_actuators());
+    let straight = [&near, &far].map(|stepper| run(stepper, [1.5, 0.0], &GroundSample::FIRM, 20));
+    assert_eq!(straight[0], straight[1]);
+}
+
 /// A first-order lag leaves exp(-t / T) of a step to be made good.
 #[test]
 fn a_lag_is_exponential() {
@@ -151,8 +171,11 @@ fn impossible_models_are_refused_with_field_and_value() {
     assert!(told(&|model| model.limits.roll_max_rad = f64::INFINITY).starts_with("limits.roll_max_rad"));
 }
 
+/// Command of a step and traction under it.
+type Leg = ([f32; 2], [f32; 2]);
+
 /// Command and traction of every step of one vehicle, drawn for its number.
-fn journey(lane: usize) -> Vec<([f32; 2], [f32; 2])> {
+fn journey(lane: usize) -> Vec<Leg> {
     let mut random = Xoshiro256PlusPlus::seed_from_u64(lane as u64);
     let mut draw = |low: f32, high: f32| random.random_range(low..high);
     (0..50).map(|_| ([draw(-1.0, 2.0), draw(-1.5, 1.5)], [draw(0.3, 1.0), draw(0.3, 1.0)])).collect()
@@ -160,13 +183,13 @@ fn journey(lane: usize) -> Vec<([f32; 2], [f32; 2])> {
 
 /// Every lane of a pack ends where the reference ends that drives the lane's journey.
 fn compare<L: Lanes>(lanes: L, unpack: impl Fn(L::Value) -> Vec<f32>, pack: impl Fn(&[f32]) -> L::Value) {
-    let lagging = SkidSteer { speed_lag_s: 0.2, yaw_rate_lag_s: 0.3, ..model() };
+    let lagging = SkidSteer { speed_lag_s: 0.2, yaw_rate_lag_s: 0.3, turning_point_ahead_m: 0.4, ..model() };
     for stepper in [model().stepper(STEP_S, 1.0), instant(), lagging.stepper(STEP_S, 1.0)] {
         let journeys: Vec<_> = (0..L::WIDTH).map(journey).collect();
         let zero = lanes.real(0.0);
         let mut state = LaneState { x: zero, y: zero, turns: zero, speed: zero, steering: zero };
         for t in 0..journeys[0].len() {
-            let real = |of: &dyn Fn(&([f32; 2], [f32; 2])) -> f32| {
+            let real = |of: &dyn Fn(&Leg) -> f32| {
                 let values: Vec<f32> = journeys.iter().map(|journey| of(&journey[t])).collect();
                 Real(lanes, pack(&values))
             };

@@ -23,7 +23,7 @@ fn model() -> SkidSteer {
         roll_max_rad: 0.5,
         pitch_max_rad: 0.5,
     };
-    SkidSteer { limits, speed_lag_s: 0.1, yaw_rate_lag_s: 0.1 }
+    SkidSteer { limits, speed_lag_s: 0.1, yaw_rate_lag_s: 0.1, turning_point_ahead_m: 0.0 }
 }
 
 fn config() -> Config {

@@ -14,7 +14,7 @@ fn model(lag_s: f64) -> SkidSteer {
         roll_max_rad: 0.5,
         pitch_max_rad: 0.5,
     };
-    SkidSteer { limits, speed_lag_s: lag_s, yaw_rate_lag_s: 0.5 * lag_s }
+    SkidSteer { limits, speed_lag_s: lag_s, yaw_rate_lag_s: 0.5 * lag_s, turning_point_ahead_m: 0.0 }
 }
 
 /// Where one vehicle in f64 ends, and how near it came to a place where rounding decides.
