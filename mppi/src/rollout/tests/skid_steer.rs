@@ -78,7 +78,7 @@ fn rollouts_of_a_skid_steered_vehicle_go_where_one_vehicle_goes() {
                         continue;
                     }
                     n_compared += 1;
-                    let expected_m = (x_m - goal_m[0]).hypot(y_m - goal_m[1]);
+                    let expected_m = libm::hypot(x_m - goal_m[0], y_m - goal_m[1]);
                     // The cost at the end is the time for the rest of the way, at 2 m/s.
                     let found_m = 2.0 * f64::from(chunk.terms[CostTerm::Terminal as usize].0[lane]);
                     assert!((found_m - expected_m).abs() < OFF_M, "{machine:?} lane {lane}: {found_m}");
