@@ -158,7 +158,7 @@ impl ClosedLoop {
         };
         let (goal_m, tolerance_m) = (task.goal_m, task.goal_tolerance_m);
         let navigator = Navigator::new(Setup {
-            vehicle,
+            geometry: &vehicle.geometry,
             model,
             config,
             belief,

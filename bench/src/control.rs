@@ -196,15 +196,16 @@ fn random_map() -> RiskMap {
     let geometry = GridGeometry::centred(RESOLUTION_M, N_ROWS, N_COLS, 0.0, 0.0);
     let mut map = RiskMap::constant(geometry, N_YAWS, Risk::NONE);
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(SEED);
-    for risk in map.arrays_mut().0 {
-        *risk = Risk {
-            linear_traction: rng.random_range(0.5..1.0),
-            angular_traction: rng.random_range(0.5..1.0),
-            roll_rad: rng.random_range(0.0..0.6),
-            pitch_rad: rng.random_range(0.0..0.6),
-        };
-    }
-    map.close_border();
+    map.fill(|risks, _| {
+        for risk in risks {
+            *risk = Risk {
+                linear_traction: rng.random_range(0.5..1.0),
+                angular_traction: rng.random_range(0.5..1.0),
+                roll_rad: rng.random_range(0.0..0.6),
+                pitch_rad: rng.random_range(0.0..0.6),
+            };
+        }
+    });
     map
 }
 

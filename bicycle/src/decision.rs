@@ -1,25 +1,25 @@
 //! What a controller returns each cycle: a command or a reason not to give one.
 
-use crate::Command;
+use crate::{Command, MotionCommand};
 
 /// The outcome of one control cycle. Degraded operation is a value, never a stale command.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Decision {
+pub enum Decision<C = Command> {
     /// Follow the command.
-    Drive(Command),
+    Drive(C),
     /// Stand still for now; driving may go on next cycle.
     Hold(HoldReason),
     /// Come to a controlled stop.
     Stop(StopReason),
 }
 
-impl Decision {
-    /// What the vehicle is told that was told `last` before: the command; to hold or to stop, no speed and the wheels as
-    /// they were told to stand.
-    pub fn command(&self, last: Command) -> Command {
+impl<C: MotionCommand> Decision<C> {
+    /// What the vehicle is told that was told `last` before: the command; to hold or to stop, to stand still, with the
+    /// wheels as they were told to stand.
+    pub fn command(&self, last: C) -> C {
         match *self {
             Self::Drive(command) => command,
-            Self::Hold(_) | Self::Stop(_) => Command { speed_mps: 0.0, ..last },
+            Self::Hold(_) | Self::Stop(_) => last.at_standstill(),
         }
     }
 }

@@ -82,6 +82,13 @@ pub trait Lanes: Copy + Send + Sync + 'static {
     fn sqrt(self, a: Self::Value) -> Self::Value;
     /// An angle in turns brought to [-1/2, 1/2] by whole turns; |a| < 4 million. Of what is not finite, NaN.
     fn wrap_turns(self, a: Self::Value) -> Self::Value;
+    /// [`Lanes::wrap_turns`] of an angle that a rate led to, and a witness: where the rate is finite, the wrapped angle and
+    /// the witness as it was; where it is not, NaN in one of the two at least. For instructions that wrap fastest where
+    /// they hide infinity.
+    #[inline(always)]
+    fn wrap_witnessed(self, a: Self::Value, _rate: Self::Value, witness: Self::Value) -> [Self::Value; 2] {
+        [self.wrap_turns(a), witness]
+    }
     /// Where a < b.
     fn less(self, a: Self::Value, b: Self::Value) -> Self::Mask;
     /// Where a > b or either is NaN.
@@ -174,6 +181,12 @@ impl<L: Lanes> Real<L> {
     #[inline(always)]
     pub fn wrap_turns(self) -> Self {
         Self(self.0, self.0.wrap_turns(self.1))
+    }
+
+    /// See [`Lanes::wrap_witnessed`].
+    #[inline(always)]
+    pub fn wrap_witnessed(self, rate: Self, witness: Self) -> [Self; 2] {
+        self.0.wrap_witnessed(self.1, rate.1, witness.1).map(|value| Self(self.0, value))
     }
 
     /// See [`Lanes::sin_cos_turns`].

@@ -3,7 +3,8 @@
 //!
 //! A [`Vehicle`] describes the whole machine, a [`Model`] what a controller believes of it: wheelbase, [`Limits`] and
 //! [`Effect`]s that the kinematic bicycle leaves out. A [`Stepper`] carries a [`State`] on under a [`Command`]; the
-//! same code runs for one vehicle and for a pack of them in [`lanes`]. A controller's answer is a [`Decision`]; what
+//! same code runs for one vehicle and for a pack of them in [`lanes`]. [`SkidSteer`] is the same for a vehicle that is
+//! asked for a yaw rate, and [`MotionModel`] what both offer to a controller. A controller's answer is a [`Decision`]; what
 //! was commanded and measured on a drive is a [`DriveLog`]. `examples/own_vehicle.rs` makes a model of one's own.
 //!
 //! ```
@@ -34,6 +35,8 @@ pub mod effect;
 pub mod lanes;
 mod model;
 mod motion;
+mod motion_model;
+mod skid_steer;
 mod stepper;
 mod vehicle;
 
@@ -42,6 +45,10 @@ pub use drive_log::{Column, DriveLog, DriveLogError, DriveRow, Run};
 pub use effect::{Effect, SensorModel};
 pub use model::{GroundSample, Model, ModelError};
 pub use motion::{Command, ImuSample, Odometry, State};
+pub use motion_model::{Extent, MotionCommand, MotionLimits, MotionModel, MotionState, MotionStepper};
+pub use skid_steer::{
+    SkidSteer, SkidSteerCommand, SkidSteerLimits, SkidSteerState, SkidSteerStepper, SkidSteerVehicle,
+};
 pub use stepper::{Asked, LaneState, Rates, Stepper};
 pub use vehicle::{
     Axle, Body, Differential, Drivetrain, Geometry, Limits, Servo, Suspension, Tyre, Vehicle, VehicleError,

@@ -2,7 +2,7 @@
 
 use crate::effect::{Effect, EffectError};
 use crate::lanes::STEERING_DOMAIN_RAD;
-use crate::{Limits, Vehicle};
+use crate::{Command, Limits, MotionLimits, MotionModel, Odometry, SensorModel, State, Stepper, Vehicle};
 use serde::{Deserialize, Serialize};
 
 /// What the ground under a pose does to the vehicle.
@@ -66,8 +66,11 @@ pub enum ModelError {
 /// Longest and shortest lengths, fastest speeds and quickest changes of anything on wheels: beyond them, the step's
 /// arithmetic in f32 overflows.
 const WHEELBASE_M: [f64; 2] = [0.01, 100.0];
-const SPEED_MOST_MPS: f64 = 200.0;
-const CHANGE_MOST: f64 = 1e6;
+pub(crate) const SPEED_MOST_MPS: f64 = 200.0;
+pub(crate) const CHANGE_MOST: f64 = 1e6;
+/// Share of the tyres' grip that a plan may ask for: beyond it they slide, and what they then do no model foretells well.
+const GRIP_SHARE: f64 = 0.75;
+const GRAVITY_MPS2: f64 = 9.81;
 
 impl Model {
     /// The vehicle's geometry and limits, no effects.
@@ -127,7 +130,62 @@ impl Model {
     }
 }
 
-fn check(
+impl MotionModel for Model {
+    type Command = Command;
+    type State = State;
+    type Stepper = Stepper;
+
+    fn validate(&self) -> Result<(), ModelError> {
+        Self::validate(self)
+    }
+
+    fn stepper(&self, step_s: f64, unit_m: f64) -> Stepper {
+        Stepper::new(self, step_s, unit_m)
+    }
+
+    /// Of lateral acceleration, the limit or what is safe on tyres whose grip the model knows, whichever is less.
+    fn motion_limits(&self) -> MotionLimits {
+        let limits = &self.limits;
+        let safe = |effect: &Effect| match effect {
+            Effect::Friction(friction) => GRIP_SHARE * friction.mu * GRAVITY_MPS2,
+            _ => f64::INFINITY,
+        };
+        let lateral_max_mps2 = limits.lateral_acceleration_max_mps2;
+        let lateral_acceleration_max_mps2 = self.effects.iter().map(safe).fold(lateral_max_mps2, f64::min);
+        MotionLimits { lateral_acceleration_max_mps2, ..limits.into() }
+    }
+
+    fn with_attitude_share(mut self, share: f64) -> Self {
+        self.limits.roll_max_rad *= share;
+        self.limits.pitch_max_rad *= share;
+        self
+    }
+
+    fn sensors(&self) -> SensorModel {
+        SensorModel::of(&self.effects)
+    }
+
+    fn measured_state(&self, odometry: &Odometry) -> State {
+        odometry.state()
+    }
+}
+
+impl From<&Limits> for MotionLimits {
+    fn from(limits: &Limits) -> Self {
+        Self {
+            low: [-limits.reverse_speed_max_mps, -limits.steering_max_rad],
+            high: [limits.speed_max_mps, limits.steering_max_rad],
+            rates: [limits.acceleration_max_mps2, limits.steering_rate_max_radps],
+            turn_domain: STEERING_DOMAIN_RAD,
+            lateral_acceleration_max_mps2: limits.lateral_acceleration_max_mps2,
+            roll_max_rad: limits.roll_max_rad,
+            pitch_max_rad: limits.pitch_max_rad,
+        }
+    }
+}
+
+/// Refuses the first field that is not a finite number of the allowed range.
+pub(crate) fn check(
     fields: &[(&'static str, f64)],
     expected: &'static str,
     allowed: impl Fn(f64) -> bool,

@@ -1,6 +1,8 @@
 //! States, commands and what the vehicle measures of its own motion.
 
-/// What a vehicle is asked to do.
+use crate::{MotionCommand, MotionState};
+
+/// What a vehicle is asked to do that steers its front wheels.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 #[repr(C)]
 pub struct Command {
@@ -8,6 +10,25 @@ pub struct Command {
     pub speed_mps: f32,
     /// Angle of the front wheels, left positive [rad].
     pub steering_rad: f32,
+}
+
+impl From<[f32; 2]> for Command {
+    fn from([speed_mps, steering_rad]: [f32; 2]) -> Self {
+        Self { speed_mps, steering_rad }
+    }
+}
+
+impl From<Command> for [f32; 2] {
+    fn from(command: Command) -> Self {
+        [command.speed_mps, command.steering_rad]
+    }
+}
+
+impl MotionCommand for Command {
+    /// No speed, and the wheels as they were told to stand.
+    fn at_standstill(self) -> Self {
+        Self { speed_mps: 0.0, ..self }
+    }
 }
 
 /// State of the bicycle model: pose of the rear axle's centre and what the actuators have reached.
@@ -23,6 +44,20 @@ pub struct State {
     pub speed_mps: f64,
     /// Angle that the front wheels have reached [rad].
     pub steering_rad: f64,
+}
+
+impl From<MotionState> for State {
+    fn from(state: MotionState) -> Self {
+        let MotionState { x_m, y_m, yaw_rad, speed_mps, turn: steering_rad } = state;
+        Self { x_m, y_m, yaw_rad, speed_mps, steering_rad }
+    }
+}
+
+impl From<State> for MotionState {
+    fn from(state: State) -> Self {
+        let State { x_m, y_m, yaw_rad, speed_mps, steering_rad } = state;
+        Self { x_m, y_m, yaw_rad, speed_mps, turn: steering_rad }
+    }
 }
 
 /// What a vehicle knows of its own motion at one instant.

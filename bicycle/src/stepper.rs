@@ -1,8 +1,10 @@
 //! The kinematic bicycle on ground that takes a share of every motion (PIETRA, equation 2), step by step.
 
+mod contract;
+
 use crate::effect::{CommandStep, Driving, Moving, PreparedEffects};
-use crate::lanes::{Constant, Lanes, Real, STEERING_DOMAIN_RAD, Scalar};
-use crate::{Command, GroundSample, Model, State};
+use crate::lanes::{Constant, Lanes, Real, STEERING_DOMAIN_RAD};
+use crate::{Command, GroundSample, Model, MotionStepper, State};
 use std::f64::consts::TAU;
 
 /// States of a pack of vehicles. Lengths are in the unit that the stepper was made for.
@@ -16,8 +18,23 @@ pub struct LaneState<L: Lanes> {
     pub turns: Real<L>,
     /// Speed that the drive has reached [m/s].
     pub speed: Real<L>,
-    /// Angle that the steering has reached [rad].
+    /// Angle that the steering has reached [rad], or yaw rate of a skid-steered vehicle [rad/s].
     pub steering: Real<L>,
+}
+
+impl<L: Lanes> LaneState<L> {
+    /// Moves the pose by a step along the yaw that it begins with [unit], and by a yaw rate [rad/s] at so many turns per
+    /// radian per second.
+    #[inline(always)]
+    pub(crate) fn carry_on(&mut self, advance: Real<L>, yaw_rate: Real<L>, turn: Constant) {
+        let (sine, cosine) = self.turns.sin_cos_turns();
+        let turns = yaw_rate.mul_add(Real::constant(self.x.0, turn), self.turns);
+        // A yaw rate that is not finite shows in the position where it does not show in the yaw.
+        let [turns, x] = turns.wrap_witnessed(yaw_rate, self.x);
+        self.x = advance.mul_add(cosine, x);
+        self.y = advance.mul_add(sine, self.y);
+        self.turns = turns;
+    }
 }
 
 /// Body rates of a step, after the ground took its share.
@@ -51,7 +68,15 @@ impl<L: Lanes> Asked<L> {
 /// Speeds that forces may push a vehicle to [m/s]: far beyond any, near enough that no arithmetic overflows.
 const SPEED_DOMAIN_MPS: f64 = 1000.0;
 /// Change in a step that limits nothing.
-const ENDLESS: f64 = 1e30;
+pub(crate) const ENDLESS: f64 = 1e30;
+
+/// What an actuator reaches in a step that can change it by so much.
+#[inline(always)]
+pub(crate) fn towards<L: Lanes>(asked: Real<L>, reached: Real<L>, change: Constant) -> Real<L> {
+    let change = Real::constant(reached.0, change);
+    // In this order, what was reached stays NaN once it is.
+    asked.max(reached - change).min(reached + change)
+}
 
 /// A model made ready for one step length and one unit of length.
 #[derive(Clone, Debug)]
@@ -179,13 +204,10 @@ impl Stepper {
     fn roll<L: Lanes>(&self, state: &mut LaneState<L>, ground: &GroundSample<Real<L>>) -> Rates<L> {
         let lanes = state.x.0;
         let (speed, steering) = (state.speed, state.steering);
-        let (sine, cosine) = state.turns.sin_cos_turns();
         let advance = speed * ground.linear_traction * Real::constant(lanes, self.advance);
         let curving = steering.tan() * ground.angular_traction;
         let yaw_rate = speed * Real::constant(lanes, self.per_wheelbase) * curving;
-        state.x = advance.mul_add(cosine, state.x);
-        state.y = advance.mul_add(sine, state.y);
-        state.turns = yaw_rate.mul_add(Real::constant(lanes, self.turn), state.turns).wrap_turns();
+        state.carry_on(advance, yaw_rate, self.turn);
         Rates { speed, yaw_rate }
     }
 
@@ -320,11 +342,6 @@ impl Stepper {
     /// The actuators go towards what is asked of them, as far as they come in a step.
     #[inline(always)]
     fn follow_command<L: Lanes>(&self, state: &mut LaneState<L>, asked: [Real<L>; 2]) {
-        let towards = |asked: Real<L>, reached: Real<L>, change: Constant| {
-            let change = Real::constant(reached.0, change);
-            // In this order, what was reached stays NaN once it is.
-            asked.max(reached - change).min(reached + change)
-        };
         state.speed = towards(asked[0], state.speed, self.speed_change);
         state.steering = towards(asked[1], state.steering, self.steering_change);
     }
@@ -338,28 +355,6 @@ impl Stepper {
         memory: &mut [f64],
         step: usize,
     ) -> State {
-        let real = |value: f64| Real(Scalar, value);
-        let mut lanes = LaneState {
-            x: real(state.x_m),
-            y: real(state.y_m),
-            turns: real(state.yaw_rad / TAU),
-            speed: real(state.speed_mps),
-            steering: real(state.steering_rad),
-        };
-        let ground = GroundSample {
-            linear_traction: real(ground.linear_traction),
-            angular_traction: real(ground.angular_traction),
-            gradient: ground.gradient.map(real),
-            class: real(ground.class),
-        };
-        let command = [f64::from(command.speed_mps), f64::from(command.steering_rad)].map(real);
-        self.step(&mut lanes, command, &ground, memory, step);
-        State {
-            x_m: lanes.x.1,
-            y_m: lanes.y.1,
-            yaw_rad: lanes.turns.1 * TAU,
-            speed_mps: lanes.speed.1,
-            steering_rad: lanes.steering.1,
-        }
+        self.step_one(&(*state).into(), command.into(), ground, memory, step).into()
     }
 }

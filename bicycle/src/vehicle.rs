@@ -207,12 +207,8 @@ pub struct VehicleError {
 impl Vehicle {
     /// Refuses values that no vehicle can have.
     pub fn validate(&self) -> Result<(), VehicleError> {
+        self.geometry.validate()?;
         let positive = [
-            ("geometry.wheelbase_m", self.geometry.wheelbase_m),
-            ("geometry.track_m", self.geometry.track_m),
-            ("geometry.length_m", self.geometry.length_m),
-            ("geometry.width_m", self.geometry.width_m),
-            ("geometry.wheel_radius_m", self.geometry.wheel_radius_m),
             ("limits.speed_max_mps", self.limits.speed_max_mps),
             ("limits.steering_max_rad", self.limits.steering_max_rad),
             ("limits.steering_rate_max_radps", self.limits.steering_rate_max_radps),
@@ -240,8 +236,6 @@ impl Vehicle {
             ("tyre.radial_stiffness_n_per_m", self.tyre.radial_stiffness_n_per_m),
         ];
         let not_negative = [
-            ("geometry.rear_overhang_m", self.geometry.rear_overhang_m),
-            ("geometry.ground_clearance_m", self.geometry.ground_clearance_m),
             ("limits.reverse_speed_max_mps", self.limits.reverse_speed_max_mps),
             ("body.cog_ahead_m", self.body.cog_ahead_m),
             ("front.suspension.damping_ns_per_m", self.front.suspension.damping_ns_per_m),
@@ -265,8 +259,19 @@ impl Vehicle {
             ("limits.roll_max_rad", self.limits.roll_max_rad),
             ("limits.pitch_max_rad", self.limits.pitch_max_rad),
         ];
-        check(&angles, "an angle in radians below pi/2", |v| v < std::f64::consts::FRAC_PI_2)?;
-        self.geometry.validate()
+        check(&angles, "an angle in radians below pi/2", |v| v < std::f64::consts::FRAC_PI_2)
+    }
+}
+
+impl AsRef<Geometry> for Vehicle {
+    fn as_ref(&self) -> &Geometry {
+        &self.geometry
+    }
+}
+
+impl AsRef<Self> for Geometry {
+    fn as_ref(&self) -> &Self {
+        self
     }
 }
 
@@ -301,9 +306,22 @@ impl Vehicle {
 }
 
 impl Geometry {
-    /// Refuses a body that does not reach over its own wheels.
-    fn validate(&self) -> Result<(), VehicleError> {
+    /// Refuses lengths that no vehicle can have, and a body that does not reach over its own wheels.
+    pub fn validate(&self) -> Result<(), VehicleError> {
         let Self { wheelbase_m, track_m, length_m, width_m, rear_overhang_m, .. } = *self;
+        let positive = [
+            ("geometry.wheelbase_m", wheelbase_m),
+            ("geometry.track_m", track_m),
+            ("geometry.length_m", length_m),
+            ("geometry.width_m", width_m),
+            ("geometry.wheel_radius_m", self.wheel_radius_m),
+        ];
+        check(&positive, "a finite number > 0", |v| v > 0.0)?;
+        let not_negative = [
+            ("geometry.rear_overhang_m", rear_overhang_m),
+            ("geometry.ground_clearance_m", self.ground_clearance_m),
+        ];
+        check(&not_negative, "a finite number >= 0", |v| v >= 0.0)?;
         let refuse = |field, expected: String, found| {
             Err(VehicleError { field, expected: Cow::Owned(expected), found })
         };

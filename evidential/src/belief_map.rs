@@ -14,7 +14,7 @@ use bicycle::lanes::Instructions;
 use physics_prior::{Assumption, PriorConfig, PriorField, PriorMapError};
 use rayon::prelude::*;
 use terrain::{CellRegion, GridGeometry, GridMap, SurfaceCell};
-use traversability::{CvarLevel, PartialMoments, Risk, RiskMap};
+use traversability::{CvarLevel, Ground, PartialMoments, Risk, RiskMap};
 
 use crate::predictor::{Predictor, PredictorError};
 use crate::{Checkpoint, FeatureLayout, Prior, VehicleMismatch};
@@ -256,28 +256,33 @@ impl BeliefMap {
         let n_threads = rayon::current_num_threads();
         let (layers, workspace) = (&self.layers, self.layers.predictor.workspace());
         self.scratches.resize_with(n_threads, || Scratch::new(workspace.clone()));
-        let tasks = Mutex::new(tasks(&mut self.map, layers.n_yaws, dirty).into_iter());
-        self.scratches.par_iter_mut().for_each(|scratch| {
-            let next = || tasks.lock().unwrap_or_else(PoisonError::into_inner).next();
-            while let Some(task) = next() {
-                task.run(layers, surface, scratch);
-            }
+        let (geometry, scratches) = (*self.map.geometry(), &mut self.scratches);
+        self.map.fill(|risks, ground| {
+            let tasks = Mutex::new(tasks(&geometry, (risks, ground), layers.n_yaws, dirty).into_iter());
+            scratches.par_iter_mut().for_each(|scratch| {
+                let next = || tasks.lock().unwrap_or_else(PoisonError::into_inner).next();
+                while let Some(task) = next() {
+                    task.run(layers, surface, scratch);
+                }
+            });
         });
-        self.map.close_border();
     }
 }
 
 /// The dirty part of a map, a few rows at a time.
-fn tasks<'a>(map: &'a mut RiskMap, n_yaws: usize, dirty: &CellRegion) -> Vec<RowTask<'a>> {
-    let geometry = *map.geometry();
+fn tasks<'a>(
+    geometry: &GridGeometry,
+    (risks, ground): (&'a mut [Risk], &'a mut [Ground]),
+    n_yaws: usize,
+    dirty: &CellRegion,
+) -> Vec<RowTask<'a>> {
     let n_cols = geometry.n_cols;
     let n_rows = (TASK_LANES / (dirty.cols.len() * n_yaws)).max(1);
     let [west, south] = geometry.origin;
-    let (risks, ground) = map.arrays_mut();
     let cells = dirty.rows.start * n_cols..dirty.rows.end * n_cols;
     let risks = risks[cells.start * n_yaws..cells.end * n_yaws].chunks_mut(n_rows * n_cols * n_yaws);
     let slices = risks.zip(ground[cells].chunks_mut(n_rows * n_cols));
-    let task = |(index, (risks, ground)): (usize, (&'a mut [Risk], &'a mut [_]))| {
+    let task = |(index, (risks, ground)): (usize, (&'a mut [Risk], &'a mut [Ground]))| {
         let first = south + (dirty.rows.start + index * n_rows) as i64;
         RowTask {
             rows: first..first + (ground.len() / n_cols) as i64,

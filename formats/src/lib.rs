@@ -29,6 +29,7 @@ mod recording;
 mod refusal;
 mod results;
 mod scan;
+mod skid_steer;
 mod traction_map;
 mod vehicle;
 
@@ -56,6 +57,7 @@ pub use recording::{
 pub use refusal::ArrayFileError;
 pub use results::{OutputError, config_hash, prepare_out_dir, write_bytes_atomic, write_json_atomic};
 pub use scan::{parse_scan_points, read_scan_points};
+pub use skid_steer::{parse_skid_steer_vehicle, read_skid_steer_vehicle};
 pub use traction_map::{TractionMap, TractionPmfs, parse_traction_map, read_traction_map};
 pub use vehicle::{
     parse_model, parse_vehicle, read_model, read_vehicle, shipped_vehicle_names, shipped_vehicle_text,

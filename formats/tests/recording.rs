@@ -44,7 +44,7 @@ fn record_everything(path: &Path) {
     let mut risk = RiskMap::constant(GEOMETRY, 4, Risk::NONE);
     let index = GEOMETRY.index(Cell { row: 2, col: 5 });
     // Yaw bin 1 of 4 is centred at 135 degrees and holds 90 to 180.
-    risk.arrays_mut().0[4 * index + 1].linear_traction = 0.25;
+    risk.fill(|risks, _| risks[4 * index + 1].linear_traction = 0.25);
     recorder.risk(0, &risk.view(), 2.0).unwrap();
     let point = RangePoint { position_m: [1.0, -2.0, 0.5], class: TerrainClass::Obstacle };
     recorder.scan(0, &Scan { points: vec![point; 3], ..Scan::default() }).unwrap();

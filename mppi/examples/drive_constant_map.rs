@@ -31,7 +31,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     for index in 0..geometry.n_cells() {
         let [x_m, y_m] = geometry.centre_m(geometry.cell(index));
         if (x_m - ROCK_M[0]).hypot(y_m - ROCK_M[1]) < 1.0 {
-            map.arrays_mut().0[index * n_yaws..][..n_yaws].fill(level.blocked());
+            map.fill(|risks, _| risks[index * n_yaws..][..n_yaws].fill(level.blocked()));
         }
     }
     let mut field = CostToGo::new(CostToGoConfig::default(), &LIMITS, geometry.n_rows, geometry.n_cols)?;

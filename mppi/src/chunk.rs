@@ -1,9 +1,12 @@
 //! The memory of one chunk of rollouts: everything that the inner loops write.
 
+use crate::cost::{Frame, Future};
 use crate::diagnostics::CostTerm;
 use crate::kernel::Row;
 use crate::sampling::Control;
 use crate::summary::Totals;
+use bicycle::MotionState;
+use std::f64::consts::TAU;
 
 /// Controls, costs and sums of [`crate::kernel::CHUNK`] rollouts.
 #[derive(Clone)]
@@ -12,6 +15,8 @@ pub(crate) struct Chunk {
     pub(crate) controls: Vec<[Row; 2]>,
     /// Cost of every rollout by term [s].
     pub(crate) terms: [Row; CostTerm::COUNT],
+    /// Where every rollout ends, where somebody asks: position in cells, yaw in turns, speed [m/s] and what turns.
+    pub(crate) ends: [Row; 5],
     /// Cost of every rollout [s]; not finite when the rollout met a number that is not.
     pub(crate) costs: Row,
     /// Steps of every rollout that break a limit of attitude.
@@ -31,6 +36,7 @@ impl Chunk {
         Self {
             controls: vec![[Row::ZERO; 2]; n_steps],
             terms: [Row::ZERO; CostTerm::COUNT],
+            ends: [Row::ZERO; 5],
             costs: Row::ZERO,
             n_broken: Row::ZERO,
             weights: Row::ZERO,
@@ -38,6 +44,20 @@ impl Chunk {
             is_negligible: false,
             totals: Totals::default(),
         }
+    }
+
+    /// One rollout, whose end is kept.
+    pub(crate) fn future(&self, lane: usize, frame: &Frame) -> Future {
+        let [x_cells, y_cells, turns, speed_mps, turn] =
+            self.ends.each_ref().map(|row| f64::from(row.0[lane]));
+        let end = MotionState {
+            x_m: frame.corner_m[0] + x_cells * frame.cell_m,
+            y_m: frame.corner_m[1] + y_cells * frame.cell_m,
+            yaw_rad: turns * TAU,
+            speed_mps,
+            turn,
+        };
+        Future { end, cost_s: self.costs.0[lane], n_broken: self.n_broken.0[lane] }
     }
 
     /// The controls of one rollout, step by step.

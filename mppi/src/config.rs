@@ -59,7 +59,8 @@ pub struct Sampling {
     pub space: SampleSpace,
     /// Standard deviation of the speed [m/s], or of the acceleration [m/s2] when sampling rates.
     pub speed_std: f64,
-    /// Standard deviation of the steering angle [rad], or of the steering rate [rad/s] when sampling rates.
+    /// Standard deviation of the steering angle [rad], or of the steering rate [rad/s] when sampling rates; of a model
+    /// that is asked for a yaw rate, of that [rad/s] or of its rate [rad/s2].
     pub steering_std: f64,
     /// Correlation time of the noise; 0 = white [s].
     pub correlation_s: f64,
@@ -233,6 +234,27 @@ impl Config {
         Ok(())
     }
 
+    /// Refuses what a controller that runs by this configuration cannot change.
+    pub(crate) fn refuse_other_layout(&self, other: &Self) -> Result<(), ConfigError> {
+        let told = |of: &Self| {
+            [
+                ("n_rollouts", of.n_rollouts.to_string()),
+                ("n_steps", of.n_steps.to_string()),
+                ("step_s", of.step_s.to_string()),
+                ("n_threads", of.n_threads.to_string()),
+                ("isa", format!("{:?}", of.isa)),
+                ("delay_s", of.delay_s.to_string()),
+                ("period_min_s", of.period_min_s.to_string()),
+            ]
+        };
+        for ((field, expected), (_, found)) in told(self).into_iter().zip(told(other)) {
+            if expected != found {
+                return Err(ConfigError::Fixed { field, expected, found });
+            }
+        }
+        Ok(())
+    }
+
     fn validate_numbers(&self) -> Result<(), ConfigError> {
         let (sampling, costs, recovery) = (&self.sampling, &self.costs, &self.recovery);
         let step = ("a time from 0.01 to 1 s", 0.01..=1.0);
@@ -283,7 +305,7 @@ fn check(allowed: bool, field: &'static str, expected: &'static str, found: f64)
     if allowed { Ok(()) } else { Err(ConfigError::Field { field, expected, found }) }
 }
 
-/// Why there is no controller.
+/// Why there is no controller, or why it does not change.
 #[derive(Debug, thiserror::Error)]
 pub enum ConfigError {
     /// A value is out of range.
@@ -312,6 +334,16 @@ pub enum ConfigError {
         found: usize,
         /// Length of a step [s].
         step_s: f64,
+    },
+    /// What a running controller cannot change.
+    #[error("{field}: expected {expected} as before, found {found}; for another one, make a new controller")]
+    Fixed {
+        /// Path of the field, or what it is about.
+        field: &'static str,
+        /// What the controller was made with.
+        expected: String,
+        /// What was asked for.
+        found: String,
     },
     /// The system refused a thread.
     #[error("n_threads: the system refused a thread: {0}")]

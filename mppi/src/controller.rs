@@ -1,16 +1,18 @@
 //! The controller: one decision per cycle.
 
+mod settings;
 mod steps;
 #[cfg(test)]
 mod tests;
 
 use crate::chunk::Chunk;
-use crate::config::{Actuation, Config, ConfigError};
+use crate::config::{Config, ConfigError};
+use crate::cost::{Future, RolloutCost, StepCost};
 use crate::diagnostics::Diagnostics;
+use crate::driven::Driven;
 use crate::judgement::Judge;
 use crate::kernel::workers::Workers;
 use crate::kernel::{CHUNK, functions};
-use crate::lag;
 use crate::ledger::Ledger;
 use crate::objective::{Input, ReferenceStep};
 use crate::plan::Plan;
@@ -20,13 +22,13 @@ use crate::rollout::MAX_SLOTS;
 use crate::sampling::Control;
 use crate::summary::Totals;
 use crate::weights::WeightSummary;
-use bicycle::lanes::{Instructions, STEERING_DOMAIN_RAD};
-use bicycle::{Command, Decision, Effect, HoldReason, Model, State, Stepper, StopReason};
+use bicycle::lanes::Instructions;
+use bicycle::{
+    Decision, HoldReason, Model, MotionCommand, MotionLimits, MotionState, MotionStepper, StopReason,
+};
+use settings::Prepared;
 use traversability::RiskMapView;
 
-/// Share of the tyres' grip that a plan may ask for: beyond it they slide, and what they then do no model foretells well.
-const GRIP_SHARE: f64 = 0.75;
-const GRAVITY_MPS2: f64 = 9.81;
 /// A cycle that took more of the model's steps than this tells nothing of a single one.
 const LONGEST_STEPS: f64 = 3.0;
 /// Most rollouts that are judged when the plan breaks a limit. Those that the rollouts themselves call feasible come
@@ -46,12 +48,16 @@ pub enum Phase {
 
 /// Model predictive path integral control (Williams et al. 2017) over a risk map.
 ///
+/// The model decides what a command is: speed and steering angle of the bicycle, [`bicycle::Model`], speed and yaw rate
+/// of the [`bicycle::SkidSteer`]. Its equations become part of the rollouts' inner loop when the program is compiled.
+///
 /// Each cycle: shift the plan, predict the start, then sample, roll out, weigh and average; then judge the plan.
 /// A decision is a function of the inputs since [`Controller::new`] or [`Controller::reset`], the configuration and
 /// the seed, bit for bit, for any number of threads.
-pub struct Controller {
+pub struct Controller<M: Driven = Model, S = (), R = ()> {
     pub(crate) config: Config,
-    pub(crate) model: Model,
+    model: M,
+    pub(crate) limits: MotionLimits,
     seed: u64,
     instructions: Instructions,
     workers: Workers,
@@ -61,18 +67,16 @@ pub struct Controller {
     pub(crate) plan: Plan,
     ranking: Ranking,
     /// The model with lengths in metres, for judging.
-    pub(crate) stepper: Stepper,
+    pub(crate) stepper: M::Stepper,
     /// The model with lengths in cells, for the rollouts.
-    cell_stepper: Stepper,
-    ledger: Ledger,
+    cell_stepper: M::Stepper,
+    ledger: Ledger<M::Command>,
     /// Accelerations that the effects hold against the forces that the vehicle met [m/s2].
     held_mps2: Vec<f64>,
     /// Where the step began that is being driven.
-    before: Option<State>,
+    before: Option<MotionState>,
     watch: Watch,
-    /// Largest lateral acceleration that a plan may ask for [m/s2].
-    lateral_max_mps2: f64,
-    /// How far the model's effects keep speed and steering behind the commands [s].
+    /// How far the model's effects and lags keep its actuators behind the commands [s].
     lag_s: [f64; 2],
     reference: Vec<ReferenceStep>,
     /// Whether there is no plan yet.
@@ -80,30 +84,41 @@ pub struct Controller {
     /// What the effects remember at the start of the rollouts.
     pub(crate) slots: [f32; MAX_SLOTS],
     /// Where the last rollouts started.
-    pub(crate) start: State,
+    pub(crate) start: MotionState,
     temperature_s: f32,
     diagnostics: Diagnostics,
+    step_cost: S,
+    rollout_cost: R,
+    /// Room for what whole rollouts cost.
+    futures: Vec<Future>,
+    added_s: Vec<f32>,
 }
 
-impl Controller {
+impl<M: Driven> Controller<M> {
     /// A controller of `model`, with its threads and all memory that it will ever use.
     ///
     /// # Errors
     /// A configuration or model out of range, an instruction set that the machine lacks, or a refused thread.
-    pub fn new(config: Config, model: Model, seed: u64) -> Result<Self, ConfigError> {
+    pub fn new(config: Config, model: M, seed: u64) -> Result<Self, ConfigError> {
+        Self::with_costs(config, model, ((), ()), seed)
+    }
+}
+
+impl<M: Driven, S: StepCost, R: RolloutCost> Controller<M, S, R> {
+    /// [`Controller::new`] with costs of one's own: of every step, and of whole rollouts.
+    ///
+    /// # Errors
+    /// As [`Controller::new`].
+    pub fn with_costs(
+        config: Config,
+        model: M,
+        (step_cost, rollout_cost): (S, R),
+        seed: u64,
+    ) -> Result<Self, ConfigError> {
         config.validate()?;
         model.validate()?;
         let instructions = Instructions::find(config.isa)?;
-        let stepper = Stepper::new(&model, config.step_s, 1.0);
-        let stepper = match config.actuation {
-            Actuation::Instant => stepper.with_instant_actuators(),
-            Actuation::Limited => stepper,
-        };
-        let n_slots = stepper.n_slots();
-        if n_slots > MAX_SLOTS {
-            return Err(ConfigError::EffectMemory { found: n_slots, step_s: config.step_s });
-        }
-        let lag_s = lag::of_actuators(&stepper, &model.limits, config.step_s);
+        let Prepared { limits, stepper, lag_s } = Prepared::new(&config, &model)?;
         let reach_s = config.delay_s + LONGEST_STEPS * config.step_s + stepper.past_s();
         let ledger = Ledger::new(reach_s, config.period_min_s);
         let n_chunks = config.n_rollouts / CHUNK;
@@ -120,14 +135,18 @@ impl Controller {
             before: None,
             watch: Watch::new(config.recovery),
             lag_s,
-            lateral_max_mps2: lateral_max_mps2(&model),
             reference: vec![ReferenceStep::default(); config.n_steps],
             is_fresh: true,
             slots: [0.0; MAX_SLOTS],
-            start: State::default(),
+            start: MotionState::default(),
             temperature_s: 1.0,
             diagnostics: Diagnostics::new(instructions.isa()),
+            futures: vec![Future::default(); if R::IS_NOTHING { 0 } else { config.n_rollouts }],
+            added_s: vec![0.0; if R::IS_NOTHING { 0 } else { config.n_rollouts }],
+            step_cost,
+            rollout_cost,
             config,
+            limits,
             model,
             seed,
             instructions,
@@ -160,6 +179,16 @@ impl Controller {
         &self.diagnostics
     }
 
+    /// The cost of every step, to be changed between decisions.
+    pub fn step_cost_mut(&mut self) -> &mut S {
+        &mut self.step_cost
+    }
+
+    /// The cost of whole rollouts, to be changed between decisions.
+    pub fn rollout_cost_mut(&mut self) -> &mut R {
+        &mut self.rollout_cost
+    }
+
     /// The configuration.
     pub fn config(&self) -> &Config {
         &self.config
@@ -169,13 +198,18 @@ impl Controller {
     ///
     /// Takes it that the vehicle is told [`Decision::command`] of the result; where it is told something else, say so
     /// with [`Controller::note_sent`].
-    pub fn decide(&mut self, input: &Input<'_>) -> Decision {
+    pub fn decide(&mut self, input: &Input<'_, M::State>) -> Decision<M::Command> {
         self.decide_observed(input, |_| ())
     }
 
     /// [`Controller::decide`], telling `observe` at the end of every phase which one it was; with several iterations
     /// each phase ends once per iteration. Cycles that do not sample tell nothing.
-    pub fn decide_observed(&mut self, input: &Input<'_>, mut observe: impl FnMut(Phase)) -> Decision {
+    pub fn decide_observed(
+        &mut self,
+        input: &Input<'_, M::State>,
+        mut observe: impl FnMut(Phase),
+    ) -> Decision<M::Command> {
+        let input = &input.in_shared_terms();
         if let Some(decision) = self.reason_not_to_plan(input) {
             self.stand_by(&decision, input.elapsed_s);
             return decision;
@@ -192,7 +226,7 @@ impl Controller {
 
     /// A cycle that somebody else decides, `elapsed_s` after the cycle before: time passes and the vehicle is told what
     /// that decision says. The next plan starts from there, with nothing of the last one.
-    pub fn stand_by(&mut self, decision: &Decision, elapsed_s: f64) {
+    pub fn stand_by(&mut self, decision: &Decision<M::Command>, elapsed_s: f64) {
         self.ledger.pass(elapsed_s);
         self.send(decision);
         self.is_fresh = true;
@@ -203,7 +237,7 @@ impl Controller {
     /// What the vehicle was really told from `after_s` after the last cycle on, or before it where that is negative, whatever
     /// has been decided since: whoever stands between controller and vehicle has changed it. While it does something else
     /// than it is told it is not stuck. Numbers that are not finite are no command and change nothing.
-    pub fn note_sent(&mut self, sent: Command, after_s: f64) {
+    pub fn note_sent(&mut self, sent: M::Command, after_s: f64) {
         if is_finite(sent, after_s) {
             self.ledger.replace(after_s, sent);
             self.watch.reset();
@@ -212,7 +246,7 @@ impl Controller {
 
     /// What the vehicle says that it has been following since `after_s` after the last cycle, where it is not what was
     /// decided last before: it follows again, or one before was lost. What was decided later is still on its way.
-    pub fn note_followed(&mut self, followed: Command, after_s: f64) {
+    pub fn note_followed(&mut self, followed: M::Command, after_s: f64) {
         if is_finite(followed, after_s) {
             self.ledger.resume(after_s, followed);
         }
@@ -227,18 +261,18 @@ impl Controller {
         });
         self.before = self.before.map(|before| {
             let [x_m, y_m, yaw_rad] = carry([before.x_m, before.y_m, before.yaw_rad]);
-            State { x_m, y_m, yaw_rad, ..before }
+            MotionState { x_m, y_m, yaw_rad, ..before }
         });
     }
 
-    fn send(&mut self, decision: &Decision) {
+    fn send(&mut self, decision: &Decision<M::Command>) {
         let last = self.ledger.last().unwrap_or_default();
         self.ledger.send(decision.command(last));
     }
 
-    fn reason_not_to_plan(&self, input: &Input<'_>) -> Option<Decision> {
-        let State { x_m, y_m, yaw_rad, speed_mps, steering_rad } = input.state;
-        let numbers = [x_m, y_m, yaw_rad, speed_mps, steering_rad, input.elapsed_s];
+    fn reason_not_to_plan(&self, input: &Input<'_, MotionState>) -> Option<Decision<M::Command>> {
+        let MotionState { x_m, y_m, yaw_rad, speed_mps, turn } = input.state;
+        let numbers = [x_m, y_m, yaw_rad, speed_mps, turn, input.elapsed_s];
         let Some((end_m, tolerance_m)) = input.objective.end() else {
             return Some(Decision::Stop(StopReason::NonFiniteInput));
         };
@@ -256,17 +290,21 @@ impl Controller {
     }
 
     /// A cycle that samples.
-    fn plan_cycle(&mut self, input: &Input<'_>, observe: &mut impl FnMut(Phase)) -> Decision {
+    fn plan_cycle(
+        &mut self,
+        input: &Input<'_, MotionState>,
+        observe: &mut impl FnMut(Phase),
+    ) -> Decision<M::Command> {
         self.plan.shift(input.elapsed_s / self.config.step_s);
         let mode = self.watch.observe(&input.state, input.elapsed_s);
         self.follow_held(input);
         self.recall_slots(input.state, self.config.delay_s);
         self.start = self.predict_start(input);
         // No model steps from farther: what is measured may exceed what the wheels can do.
-        self.start.steering_rad = self.start.steering_rad.clamp(-STEERING_DOMAIN_RAD, STEERING_DOMAIN_RAD);
+        self.start.turn = self.start.turn.clamp(-self.limits.turn_domain, self.limits.turn_domain);
         self.recall_slots(self.start, 0.0);
         if std::mem::take(&mut self.is_fresh) {
-            self.plan.hold([self.start.speed_mps as f32, self.start.steering_rad as f32]);
+            self.plan.hold(steps::as_control(&self.start));
         }
         self.cell_stepper.rescale(input.map.geometry.resolution_m);
         let task = self.task(input, mode);
@@ -277,6 +315,7 @@ impl Controller {
             self.sample(functions::key(self.seed, number), mode);
             observe(Phase::Noise);
             self.roll_out(input, task);
+            self.add_rollout_cost(input);
             observe(Phase::Rollout);
             summary = self.weigh();
             self.average(&summary);
@@ -312,7 +351,7 @@ impl Controller {
     }
 
     /// The plan's first command, if the plan may be driven; else that of the best rollout that may.
-    fn judge(&mut self, input: &Input<'_>, summary: &WeightSummary) -> Decision {
+    fn judge(&mut self, input: &Input<'_, MotionState>, summary: &WeightSummary) -> Decision<M::Command> {
         let finite = self.plan.nominal.iter().flatten().all(|value| value.is_finite());
         if summary.n_non_finite == self.n_rollouts() || !finite {
             self.is_fresh = true;
@@ -320,18 +359,18 @@ impl Controller {
         }
         if !self.may_drive(input, self.plan.nominal.iter().copied()) {
             let Some((chunk, lane)) = self.best_that_may_be_driven(input) else {
-                self.plan.stop();
+                self.plan.hold(M::Command::from(self.plan.nominal[0]).at_standstill().into());
                 return Decision::Stop(StopReason::NoFeasibleRollout);
             };
             let controls = self.chunks[chunk].controls_of(lane);
             self.plan.nominal.iter_mut().zip(controls).for_each(|(nominal, control)| *nominal = control);
             self.diagnostics.is_best_alone = true;
         }
-        Decision::Drive(self.plan.command(0))
+        Decision::Drive(self.plan.nominal[0].into())
     }
 
     /// Chunk and lane of the first rollout in the order of [`Ranking`] that may be driven.
-    fn best_that_may_be_driven(&mut self, input: &Input<'_>) -> Option<(usize, usize)> {
+    fn best_that_may_be_driven(&mut self, input: &Input<'_, MotionState>) -> Option<(usize, usize)> {
         let mut ranking = std::mem::take(&mut self.ranking);
         let best = ranking
             .first(MOST_JUDGED, &self.chunks[..self.n_used])
@@ -341,39 +380,37 @@ impl Controller {
     }
 
     /// Whether controls keep the limits of attitude for as long as the vehicle would need to stop.
-    fn may_drive(&self, input: &Input<'_>, controls: impl Iterator<Item = Control> + Clone) -> bool {
-        let judge = Judge { stepper: &self.stepper, limits: &self.model.limits, map: input.map };
+    fn may_drive(
+        &self,
+        input: &Input<'_, MotionState>,
+        controls: impl Iterator<Item = Control> + Clone,
+    ) -> bool {
+        let judge = self.judge_over(input.map);
         let n_steps = self.steps_to_stop(controls.clone().next().unwrap_or_default());
         let mut memory = self.slots.map(f64::from);
         !judge.breaks_limits(&self.start, controls.take(n_steps), &mut memory)
     }
 
+    /// The reference model over a map.
+    pub(crate) fn judge_over<'a>(&'a self, map: RiskMapView<'a>) -> Judge<'a, M::Stepper> {
+        Judge { stepper: &self.stepper, limits: &self.limits, map }
+    }
+
     /// Steps in which the vehicle could stop, one to spare, from the faster of its speed and the one asked for.
     fn steps_to_stop(&self, [speed_mps, _]: Control) -> usize {
         let speed_mps = self.start.speed_mps.abs().max(f64::from(speed_mps.abs()));
-        let stop_s = speed_mps / self.model.limits.acceleration_max_mps2 + self.lag_s[0];
+        let stop_s = speed_mps / self.limits.rates[0] + self.lag_s[0];
         ((stop_s / self.config.step_s).ceil() as usize + 1).min(self.config.n_steps)
     }
 }
 
-fn is_finite(command: Command, after_s: f64) -> bool {
-    command.speed_mps.is_finite() && command.steering_rad.is_finite() && after_s.is_finite()
+fn is_finite(command: impl Into<Control>, after_s: f64) -> bool {
+    command.into().iter().all(|channel| channel.is_finite()) && after_s.is_finite()
 }
 
-/// The limit of lateral acceleration, or what is safe on tyres whose grip the model knows, if that is less [m/s2].
-fn lateral_max_mps2(model: &Model) -> f64 {
-    let safe = |effect: &Effect| match effect {
-        Effect::Friction(friction) => GRIP_SHARE * friction.mu * GRAVITY_MPS2,
-        _ => f64::INFINITY,
-    };
-    model.effects.iter().map(safe).fold(model.limits.lateral_acceleration_max_mps2, f64::min)
-}
-
-/// Whether the arrays have the shape that the geometry says.
+/// Whether there is anything in the map, and no more than a lane's index counts.
 fn is_usable(map: &RiskMapView<'_>) -> bool {
-    let n_cells = map.geometry.n_cells();
     let resolution_m = map.geometry.resolution_m;
     let indexable = i32::try_from(map.risks.len()).is_ok();
-    let shaped = map.risks.len() == n_cells * map.n_yaws && map.ground.len() == n_cells;
-    !map.risks.is_empty() && shaped && indexable && resolution_m.is_finite() && resolution_m > 0.0
+    !map.risks.is_empty() && indexable && resolution_m.is_finite() && resolution_m > 0.0
 }

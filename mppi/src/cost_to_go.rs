@@ -8,7 +8,7 @@
 mod buckets;
 mod stencil;
 
-use bicycle::Limits;
+use bicycle::MotionLimits;
 use buckets::BucketQueue;
 use serde::{Deserialize, Serialize};
 use stencil::{EDGES, Edge};
@@ -147,11 +147,12 @@ impl CostToGo {
     /// A configuration or limit out of range, or a window without a cell inside its border.
     pub fn new(
         config: CostToGoConfig,
-        limits: &Limits,
+        limits: impl Into<MotionLimits>,
         n_rows: usize,
         n_cols: usize,
     ) -> Result<Self, CostToGoError> {
-        validate(&config, limits)?;
+        let limits = limits.into();
+        validate(&config, &limits)?;
         if n_rows < 3 || n_cols < 3 {
             return Err(CostToGoError::WindowTooSmall { n_rows, n_cols });
         }
@@ -162,7 +163,7 @@ impl CostToGo {
         let n_buckets = longest_edge.max(seed_spread) as usize + 3;
         Ok(Self {
             config,
-            speed_max_mps: limits.speed_max_mps as f32,
+            speed_max_mps: limits.high[0] as f32,
             roll_max_rad: limits.roll_max_rad as f32,
             pitch_max_rad: limits.pitch_max_rad as f32,
             n_rows,
@@ -208,12 +209,7 @@ impl CostToGo {
 
     fn check_shape(&self, map: &RiskMapView<'_>) -> Result<(), CostToGoError> {
         let GridGeometry { n_rows, n_cols, .. } = map.geometry;
-        let n_cells = self.n_rows * self.n_cols;
-        let fits = (n_rows, n_cols) == (self.n_rows, self.n_cols)
-            && map.ground.len() == n_cells
-            && map.n_yaws > 0
-            && map.risks.len() == n_cells * map.n_yaws;
-        if fits {
+        if (n_rows, n_cols) == (self.n_rows, self.n_cols) && map.n_yaws > 0 {
             return Ok(());
         }
         Err(CostToGoError::MapShape {
@@ -380,7 +376,7 @@ impl CostToGoView<'_> {
     }
 }
 
-fn validate(config: &CostToGoConfig, limits: &Limits) -> Result<(), CostToGoError> {
+fn validate(config: &CostToGoConfig, limits: &MotionLimits) -> Result<(), CostToGoError> {
     let check = |field, found: f64, expected, allowed: bool| {
         if allowed { Ok(()) } else { Err(CostToGoError::Config { field, expected, found }) }
     };
@@ -392,7 +388,7 @@ fn validate(config: &CostToGoConfig, limits: &Limits) -> Result<(), CostToGoErro
     share("outside_speed_share", config.outside_speed_share)?;
     let slowdown = config.forbidden_slowdown;
     check("forbidden_slowdown", slowdown, "a number from 1 to 10000", (1.0..=1e4).contains(&slowdown))?;
-    positive("limits.speed_max_mps", limits.speed_max_mps)?;
+    positive("limits.speed_max_mps", limits.high[0])?;
     positive("limits.roll_max_rad", limits.roll_max_rad)?;
     positive("limits.pitch_max_rad", limits.pitch_max_rad)
 }

@@ -20,14 +20,23 @@ pub enum CostTerm {
     Control,
     /// What is left at the end of the horizon.
     Terminal,
+    /// What costs of one's own come to, see [`crate::StepCost`] and [`crate::RolloutCost`].
+    Added,
 }
 
 impl CostTerm {
     /// Number of terms.
-    pub const COUNT: usize = 6;
+    pub const COUNT: usize = 7;
     /// All terms in the order of [`Diagnostics::best_terms_s`].
-    pub const ALL: [Self; Self::COUNT] =
-        [Self::Running, Self::Attitude, Self::Lateral, Self::Reverse, Self::Control, Self::Terminal];
+    pub const ALL: [Self; Self::COUNT] = [
+        Self::Running,
+        Self::Attitude,
+        Self::Lateral,
+        Self::Reverse,
+        Self::Control,
+        Self::Terminal,
+        Self::Added,
+    ];
 }
 
 /// What happened in the last cycle that sampled; of several iterations, in the last.

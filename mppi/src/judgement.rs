@@ -4,20 +4,26 @@
 //! beyond the goal: a vehicle that arrives has yet to stop.
 
 use crate::sampling::Control;
-use bicycle::{Command, GroundSample, Limits, State, Stepper};
+use bicycle::{GroundSample, MotionLimits, MotionState, MotionStepper};
 use traversability::{Risk, RiskMapView};
 
 /// Rolls single control sequences over the map with the reference model.
-pub(crate) struct Judge<'a> {
+pub(crate) struct Judge<'a, S> {
     /// The model in metres.
-    pub(crate) stepper: &'a Stepper,
-    pub(crate) limits: &'a Limits,
+    pub(crate) stepper: &'a S,
+    pub(crate) limits: &'a MotionLimits,
     pub(crate) map: RiskMapView<'a>,
 }
 
-impl Judge<'_> {
+impl<S: MotionStepper> Judge<'_, S> {
     /// The state after one step.
-    pub(crate) fn step(&self, state: &State, command: Command, memory: &mut [f64], t: usize) -> State {
+    pub(crate) fn step(
+        &self,
+        state: &MotionState,
+        command: Control,
+        memory: &mut [f64],
+        t: usize,
+    ) -> MotionState {
         self.step_on(self.risk(state), state, command, (memory, t))
     }
 
@@ -25,10 +31,10 @@ impl Judge<'_> {
     fn step_on(
         &self,
         risk: Risk,
-        state: &State,
-        command: Command,
+        state: &MotionState,
+        command: Control,
         (memory, t): (&mut [f64], usize),
-    ) -> State {
+    ) -> MotionState {
         let mut sample = GroundSample {
             linear_traction: f64::from(risk.linear_traction),
             angular_traction: f64::from(risk.angular_traction),
@@ -40,10 +46,10 @@ impl Judge<'_> {
             sample.gradient = ground.gradient.map(f64::from);
             sample.class = f64::from(ground.class);
         }
-        self.stepper.step_state(state, command, &sample, memory, t)
+        self.stepper.step_one(state, command, &sample, memory, t)
     }
 
-    fn risk(&self, state: &State) -> Risk {
+    fn risk(&self, state: &MotionState) -> Risk {
         self.map.risk_at(state.x_m, state.y_m, state.yaw_rad)
     }
 
@@ -51,15 +57,15 @@ impl Judge<'_> {
     /// poses count only when they are worse than where it stands.
     pub(crate) fn breaks_limits(
         &self,
-        start: &State,
+        start: &MotionState,
         controls: impl Iterator<Item = Control>,
         memory: &mut [f64],
     ) -> bool {
         let start_risk = self.risk(start);
         let mut is_leaving = self.is_tilted(start_risk);
         let (mut state, mut risk) = (*start, start_risk);
-        for (t, [speed_mps, steering_rad]) in controls.enumerate() {
-            state = self.step_on(risk, &state, Command { speed_mps, steering_rad }, (&mut *memory, t));
+        for (t, control) in controls.enumerate() {
+            state = self.step_on(risk, &state, control, (&mut *memory, t));
             risk = self.risk(&state);
             let is_no_worse = risk.roll_rad <= start_risk.roll_rad && risk.pitch_rad <= start_risk.pitch_rad;
             if self.is_tilted(risk) && !(is_leaving && is_no_worse) {
@@ -71,14 +77,14 @@ impl Judge<'_> {
     }
 
     /// |roll| and |pitch| where the vehicle stands, if beyond a limit [rad].
-    pub(crate) fn tilt(&self, state: &State) -> Option<[f64; 2]> {
+    pub(crate) fn tilt(&self, state: &MotionState) -> Option<[f64; 2]> {
         let risk = self.risk(state);
         self.is_tilted(risk).then(|| [risk.roll_rad, risk.pitch_rad].map(f64::from))
     }
 
     /// A number that is not finite is beyond every limit.
     fn is_tilted(&self, risk: Risk) -> bool {
-        let Limits { roll_max_rad, pitch_max_rad, .. } = *self.limits;
+        let MotionLimits { roll_max_rad, pitch_max_rad, .. } = *self.limits;
         let within = risk.roll_rad <= roll_max_rad as f32 && risk.pitch_rad <= pitch_max_rad as f32;
         !within
     }

@@ -120,7 +120,8 @@ impl<K: Kernel, W: Work> pulp::NullaryFnOnce for Vectorized<K, W> {
     }
 }
 
-/// Runs the work with these instructions.
+/// Runs the work with these instructions. Work that does not depend on the model has a function of its own that calls
+/// this, so that its loops are compiled in this crate and once.
 #[inline]
 pub(crate) fn run<W: Work>(instructions: Instructions, work: W) -> W::Output {
     match instructions {

@@ -1,28 +1,26 @@
 //! How far the effects of a model keep its actuators behind the commands.
 
-use bicycle::{Command, GroundSample, Limits, State, Stepper};
+use bicycle::{Extent, GroundSample, MotionState, MotionStepper};
 
 /// Length of the ramp that the lag is read from, and hence the longest lag that is found [s].
 const RAMP_S: f64 = 1.0;
 
-/// Time by which speed and steering angle stay behind commands that have risen for a second as fast as the limits
-/// allow, on firm ground [s]; zero for a model without effects. The stepper's unit must be 1 m.
-pub(crate) fn of_actuators(stepper: &Stepper, limits: &Limits, step_s: f64) -> [f64; 2] {
-    if !stepper.has_effects() {
+/// Time by which the two actuators stay behind commands that have risen for a second as fast as the limits allow, so much
+/// a second, on firm ground [s]; zero for a model without effects or lags. The stepper's unit must be 1 m.
+pub(crate) fn of_actuators<S: MotionStepper>(stepper: &S, rates: [f64; 2], step_s: f64) -> [f64; 2] {
+    if stepper.extent() != Extent::Whole {
         return [0.0; 2];
     }
-    let rates = [limits.acceleration_max_mps2, limits.steering_rate_max_radps];
     let n_steps = (RAMP_S / step_s).ceil() as usize;
     let mut memory = vec![0.0; stepper.n_slots()];
-    stepper.settle(Command::default(), &mut memory);
-    let (mut state, mut command) = (State::default(), [0.0; 2]);
+    stepper.recall(&|_| [0.0; 2], &mut memory);
+    let (mut state, mut command) = (MotionState::default(), [0.0; 2]);
     for t in 0..n_steps {
         command = rates.map(|rate| rate * step_s * (t + 1) as f64);
-        let [speed_mps, steering_rad] = command.map(|value| value as f32);
-        let asked = Command { speed_mps, steering_rad };
-        state = stepper.step_state(&state, asked, &GroundSample::FIRM, &mut memory, t);
+        let asked = command.map(|value| value as f32);
+        state = stepper.step_one(&state, asked, &GroundSample::FIRM, &mut memory, t);
     }
-    let behind = [command[0] - state.speed_mps, command[1] - state.steering_rad];
+    let behind = [command[0] - state.speed_mps, command[1] - state.turn];
     [0, 1].map(|c| (behind[c] / rates[c]).clamp(0.0, RAMP_S))
 }
 
@@ -30,7 +28,7 @@ pub(crate) fn of_actuators(stepper: &Stepper, limits: &Limits, step_s: f64) -> [
 mod tests {
     use super::*;
     use bicycle::effect::{SpeedLag, SpeedLoop, SteerDelay, SteerLag};
-    use bicycle::{Effect, Model};
+    use bicycle::{Effect, Limits, Model, Stepper};
 
     const STEP_S: f64 = 0.1;
 
@@ -45,8 +43,9 @@ mod tests {
             roll_max_rad: 0.5,
             pitch_max_rad: 0.5,
         };
+        let rates = [limits.acceleration_max_mps2, limits.steering_rate_max_radps];
         let model = Model { wheelbase_m: 2.0, limits, effects };
-        of_actuators(&Stepper::new(&model, STEP_S, 1.0), &limits, STEP_S)
+        of_actuators(&Stepper::new(&model, STEP_S, 1.0), rates, STEP_S)
     }
 
     #[test]

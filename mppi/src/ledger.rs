@@ -1,13 +1,12 @@
 //! What went to the vehicle and when, whoever decided it, as far back as delays reach.
 
-use bicycle::Command;
 use std::collections::VecDeque;
 
 /// Past commands with the times of their sending, in memory that is taken once.
 #[derive(Clone, Debug)]
-pub(crate) struct Ledger {
+pub(crate) struct Ledger<C> {
     /// Oldest first.
-    sent: VecDeque<Sent>,
+    sent: VecDeque<Sent<C>>,
     n_most: usize,
     /// What is sent sooner than this after another takes its place [s].
     apart_s: f64,
@@ -15,12 +14,12 @@ pub(crate) struct Ledger {
 }
 
 #[derive(Clone, Copy, Debug)]
-struct Sent {
+struct Sent<C> {
     at_s: f64,
-    command: Command,
+    command: C,
 }
 
-impl Ledger {
+impl<C: Copy + PartialEq> Ledger<C> {
     /// Commands of the last `reach_s`, one every `period_s` or more seldom. Commands that follow each other in less than
     /// half of that count as one, the later.
     pub(crate) fn new(reach_s: f64, period_s: f64) -> Self {
@@ -41,13 +40,13 @@ impl Ledger {
     }
 
     /// A command is sent now.
-    pub(crate) fn send(&mut self, command: Command) {
+    pub(crate) fn send(&mut self, command: C) {
         self.put(self.now_s, command);
     }
 
     /// From `after_s` after now on something else went out than what was noted as sent since. Before the first command
     /// nothing is known.
-    pub(crate) fn replace(&mut self, after_s: f64, command: Command) {
+    pub(crate) fn replace(&mut self, after_s: f64, command: C) {
         let at_s = self.now_s + after_s;
         while self.sent.back().is_some_and(|last| last.at_s >= at_s) {
             self.sent.pop_back();
@@ -56,20 +55,20 @@ impl Ledger {
     }
 
     /// From `after_s` after now on this went out, unless another was sent later.
-    pub(crate) fn resume(&mut self, after_s: f64, command: Command) {
+    pub(crate) fn resume(&mut self, after_s: f64, command: C) {
         let at_s = self.now_s + after_s;
         if self.sent.back().is_none_or(|last| last.at_s <= at_s) {
             self.change(at_s, command);
         }
     }
 
-    fn change(&mut self, at_s: f64, command: Command) {
+    fn change(&mut self, at_s: f64, command: C) {
         if self.last() != Some(command) {
             self.put(at_s, command);
         }
     }
 
-    fn put(&mut self, at_s: f64, command: Command) {
+    fn put(&mut self, at_s: f64, command: C) {
         if let Some(last) = self.sent.back_mut().filter(|last| at_s - last.at_s < self.apart_s) {
             last.command = command;
             return;
@@ -81,12 +80,12 @@ impl Ledger {
     }
 
     /// The last command.
-    pub(crate) fn last(&self) -> Option<Command> {
+    pub(crate) fn last(&self) -> Option<C> {
         self.sent.back().map(|sent| sent.command)
     }
 
     /// The command in force `age_s` ago; before the first, the first; before any, none.
-    pub(crate) fn at(&self, age_s: f64) -> Option<Command> {
+    pub(crate) fn at(&self, age_s: f64) -> Option<C> {
         let n_sent = self.sent.partition_point(|sent| self.now_s - sent.at_s >= age_s);
         self.sent.get(n_sent.saturating_sub(1)).map(|sent| sent.command)
     }
@@ -95,6 +94,7 @@ impl Ledger {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use bicycle::Command;
     use rand::{RngExt, SeedableRng};
     use rand_xoshiro::Xoshiro256PlusPlus;
 
@@ -121,7 +121,7 @@ mod tests {
     #[test]
     fn what_went_out_instead_is_in_force_from_its_time_until_another_is_sent() {
         let mut ledger = Ledger::new(3.0, 0.02);
-        let sent = |ledger: &Ledger, age_s: f64| ledger.at(age_s).map(|command| command.speed_mps);
+        let sent = |ledger: &Ledger<Command>, age_s: f64| ledger.at(age_s).map(|command| command.speed_mps);
         for speed_mps in [1.0, 2.0, 3.0] {
             ledger.pass(0.1);
             ledger.send(command(speed_mps));

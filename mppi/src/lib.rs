@@ -4,7 +4,9 @@
 //!
 //! A [`Controller`] takes an [`Input`] every cycle, state, risk map and [`Objective`], and gives a decision. It
 //! allocates nothing after its first cycle, and the decision is a function of the inputs, the [`Config`] and the seed,
-//! bit for bit, for any number of threads. [`CostToGo`] finds the least time to the goal over the same map.
+//! bit for bit, for any number of threads. The vehicle's model is a type, [`bicycle::Model`] unless another is given;
+//! costs of one's own plug in as [`StepCost`] and [`RolloutCost`]; settings may change between decisions, see
+//! [`Controller::set_config`]. [`CostToGo`] finds the least time to the goal over the same map.
 //! `examples/drive_constant_map.rs` drives a whole way.
 //!
 //! ```
@@ -41,8 +43,10 @@
 mod chunk;
 mod config;
 mod controller;
+mod cost;
 mod cost_to_go;
 mod diagnostics;
+mod driven;
 mod judgement;
 mod kernel;
 mod lag;
@@ -60,7 +64,9 @@ mod weights;
 pub use bicycle::lanes::Isa;
 pub use config::{Actuation, Config, ConfigError, Costs, Recovery, SampleSpace, Sampling, Temperature};
 pub use controller::{Controller, Phase};
+pub use cost::{Future, Place, RolloutCost, Step, StepCost};
 pub use cost_to_go::{CostToGo, CostToGoConfig, CostToGoError, CostToGoView, Neighbourhood};
 pub use diagnostics::{CostTerm, Diagnostics};
+pub use driven::Driven;
 pub use objective::{Input, Objective, ReferencePath, Terminal};
 pub use replay::Rollout;

@@ -2,15 +2,15 @@
 
 use crate::cost_to_go::CostToGoView;
 use crate::kernel::Kernel;
-use bicycle::State;
 use bicycle::lanes::Real;
+use bicycle::{MotionState, State};
 use traversability::{GridGeometry, RiskMapView};
 
 /// One cycle's input.
 #[derive(Clone, Copy, Debug)]
-pub struct Input<'a> {
-    /// Measured state.
-    pub state: State,
+pub struct Input<'a, S = State> {
+    /// Measured state, in the terms of the controller's model.
+    pub state: S,
     /// Time since the previous decision; 0 on the first [s].
     pub elapsed_s: f64,
     /// Risk and ground around the vehicle.
@@ -19,6 +19,14 @@ pub struct Input<'a> {
     pub objective: Objective<'a>,
     /// Number of the cycle; together with the seed it keys the noise.
     pub cycle: u64,
+}
+
+impl<'a, S: Copy + Into<MotionState>> Input<'a, S> {
+    /// The same with the state in the terms of all models.
+    pub(crate) fn in_shared_terms(&self) -> Input<'a, MotionState> {
+        let Self { state, elapsed_s, map, objective, cycle } = *self;
+        Input { state: state.into(), elapsed_s, map, objective, cycle }
+    }
 }
 
 /// What to do.

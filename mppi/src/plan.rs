@@ -3,7 +3,6 @@
 
 use crate::config::{Config, SampleSpace};
 use crate::sampling::{Control, SampleStep};
-use bicycle::Command;
 
 /// Nominal controls and the constants of their perturbation.
 #[derive(Clone, Debug)]
@@ -26,8 +25,8 @@ struct Noise {
     space: SampleSpace,
 }
 
-impl Plan {
-    pub(crate) fn new(config: &Config) -> Self {
+impl Noise {
+    fn new(config: &Config) -> Self {
         let sampling = &config.sampling;
         let per_step = match sampling.space {
             SampleSpace::Controls => 1.0,
@@ -39,31 +38,31 @@ impl Plan {
             0.0
         };
         Self {
+            std: [sampling.speed_std, sampling.steering_std].map(|std| std * per_step),
+            correlation,
+            space: sampling.space,
+        }
+    }
+}
+
+impl Plan {
+    pub(crate) fn new(config: &Config) -> Self {
+        Self {
             nominal: vec![[0.0; 2]; config.n_steps],
             steps: vec![SampleStep::default(); config.n_steps],
             scores: vec![[0.0; 2]; config.n_steps + 1],
-            noise: Noise {
-                std: [sampling.speed_std, sampling.steering_std].map(|std| std * per_step),
-                correlation,
-                space: sampling.space,
-            },
+            noise: Noise::new(config),
         }
     }
 
-    /// To standstill with the wheels as they are.
-    pub(crate) fn stop(&mut self) {
-        let steering_rad = self.nominal[0][1];
-        self.nominal.fill([0.0, steering_rad]);
+    /// Perturbs as another configuration says from now on.
+    pub(crate) fn set_noise(&mut self, config: &Config) {
+        self.noise = Noise::new(config);
     }
 
     /// The same control for the whole horizon.
     pub(crate) fn hold(&mut self, control: Control) {
         self.nominal.fill(control);
-    }
-
-    /// The command of a step.
-    pub(crate) fn command(&self, t: usize) -> Command {
-        Command { speed_mps: self.nominal[t][0], steering_rad: self.nominal[t][1] }
     }
 
     /// Lets `steps` steps, whole or not, pass; the last control is held.

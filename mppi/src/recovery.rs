@@ -3,7 +3,7 @@
 //! No clock: time comes in as the time between two decisions.
 
 use crate::config::Recovery;
-use bicycle::State;
+use bicycle::MotionState;
 
 /// What the controller should do.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -30,6 +30,11 @@ impl Watch {
         Self { config, mode: Mode::Onward, anchor_m: None, waited_s: 0.0 }
     }
 
+    /// Goes by another configuration from now on.
+    pub(crate) fn set(&mut self, config: Recovery) {
+        self.config = config;
+    }
+
     /// Forgets what was; to be called when the vehicle is not meant to move.
     pub(crate) fn reset(&mut self) {
         (self.mode, self.anchor_m, self.waited_s) = (Mode::Onward, None, 0.0);
@@ -44,7 +49,7 @@ impl Watch {
     }
 
     /// Looks at a vehicle that is meant to move.
-    pub(crate) fn observe(&mut self, state: &State, elapsed_s: f64) -> Mode {
+    pub(crate) fn observe(&mut self, state: &MotionState, elapsed_s: f64) -> Mode {
         let here_m = [state.x_m, state.y_m];
         let anchor_m = *self.anchor_m.get_or_insert(here_m);
         let moved_m = libm::hypot(here_m[0] - anchor_m[0], here_m[1] - anchor_m[1]);
@@ -78,8 +83,8 @@ mod tests {
 
     const CONFIG: Recovery = Recovery { patience_s: 3.0, progress_m: 0.5, distance_m: 1.0, duration_s: 2.0 };
 
-    fn at(x_m: f64) -> State {
-        State { x_m, ..State::default() }
+    fn at(x_m: f64) -> MotionState {
+        MotionState { x_m, ..MotionState::default() }
     }
 
     #[test]
@@ -105,14 +110,15 @@ mod tests {
     #[test]
     fn backing_up_aims_behind_the_vehicle_and_ends_with_the_distance() {
         let mut watch = Watch::new(CONFIG);
-        let standing = State { x_m: 2.0, yaw_rad: std::f64::consts::FRAC_PI_2, ..State::default() };
+        let standing =
+            MotionState { x_m: 2.0, yaw_rad: std::f64::consts::FRAC_PI_2, ..MotionState::default() };
         let mut mode = Mode::Onward;
         for _ in 0..32 {
             mode = watch.observe(&standing, 0.1);
         }
         let Mode::BackUp { target_m } = mode else { panic!("stuck for longer than the patience") };
         assert!((target_m[0] - 2.0).abs() < 1e-12 && (target_m[1] + 1.0).abs() < 1e-12);
-        let moved = State { y_m: -1.01, ..standing };
+        let moved = MotionState { y_m: -1.01, ..standing };
         assert_eq!(watch.observe(&moved, 0.1), Mode::Onward);
     }
 
@@ -124,10 +130,11 @@ mod tests {
             watch.observe(&at(2.0), 0.1);
         }
         watch.carry(|[x_m, y_m]| [-y_m, x_m + 100.0]);
-        let carried = State { y_m: 102.0, yaw_rad: std::f64::consts::FRAC_PI_2, ..State::default() };
+        let carried =
+            MotionState { y_m: 102.0, yaw_rad: std::f64::consts::FRAC_PI_2, ..MotionState::default() };
         let Mode::BackUp { target_m } = watch.observe(&carried, 0.1) else { panic!("not yet there") };
         assert!(target_m[0].abs() < 1e-12 && (target_m[1] - 101.0).abs() < 1e-12, "{target_m:?}");
-        assert_eq!(watch.observe(&State { y_m: 100.99, ..carried }, 0.1), Mode::Onward);
+        assert_eq!(watch.observe(&MotionState { y_m: 100.99, ..carried }, 0.1), Mode::Onward);
     }
 
     #[test]

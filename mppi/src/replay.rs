@@ -1,33 +1,34 @@
 //! Trajectories of the last decision, computed only when somebody asks.
 
 use crate::controller::Controller;
-use crate::judgement::Judge;
+use crate::cost::{RolloutCost, StepCost};
+use crate::driven::Driven;
 use crate::sampling::Control;
-use bicycle::{Command, State};
+use bicycle::{MotionState, State};
 use traversability::RiskMapView;
 
 /// One sampled future.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Rollout {
+pub struct Rollout<S = State> {
     /// Its cost [s].
     pub cost_s: f32,
     /// Its states, the start first.
-    pub states: Vec<State>,
+    pub states: Vec<S>,
 }
 
-impl Controller {
+impl<M: Driven, S: StepCost, R: RolloutCost> Controller<M, S, R> {
     /// The commands of the plan, one per step, the one just decided first.
-    pub fn plan(&self) -> impl ExactSizeIterator<Item = Command> + '_ {
-        self.plan.nominal.iter().map(|&[speed_mps, steering_rad]| Command { speed_mps, steering_rad })
+    pub fn plan(&self) -> impl ExactSizeIterator<Item = M::Command> + '_ {
+        self.plan.nominal.iter().copied().map(M::Command::from)
     }
 
     /// Where the plan leads over `map`, the predicted start first.
-    pub fn nominal_trajectory(&self, map: RiskMapView<'_>) -> Vec<State> {
+    pub fn nominal_trajectory(&self, map: RiskMapView<'_>) -> Vec<M::State> {
         self.trajectory(map, self.plan.nominal.iter().copied())
     }
 
     /// The `n` cheapest rollouts of the last cycle over `map`, the cheapest first.
-    pub fn best_rollouts(&self, n: usize, map: RiskMapView<'_>) -> Vec<Rollout> {
+    pub fn best_rollouts(&self, n: usize, map: RiskMapView<'_>) -> Vec<Rollout<M::State>> {
         let mut order: Vec<(f32, usize, usize)> = Vec::new();
         for (index, chunk) in self.chunks[..self.n_used].iter().enumerate() {
             order.extend(chunk.costs.0.iter().enumerate().map(|(lane, &cost_s)| (cost_s, index, lane)));
@@ -40,15 +41,14 @@ impl Controller {
         order.iter().take(n).map(rollout).collect()
     }
 
-    fn trajectory(&self, map: RiskMapView<'_>, controls: impl Iterator<Item = Control>) -> Vec<State> {
-        let judge = Judge { stepper: &self.stepper, limits: &self.model.limits, map };
+    fn trajectory(&self, map: RiskMapView<'_>, controls: impl Iterator<Item = Control>) -> Vec<M::State> {
+        let judge = self.judge_over(map);
         let mut memory = self.slots.map(f64::from);
-        let mut state = self.start;
-        let mut states = vec![state];
-        for (t, [speed_mps, steering_rad]) in controls.enumerate() {
-            state = judge.step(&state, Command { speed_mps, steering_rad }, &mut memory, t);
-            states.push(state);
-        }
-        states
+        let walk = |state: &mut MotionState, (t, control)| {
+            *state = judge.step(state, control, &mut memory, t);
+            Some(M::State::from(*state))
+        };
+        let led_to = controls.enumerate().scan(self.start, walk);
+        std::iter::once(self.start.into()).chain(led_to).collect()
     }
 }

@@ -7,23 +7,23 @@ mod motion;
 mod stage;
 
 use crate::chunk::Chunk;
+use crate::cost::{Frame, Place, Step, StepCost};
 use crate::diagnostics::CostTerm;
-use crate::kernel::{CHUNK, Kernel, Row, Work};
+use crate::kernel::{self, CHUNK, Kernel, Row, Work};
 use crate::objective::{ReferenceStep, TerminalField};
-use bicycle::lanes::Real;
-use bicycle::{GroundSample, LaneState, Stepper};
+use bicycle::lanes::{Instructions, Real};
+use bicycle::{Extent, GroundSample, LaneState, MotionStepper, Rates};
 use motion::{Bare, Leaving, Motion, Plain, Whole};
-use stage::{PathTask, Stage};
+use stage::{Lateral, PathTask, Reverse, Stage};
 use traversability::{Ground, Risk};
 
 /// Most numbers per rollout that the effects may carry from step to step.
 pub(crate) const MAX_SLOTS: usize = 64;
 
 /// Everything that all rollouts of an iteration share.
-#[derive(Clone, Copy)]
-pub(crate) struct Scene<'a> {
+pub(crate) struct Scene<'a, S, C> {
     /// The model in steps of the horizon, lengths in cells.
-    pub(crate) stepper: &'a Stepper,
+    pub(crate) stepper: &'a S,
     pub(crate) grid: Grid<'a>,
     pub(crate) start: Start,
     /// |roll| and |pitch| where the vehicle stands, if beyond a limit [rad]: it may leave.
@@ -32,6 +32,11 @@ pub(crate) struct Scene<'a> {
     pub(crate) slots: &'a [f32],
     pub(crate) prices: Prices,
     pub(crate) task: Task<'a>,
+    /// What the user adds to the cost of a step.
+    pub(crate) cost: &'a C,
+    pub(crate) frame: Frame,
+    /// Whether it is to be kept where rollouts end.
+    pub(crate) keeps_ends: bool,
 }
 
 /// The risk map in numbers of cells.
@@ -51,7 +56,8 @@ pub(crate) struct Start {
     pub(crate) y_cells: f64,
     pub(crate) turns: f64,
     pub(crate) speed_mps: f64,
-    pub(crate) steering_rad: f64,
+    /// Steering angle [rad] or yaw rate [rad/s].
+    pub(crate) turn: f64,
 }
 
 /// What things cost, and limits.
@@ -99,13 +105,26 @@ pub(crate) struct GoalTask<'a> {
     pub(crate) field: Option<TerminalField<'a>>,
 }
 
-/// Rolls out one chunk.
-pub(crate) struct RollOut<'a> {
-    pub(crate) scene: &'a Scene<'a>,
+/// One chunk to roll out, and on which instructions.
+pub struct Job<'a, S, C> {
+    pub(crate) instructions: Instructions,
+    pub(crate) scene: &'a Scene<'a, S, C>,
     pub(crate) chunk: &'a mut Chunk,
 }
 
-impl Work for RollOut<'_> {
+impl<S: MotionStepper, C: StepCost> Job<'_, S, C> {
+    pub(crate) fn run(self) {
+        kernel::run(self.instructions, RollOut { scene: self.scene, chunk: self.chunk });
+    }
+}
+
+/// Rolls out one chunk.
+pub(crate) struct RollOut<'a, S, C> {
+    pub(crate) scene: &'a Scene<'a, S, C>,
+    pub(crate) chunk: &'a mut Chunk,
+}
+
+impl<S: MotionStepper, C: StepCost> Work for RollOut<'_, S, C> {
     type Output = ();
     #[inline(always)]
     fn run<K: Kernel>(self, kernel: K) {
@@ -119,12 +138,18 @@ impl Work for RollOut<'_> {
 
 /// To a goal, with no more of a step than the model and the prices ask for.
 #[inline(always)]
-fn roll_to<K: Kernel>(kernel: K, scene: &Scene<'_>, goal: &GoalTask<'_>, chunk: &mut Chunk) {
-    let is_plain = !scene.stepper.has_effects() && scene.tilted_start.is_none();
-    if is_plain && scene.stepper.has_instant_actuators() && !scene.prices.has_manoeuvres() {
-        roll_chunk::<K, _, Bare>(kernel, scene, goal, chunk);
+fn roll_to<K: Kernel, P: MotionStepper, C: StepCost>(
+    kernel: K,
+    scene: &Scene<'_, P, C>,
+    goal: &GoalTask<'_>,
+    chunk: &mut Chunk,
+) {
+    let extent = scene.stepper.extent();
+    let is_plain = extent != Extent::Whole && scene.tilted_start.is_none();
+    if is_plain && extent == Extent::Bare && !scene.prices.has_manoeuvres() {
+        roll_chunk::<K, P, C, _, Bare>(kernel, scene, goal, chunk);
     } else if is_plain {
-        roll_chunk::<K, _, Plain>(kernel, scene, goal, chunk);
+        roll_chunk::<K, P, C, _, Plain>(kernel, scene, goal, chunk);
     } else {
         roll_along(kernel, scene, goal, chunk);
     }
@@ -132,19 +157,29 @@ fn roll_to<K: Kernel>(kernel: K, scene: &Scene<'_>, goal: &GoalTask<'_>, chunk: 
 
 /// Whatever the task and the model.
 #[inline(always)]
-fn roll_along<K: Kernel, S: Stage<K>>(kernel: K, scene: &Scene<'_>, stage: &S, chunk: &mut Chunk) {
+fn roll_along<K: Kernel, P: MotionStepper, C: StepCost, S: Stage<K>>(
+    kernel: K,
+    scene: &Scene<'_, P, C>,
+    stage: &S,
+    chunk: &mut Chunk,
+) {
     match scene.tilted_start {
-        None => roll_chunk::<K, S, Whole>(kernel, scene, stage, chunk),
-        Some(_) => roll_chunk::<K, S, Leaving>(kernel, scene, stage, chunk),
+        None => roll_chunk::<K, P, C, S, Whole>(kernel, scene, stage, chunk),
+        Some(_) => roll_chunk::<K, P, C, S, Leaving>(kernel, scene, stage, chunk),
     }
 }
 
 #[inline(always)]
-fn roll_chunk<K: Kernel, S: Stage<K>, M: Motion>(kernel: K, scene: &Scene<'_>, stage: &S, chunk: &mut Chunk) {
+fn roll_chunk<K: Kernel, P: MotionStepper, C: StepCost, S: Stage<K>, M: Motion>(
+    kernel: K,
+    scene: &Scene<'_, P, C>,
+    stage: &S,
+    chunk: &mut Chunk,
+) {
     if K::IN_FLIGHT == 2 {
-        roll_packs::<K, S, M, 2>(kernel, scene, stage, chunk);
+        roll_packs::<K, P, C, S, M, 2>(kernel, scene, stage, chunk);
     } else {
-        roll_packs::<K, S, M, 1>(kernel, scene, stage, chunk);
+        roll_packs::<K, P, C, S, M, 1>(kernel, scene, stage, chunk);
     }
 }
 
@@ -155,8 +190,6 @@ struct Flight<K: Kernel> {
     state: LaneState<K>,
     /// Where the goal is not reached yet.
     under_way: K::Mask,
-    /// Distance to the goal [cells], or nothing.
-    distance: Real<K>,
     running: Real<K>,
     /// Steps beyond a limit of attitude.
     n_tilted: Real<K>,
@@ -166,6 +199,8 @@ struct Flight<K: Kernel> {
     leaving: Real<K>,
     lateral: Real<K>,
     reverse: Real<K>,
+    /// What the user's cost comes to.
+    added: Real<K>,
 }
 
 impl<K: Kernel> Flight<K> {
@@ -177,19 +212,19 @@ impl<K: Kernel> Flight<K> {
             y: kernel.real(start.y_cells),
             turns: kernel.real(start.turns).wrap_turns(),
             speed: kernel.real(start.speed_mps),
-            steering: kernel.real(start.steering_rad),
+            steering: kernel.real(start.turn),
         };
         let under_way = zero.less(kernel.real(1.0));
         Self {
             state,
             under_way,
-            distance: zero,
             running: zero,
             n_tilted: zero,
             n_broken: zero,
             leaving: kernel.real(1.0),
             lateral: zero,
             reverse: zero,
+            added: zero,
         }
     }
 }
@@ -243,9 +278,9 @@ impl<K: Kernel> Index<K> {
 }
 
 #[inline(always)]
-fn roll_packs<K: Kernel, S: Stage<K>, M: Motion, const G: usize>(
+fn roll_packs<K: Kernel, P: MotionStepper, C: StepCost, S: Stage<K>, M: Motion, const G: usize>(
     kernel: K,
-    scene: &Scene<'_>,
+    scene: &Scene<'_, P, C>,
     stage: &S,
     chunk: &mut Chunk,
 ) {
@@ -266,30 +301,50 @@ fn roll_packs<K: Kernel, S: Stage<K>, M: Motion, const G: usize>(
                 fly.step::<M>(&mut flights[1], &mut memory[1], first + K::WIDTH);
             }
         }
-        settle::<K, M>(scene, (stage.finish(&flights[0]), &flights[0]), chunk, first);
+        settle::<K, P, C, S, M>((scene, stage), flights[0], chunk, first);
         if G == 2 {
-            settle::<K, M>(scene, (stage.finish(&flights[1]), &flights[1]), chunk, first + K::WIDTH);
+            settle::<K, P, C, S, M>((scene, stage), flights[1], chunk, first + K::WIDTH);
         }
     }
 }
 
 /// What the packs in flight share in one step.
-struct Fly<'a, K: Kernel, S: Stage<K>> {
-    scene: &'a Scene<'a>,
+struct Fly<'a, K: Kernel, P, C, S: Stage<K>> {
+    scene: &'a Scene<'a, P, C>,
     index: &'a Index<K>,
     stage: &'a S,
     controls: &'a [Row; 2],
     t: usize,
 }
 
-impl<K: Kernel, S: Stage<K>> Fly<'_, K, S> {
+impl<K: Kernel, P: MotionStepper, C: StepCost, S: Stage<K>> Fly<'_, K, P, C, S> {
     #[inline(always)]
     fn step<M: Motion>(&self, flight: &mut Flight<K>, memory: &mut Memory<K>, first: usize) {
         let kernel = flight.state.x.0;
-        let [speed, steering] = self.controls;
-        let command = [Real(kernel, kernel.load(speed, first)), Real(kernel, kernel.load(steering, first))];
-        advance::<K, M>(self.scene, self.index, flight, command, (memory, self.t));
-        self.stage.step(self.t, flight);
+        let command = self.controls.each_ref().map(|row| Real(kernel, kernel.load(row, first)));
+        let (rates, risk) =
+            advance::<K, P, C, M>(self.scene, self.index, &mut flight.state, command, (memory, self.t));
+        watch_attitude::<K, P, C, M>(self.scene, flight, [risk[2], risk[3]]);
+        let place = Place { state: flight.state, frame: &self.scene.frame };
+        self.pay::<M>(flight, &Step { t: self.t, place, rates, command, risk });
+    }
+
+    /// What the step costs, which counts until the goal is reached.
+    #[inline(always)]
+    fn pay<M: Motion>(&self, flight: &mut Flight<K>, step: &Step<'_, K>) {
+        let under_way = flight.under_way;
+        if M::HAS_MANOEUVRES {
+            let Prices { lateral_max_mps2: most_mps2, lateral_s, reverse_s, .. } = self.scene.prices;
+            let (lateral, reverse) =
+                (Lateral { most_mps2, price_s: lateral_s }, Reverse { price_s: reverse_s });
+            flight.lateral = flight.lateral.add_where(under_way, lateral.step(step));
+            flight.reverse = flight.reverse.add_where(under_way, reverse.step(step));
+        }
+        flight.running = flight.running.add_where(under_way, self.stage.step(step));
+        if !C::IS_NOTHING {
+            flight.added = flight.added.add_where(under_way, self.scene.cost.step(step));
+        }
+        flight.under_way = self.stage.goes_on(step, under_way);
     }
 }
 
@@ -301,42 +356,33 @@ fn recall<K: Kernel>(kernel: K, slots: &[f32], memory: &mut Memory<K>) {
     }
 }
 
-/// One step of one pack: the model over the ground where it stands, and the limits.
+/// One step of the model over the ground where a pack stands: what moved it, and the risk that it met.
 #[inline(always)]
-fn advance<K: Kernel, M: Motion>(
-    scene: &Scene<'_>,
+fn advance<K: Kernel, P: MotionStepper, C, M: Motion>(
+    scene: &Scene<'_, P, C>,
     index: &Index<K>,
-    flight: &mut Flight<K>,
+    state: &mut LaneState<K>,
     command: [Real<K>; 2],
     memory: (&mut Memory<K>, usize),
-) {
+) -> (Rates<K>, [Real<K>; 4]) {
     let kernel = command[0].0;
-    let cell = index.cell(&flight.state);
-    let risks = kernel.risks(scene.grid.risks, index.risk(cell, flight.state.turns));
-    let [linear_traction, angular_traction, roll, pitch] = risks.map(|value| Real(kernel, value));
+    let cell = index.cell(state);
+    let risk = kernel.risks(scene.grid.risks, index.risk(cell, state.turns)).map(|value| Real(kernel, value));
+    let [linear_traction, angular_traction, ..] = risk;
     let zero = kernel.real(0.0);
     let mut ground = GroundSample { linear_traction, angular_traction, gradient: [zero; 2], class: zero };
     if M::HAS_EFFECTS && scene.stepper.uses_ground() {
         let [east, north, class] = kernel.grounds(scene.grid.ground, cell).map(|value| Real(kernel, value));
         (ground.gradient, ground.class) = ([east, north], class);
     }
-    let rates = M::step(scene.stepper, &mut flight.state, command, &ground, memory);
-    watch_attitude::<K, M>(scene, flight, [roll, pitch]);
-    if M::HAS_MANOEUVRES {
-        let prices = &scene.prices;
-        let sideways = (rates.speed * rates.yaw_rate).abs().exceeds(kernel.real(prices.lateral_max_mps2));
-        let sideways = kernel.and(sideways, flight.under_way);
-        flight.lateral = flight.lateral.add_where(sideways, kernel.real(prices.lateral_s));
-        let backwards = kernel.and(rates.speed.less(zero), flight.under_way);
-        flight.reverse = flight.reverse.add_where(backwards, kernel.real(prices.reverse_s));
-    }
+    (M::step(scene.stepper, state, command, &ground, memory), risk)
 }
 
 /// Counts the poses beyond a limit. A vehicle that stands beyond one may leave: its first poses break a limit only when
 /// they are worse than where it stands. The same rule as [`crate::judgement::Judge::breaks_limits`].
 #[inline(always)]
-fn watch_attitude<K: Kernel, M: Motion>(
-    scene: &Scene<'_>,
+fn watch_attitude<K: Kernel, P, C, M: Motion>(
+    scene: &Scene<'_, P, C>,
     flight: &mut Flight<K>,
     [roll, pitch]: [Real<K>; 2],
 ) {
@@ -357,13 +403,14 @@ fn watch_attitude<K: Kernel, M: Motion>(
 
 /// Writes the costs of a pack that has arrived.
 #[inline(always)]
-fn settle<K: Kernel, M: Motion>(
-    scene: &Scene<'_>,
-    (terminal, flight): (Real<K>, &Flight<K>),
+fn settle<K: Kernel, P, C: StepCost, S: Stage<K>, M: Motion>(
+    (scene, stage): (&Scene<'_, P, C>, &S),
+    flight: Flight<K>,
     chunk: &mut Chunk,
     first: usize,
 ) {
-    let kernel = terminal.0;
+    let (kernel, end) = (flight.running.0, Place { state: flight.state, frame: &scene.frame });
+    let terminal = kernel.real(0.0).add_where(flight.under_way, stage.finish(&end));
     let control = Real(kernel, kernel.load(&chunk.terms[CostTerm::Control as usize], first));
     let mut total = control;
     for (term, value) in [
@@ -375,6 +422,17 @@ fn settle<K: Kernel, M: Motion>(
     ] {
         total = total + value;
         kernel.store(&mut chunk.terms[term as usize], first, value.1);
+    }
+    if !C::IS_NOTHING {
+        let added = flight.added.add_where(flight.under_way, scene.cost.end(&end));
+        total = total + added;
+        kernel.store(&mut chunk.terms[CostTerm::Added as usize], first, added.1);
+    }
+    if scene.keeps_ends {
+        let LaneState { x, y, turns, speed, steering } = flight.state;
+        for (row, value) in chunk.ends.iter_mut().zip([x, y, turns, speed, steering]) {
+            kernel.store(row, first, value.1);
+        }
     }
     let n_broken = if M::IS_LEAVING { flight.n_broken } else { flight.n_tilted };
     kernel.store(&mut chunk.n_broken, first, n_broken.1);

@@ -7,7 +7,8 @@
 use crate::chunk::Chunk;
 use crate::diagnostics::CostTerm;
 use crate::kernel::functions::Generator;
-use crate::kernel::{CHUNK, Kernel, Work};
+use crate::kernel::{self, CHUNK, Kernel, Work};
+use bicycle::lanes::Instructions;
 
 /// Speed and steering angle.
 pub(crate) type Control = [f32; 2];
@@ -63,6 +64,12 @@ pub(crate) struct Sample<'a> {
     pub(crate) sampler: &'a Sampler<'a>,
     pub(crate) index: usize,
     pub(crate) chunk: &'a mut Chunk,
+}
+
+impl Sample<'_> {
+    pub(crate) fn on(self, instructions: Instructions) {
+        kernel::run(instructions, self);
+    }
 }
 
 impl Work for Sample<'_> {

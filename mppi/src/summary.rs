@@ -2,8 +2,8 @@
 
 use crate::chunk::Chunk;
 use crate::diagnostics::CostTerm;
-use crate::kernel::{CHUNK, Kernel, Row, Work};
-use bicycle::lanes::Real;
+use crate::kernel::{self, CHUNK, Kernel, Row, Work};
+use bicycle::lanes::{Instructions, Real};
 
 /// What the costs of some rollouts came to.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -35,6 +35,12 @@ impl Totals {
 /// Adds up a weighed chunk: its weighted controls and its cost terms.
 pub(crate) struct Accumulate<'a> {
     pub(crate) chunk: &'a mut Chunk,
+}
+
+impl Accumulate<'_> {
+    pub(crate) fn on(self, instructions: Instructions) {
+        kernel::run(instructions, self);
+    }
 }
 
 impl Work for Accumulate<'_> {

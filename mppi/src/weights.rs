@@ -3,8 +3,8 @@
 use crate::chunk::Chunk;
 use crate::config::Temperature;
 use crate::kernel::functions::exp_of_negative;
-use crate::kernel::{CHUNK, Kernel, Row, Work};
-use bicycle::lanes::Real;
+use crate::kernel::{self, CHUNK, Kernel, Row, Work};
+use bicycle::lanes::{Instructions, Real};
 
 /// Costs above this count as not finite.
 const WORST_COST_S: f64 = 1e30;
@@ -42,6 +42,12 @@ pub(crate) struct Weigh<'a> {
     pub(crate) chunks: &'a mut [Chunk],
     pub(crate) temperature: Temperature,
     pub(crate) last_s: f32,
+}
+
+impl Weigh<'_> {
+    pub(crate) fn on(self, instructions: Instructions) -> WeightSummary {
+        kernel::run(instructions, self)
+    }
 }
 
 impl Work for Weigh<'_> {

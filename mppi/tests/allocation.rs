@@ -4,7 +4,7 @@ mod fixture;
 
 use bicycle::effect::{CATALOGUE, SpeedLag, SteerDelay};
 use bicycle::{Decision, Effect, State};
-use mppi::{Config, Controller, CostToGo, CostToGoConfig, Input, Objective, Terminal};
+use mppi::{Config, Controller, CostToGo, CostToGoConfig, Costs, Input, Objective, Terminal};
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -67,6 +67,17 @@ fn a_decision_allocates_nothing() {
         decide(0);
         let before = N_ALLOCATIONS.load(Ordering::Relaxed);
         (1..50).for_each(&mut decide);
+        assert_eq!(N_ALLOCATIONS.load(Ordering::Relaxed) - before, 0);
+        // Nor does one after the settings have changed.
+        let costs = Costs { reverse_s: 0.7, ..controller.config().costs };
+        controller.set_config(Config { costs, ..controller.config().clone() }).unwrap();
+        let before = N_ALLOCATIONS.load(Ordering::Relaxed);
+        for cycle in 50..60 {
+            let terminal = Terminal::CostToGo(field.view());
+            let objective = Objective::Goal { goal_m: [15.0, 10.0], tolerance_m: 0.5, terminal };
+            let input = Input { state: State::default(), elapsed_s: 0.1, map: map.view(), objective, cycle };
+            controller.decide(&input);
+        }
         assert_eq!(N_ALLOCATIONS.load(Ordering::Relaxed) - before, 0);
         assert!(n_drives > 10, "decisions that stop early prove nothing: {n_drives} of 50 drove");
     }

@@ -9,7 +9,7 @@ use mppi::{
     Config, Controller, CostToGo, CostToGoConfig, Input, Objective, Recovery, ReferencePath, Rollout,
     Terminal,
 };
-use traversability::Risk;
+use traversability::{GridGeometry, Risk, RiskMapView};
 
 fn smooth() -> Config {
     Config::default()
@@ -34,8 +34,7 @@ fn a_straight_drive_takes_little_more_than_the_least_time() {
 fn half_the_traction_takes_twice_the_time() {
     let risk = Risk { linear_traction: 0.5, ..Risk::NONE };
     let mut map = level();
-    map.arrays_mut().0.fill(risk);
-    map.close_border();
+    map.fill(|risks, _| risks.fill(risk));
     let drive = drive(&smooth(), &model(), &map, goal([10.0, 0.0]), (standing(), 200));
     let time_s = (drive.states.len() - 1) as f64 * STEP_S;
     assert!((9.5 + 0.5..13.0).contains(&time_s), "{time_s} s");
@@ -231,7 +230,7 @@ fn a_path_is_followed_to_its_end() {
 fn what_cannot_be_planned_with_stops_or_holds() {
     let map = level();
     let mut controller = Controller::new(smooth(), model(), 5).unwrap();
-    let mut decide = |state: State, objective: Objective<'_>, map: traversability::RiskMapView<'_>| {
+    let mut decide = |state: State, objective: Objective<'_>, map: RiskMapView<'_>| {
         controller.decide(&Input { state, elapsed_s: 0.1, map, objective, cycle: 0 })
     };
     let ahead = goal([5.0, 0.0]);
@@ -243,8 +242,8 @@ fn what_cannot_be_planned_with_stops_or_holds() {
     assert_eq!(decide(outside, ahead, map.view()), Decision::Stop(StopReason::OutsideMap));
     let arrived = State { x_m: 4.6, ..standing() };
     assert_eq!(decide(arrived, ahead, map.view()), Decision::Hold(HoldReason::AtGoal));
-    let mut empty = map.view();
-    (empty.risks, empty.ground) = (&[], &[]);
+    let nothing = GridGeometry { n_rows: 0, n_cols: 0, ..*map.geometry() };
+    let empty = RiskMapView::new(nothing, 13, &[], &[]).unwrap();
     assert_eq!(decide(standing(), ahead, empty), Decision::Hold(HoldReason::NoMap));
     assert!(matches!(decide(standing(), ahead, map.view()), Decision::Drive(_)), "and recovers");
 }
@@ -254,12 +253,14 @@ fn broken_numbers_in_the_map_are_quarantined() {
     let mut map = level();
     let geometry = *map.geometry();
     let n_yaws = map.view().n_yaws;
-    for (index, risks) in map.arrays_mut().0.chunks_exact_mut(n_yaws).enumerate() {
-        // Everything north of y = 1 m is broken.
-        if geometry.centre_m(geometry.cell(index))[1] > 1.0 {
-            risks.fill(Risk { linear_traction: f32::NAN, ..Risk::NONE });
+    map.fill(|risks, _| {
+        for (index, risks) in risks.chunks_exact_mut(n_yaws).enumerate() {
+            // Everything north of y = 1 m is broken.
+            if geometry.centre_m(geometry.cell(index))[1] > 1.0 {
+                risks.fill(Risk { linear_traction: f32::NAN, ..Risk::NONE });
+            }
         }
-    }
+    });
     let mut controller = Controller::new(smooth(), model(), 5).unwrap();
     let input =
         Input { state: standing(), elapsed_s: 0.0, map: map.view(), objective: goal([8.0, 0.0]), cycle: 0 };
@@ -267,7 +268,7 @@ fn broken_numbers_in_the_map_are_quarantined() {
     let diagnostics = controller.diagnostics();
     assert!(diagnostics.n_non_finite > 0 && diagnostics.n_non_finite < 1024);
     assert!(diagnostics.mean_terms_s.iter().all(|term| term.is_finite()));
-    map.arrays_mut().0.fill(Risk { angular_traction: f32::NAN, ..Risk::NONE });
+    map.fill(|risks, _| risks.fill(Risk { angular_traction: f32::NAN, ..Risk::NONE }));
     let input =
         Input { state: standing(), elapsed_s: 0.0, map: map.view(), objective: goal([8.0, 0.0]), cycle: 1 };
     assert_eq!(controller.decide(&input), Decision::Stop(StopReason::NonFiniteResult));
@@ -277,7 +278,7 @@ fn broken_numbers_in_the_map_are_quarantined() {
 #[test]
 fn an_attitude_that_is_not_a_number_counts_as_too_steep() {
     let mut map = level();
-    map.arrays_mut().0.fill(Risk { roll_rad: f32::NAN, ..Risk::NONE });
+    map.fill(|risks, _| risks.fill(Risk { roll_rad: f32::NAN, ..Risk::NONE }));
     let mut controller = Controller::new(smooth(), model(), 5).unwrap();
     let input =
         Input { state: standing(), elapsed_s: 0.0, map: map.view(), objective: goal([8.0, 0.0]), cycle: 0 };

@@ -34,7 +34,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let model = Model::of(&vehicle);
     let stepper = Stepper::new(&model, CYCLE_S, 1.0);
     let mut navigator = Navigator::new(Setup {
-        vehicle: &vehicle,
+        geometry: &vehicle.geometry,
         surface: Surface::Given(walled(config.elevation.resolution_m)),
         model,
         config,

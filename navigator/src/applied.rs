@@ -4,9 +4,9 @@ use bicycle::Command;
 
 /// What the actuators were told last.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Applied {
-    /// Speed and angle of the front wheels that they were told.
-    pub command: Command,
+pub struct Applied<C = Command> {
+    /// What they were told; of a vehicle that steers its front wheels, speed and their angle.
+    pub command: C,
     /// When they were first told so, on the clock of the measurements [ns].
     pub since_ns: u64,
     /// Who decided it.

@@ -1,7 +1,7 @@
 //! The second part of the pipeline: the map of the ground becomes risk and time to the goal.
 
 use bicycle::lanes::Instructions;
-use bicycle::{Limits, Vehicle};
+use bicycle::{Geometry, MotionLimits};
 use mppi::{CostToGo, CostToGoView};
 use terrain::{CellRegion, DistantPosition, GridMap, SurfaceCell};
 use traversability::{CvarLevel, Risk, RiskMapView};
@@ -16,11 +16,11 @@ pub struct Assessor {
 }
 
 impl Assessor {
-    /// An assessor of a surface with the settings of `config`, on the instruction set of its controller; the cost to go
-    /// keeps to `limits`.
+    /// An assessor of a surface for a vehicle of such lengths with the settings of `config`, on the instruction set of its
+    /// controller; the cost to go keeps to `limits`.
     pub fn new(
-        vehicle: &Vehicle,
-        limits: &Limits,
+        vehicle: &impl AsRef<Geometry>,
+        limits: impl Into<MotionLimits>,
         config: &Config,
         belief: &Belief,
         level: CvarLevel,
@@ -29,10 +29,10 @@ impl Assessor {
         let window = config.risk_map;
         let instructions = Instructions::find(config.controller.isa).map_err(mppi::ConfigError::from)?;
         Ok(Self {
-            layer: RiskLayer::new(belief, level, &vehicle.geometry, config, instructions)?,
+            layer: RiskLayer::new(belief, level, vehicle.as_ref(), config, instructions)?,
             cost_to_go: CostToGo::new(
                 config.cost_to_go,
-                &config.allowed(limits),
+                limits.into().with_attitude_share(config.attitude_share),
                 window.n_rows,
                 window.n_cols,
             )?,

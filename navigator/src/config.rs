@@ -1,6 +1,6 @@
 //! Settings of the whole pipeline, and the ones that fit a machine.
 
-use bicycle::{Limits, Vehicle};
+use bicycle::{Geometry, Vehicle};
 use mppi::CostToGoConfig;
 use physics_prior::PriorConfig;
 use serde::{Deserialize, Serialize};
@@ -52,26 +52,32 @@ pub struct RiskMapConfig {
 }
 
 impl Config {
-    /// Settings that fit a vehicle: a window of at most 128 cells a side that holds twice the controller's horizon
-    /// if cells between a ninth and a quarter of the vehicle's width can do that.
+    /// Settings that fit a vehicle, see [`Config::for_geometry`], and how far its body leans.
     pub fn for_vehicle(vehicle: &Vehicle) -> Self {
-        let length_m = vehicle.geometry.length_m;
+        let fitting = Self::for_geometry(&vehicle.geometry, vehicle.limits.speed_max_mps);
+        Self { prior: PriorConfig { lean: vehicle.lean(), ..fitting.prior.clone() }, ..fitting }
+    }
+
+    /// Settings that fit a vehicle's lengths and its fastest speed: a window of at most 128 cells a side that holds twice
+    /// the controller's horizon if cells between a ninth and a quarter of the vehicle's width can do that.
+    pub fn for_geometry(geometry: &Geometry, speed_max_mps: f64) -> Self {
+        let length_m = geometry.length_m;
         let controller = controller(length_m);
         let horizon_s = controller.n_steps as f64 * controller.step_s;
-        let horizon_m = vehicle.limits.speed_max_mps * horizon_s;
+        let horizon_m = speed_max_mps * horizon_s;
         // Twice the horizon to either side sees around an obstacle at its end.
-        let window_m = (4.0 * horizon_m).max(6.0 * vehicle.geometry.length_m);
-        let (finest_m, coarsest_m) = (vehicle.geometry.width_m / 9.0, vehicle.geometry.width_m / 4.0);
+        let window_m = (4.0 * horizon_m).max(6.0 * length_m);
+        let (finest_m, coarsest_m) = (geometry.width_m / 9.0, geometry.width_m / 4.0);
         let risk_m = round_to_two_digits((window_m / 128.0).clamp(finest_m, coarsest_m));
         let n = ((window_m / risk_m).ceil() as usize).min(128);
         // The ground under a footprint at the border must be inside the elevation window, and so must its drift.
-        let margin_m = vehicle.geometry.length_m + 2.0 * risk_m;
+        let margin_m = length_m + 2.0 * risk_m;
         // A body beyond all measure asks for more cells than there are numbers; such a window is refused on validation.
         let elevation_n = ((margin_m / risk_m).ceil() as usize).saturating_mul(2).saturating_add(n);
         let fitting = ElevationConfig::scaled_to(length_m);
         Self {
             elevation: ElevationConfig {
-                own_body: own_body(vehicle),
+                own_body: own_body(geometry),
                 resolution_m: risk_m,
                 n_rows: elevation_n,
                 n_cols: elevation_n,
@@ -86,7 +92,7 @@ impl Config {
                 n_yaws: 16,
                 recentre_m: 4.0 * risk_m,
             },
-            prior: PriorConfig { lean: vehicle.lean(), ..PriorConfig::for_vehicle(&vehicle.geometry) },
+            prior: PriorConfig::for_vehicle(geometry),
             cost_to_go: cost_to_go(length_m),
             controller,
             guard: GuardConfig::default(),
@@ -104,15 +110,6 @@ impl Config {
         match self.first_invalid() {
             Some((field, expected, found)) => Err(NavigatorError::Config { field, expected, found }),
             None => Ok(()),
-        }
-    }
-
-    /// What a plan may use of a vehicle's limits.
-    pub(crate) fn allowed(&self, limits: &Limits) -> Limits {
-        Limits {
-            roll_max_rad: self.attitude_share * limits.roll_max_rad,
-            pitch_max_rad: self.attitude_share * limits.pitch_max_rad,
-            ..*limits
         }
     }
 
@@ -151,8 +148,7 @@ const BODY_HEIGHT: f64 = 0.5;
 
 /// The room that a vehicle takes up, from half its clearance above the ground to the roof. What lies lower is the
 /// ground itself as far as it can be driven over.
-fn own_body(vehicle: &Vehicle) -> BodyBox {
-    let geometry = &vehicle.geometry;
+fn own_body(geometry: &Geometry) -> BodyBox {
     let (length_m, radius_m) = (geometry.length_m, geometry.wheel_radius_m);
     let (half_width_m, margin_m) = (0.5 * geometry.width_m, BODY_MARGIN * length_m);
     let bounds = BodyBox {

@@ -2,8 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use bicycle::{Command, Decision, Model, Odometry, SensorModel, StopReason, Vehicle};
-use mppi::Controller;
+use bicycle::{Decision, Geometry, Model, MotionCommand, Odometry, StopReason};
+use mppi::{Controller, Driven};
 use terrain::{GridGeometry, GridMap, Scan, SurfaceCell};
 use traversability::{CvarLevel, Risk, RiskMap, RiskMapView};
 
@@ -19,11 +19,11 @@ pub enum Surface {
 }
 
 /// Everything that stays the same during a drive.
-pub struct Setup<'a> {
-    /// The machine; the pipeline reads its geometry.
-    pub vehicle: &'a Vehicle,
-    /// What the controller believes of how it moves.
-    pub model: Model,
+pub struct Setup<'a, M = Model> {
+    /// The machine's lengths.
+    pub geometry: &'a Geometry,
+    /// What the controller believes of how it moves, which decides what a command is.
+    pub model: M,
     /// Settings.
     pub config: Config,
     /// What is believed of the ground.
@@ -74,10 +74,10 @@ pub enum NavigatorError {
 }
 
 /// The planner: its three parts, one after the other, behind two calls.
-pub struct Navigator {
+pub struct Navigator<M: Driven = Model> {
     surveyor: Surveyor,
     assessor: Assessor,
-    pilot: Pilot,
+    pilot: Pilot<M>,
     /// What is believed, less the poses that proved stuck; `None` before the first scan.
     map: Option<RiskMap>,
     /// Time of the odometry in whose frame the map lies [ns].
@@ -87,14 +87,14 @@ pub struct Navigator {
     destination: Destination,
 }
 
-impl Navigator {
+impl<M: Driven> Navigator<M> {
     /// A pipeline that has seen nothing.
-    pub fn new(setup: Setup<'_>) -> Result<Self, NavigatorError> {
-        let Setup { vehicle, model, config, belief, surface, level, seed, goal_m, tolerance_m } = setup;
+    pub fn new(setup: Setup<'_, M>) -> Result<Self, NavigatorError> {
+        let Setup { geometry, model, config, belief, surface, level, seed, goal_m, tolerance_m } = setup;
         Ok(Self {
-            surveyor: Surveyor::new(vehicle, config.elevation, config.guard, surface)?
-                .with_sensors(SensorModel::of(&model.effects)),
-            assessor: Assessor::new(vehicle, &model.limits, &config, &belief, level)?,
+            surveyor: Surveyor::new(geometry, config.elevation, config.guard, surface)?
+                .with_sensors(model.sensors()),
+            assessor: Assessor::new(geometry, model.motion_limits(), &config, &belief, level)?,
             pilot: Pilot::new(model, &config, seed)?,
             map: None,
             map_at_ns: 0,
@@ -131,18 +131,18 @@ impl Navigator {
     }
 
     /// The command for now, or the reason for none. `now_ns` is on the clock of the measurements.
-    pub fn decide(&mut self, now_ns: u64) -> Decision {
+    pub fn decide(&mut self, now_ns: u64) -> Decision<M::Command> {
         let time_to_goal = self.assessor.last_time_to_goal();
         // What was given lies in the frame of the map, whatever the localisation says.
         let odometry_at_ns = if self.surveyor.is_given() { u64::MAX } else { self.map_at_ns };
         let chart = self.map.as_ref().map(|map| Chart { map: map.view(), time_to_goal, odometry_at_ns });
         let decision = self.pilot.decide(now_ns, chart, &self.destination);
-        self.surveyor.note_command(decision.command(Command::default()).speed_mps);
+        self.surveyor.note_command(decision.command(M::Command::default()).speed_mps());
         if let Some(pose) = self.pilot.take_stuck() {
             self.assessor.note_stuck(pose);
             // The pose is of now; a map of before a jump takes it in when it is renewed.
             if let Some(map) = self.map.as_mut().filter(|_| !self.is_map_behind) {
-                self.assessor.amend(map.arrays_mut().0);
+                map.fill(|risks, _| self.assessor.amend(risks));
             }
         }
         decision
@@ -160,7 +160,7 @@ impl Navigator {
     }
 
     /// The controller, for its diagnostics and rollouts.
-    pub fn controller(&self) -> &Controller {
+    pub fn controller(&self) -> &Controller<M> {
         self.pilot.controller()
     }
 
@@ -207,7 +207,7 @@ impl Navigator {
         let map =
             self.map.get_or_insert_with(|| RiskMap::constant(known.geometry, known.n_yaws, Risk::OUTSIDE));
         take_over(map, &known);
-        self.assessor.amend(map.arrays_mut().0);
+        map.fill(|risks, _| self.assessor.amend(risks));
         self.assessor.time_to_goal(map.view(), self.destination.goal_m)?;
         Ok(())
     }
@@ -216,7 +216,8 @@ impl Navigator {
 fn take_over(map: &mut RiskMap, known: &RiskMapView<'_>) {
     let GridGeometry { origin, .. } = known.geometry;
     map.place_at(origin);
-    let (risks, ground) = map.arrays_mut();
-    risks.copy_from_slice(known.risks);
-    ground.copy_from_slice(known.ground);
+    map.fill(|risks, ground| {
+        risks.copy_from_slice(known.risks);
+        ground.copy_from_slice(known.ground);
+    });
 }

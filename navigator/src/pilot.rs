@@ -2,8 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use bicycle::{Command, Decision, HoldReason, Model, Odometry, SensorModel, State, StopReason};
-use mppi::{Controller, CostToGoView, Input, Objective, Terminal};
+use bicycle::{Decision, HoldReason, Model, MotionCommand, MotionState, Odometry, SensorModel, StopReason};
+use mppi::{Controller, CostToGoView, Driven, Input, Objective, Terminal};
 use traversability::RiskMapView;
 
 use crate::applied::{Applied, AppliedBy};
@@ -32,12 +32,12 @@ pub struct Destination {
     pub tolerance_m: f64,
 }
 
-/// Watches what comes in and asks the controller.
-pub struct Pilot {
+/// Watches what comes in and asks the controller. The motion model decides what a command is.
+pub struct Pilot<M: Driven = Model> {
     guard: Guard,
     frame: Frame,
     sensors: SensorModel,
-    controller: Controller,
+    controller: Controller<M>,
     /// Of the chart that the controller was asked on last, in whose frame it remembers places [ns].
     chart_at_ns: Option<u64>,
     odometry: Option<Odometry>,
@@ -48,16 +48,15 @@ pub struct Pilot {
     stuck: Option<StuckPose>,
 }
 
-impl Pilot {
+impl<M: Driven> Pilot<M> {
     /// A pilot that knows nothing yet.
-    pub fn new(model: Model, config: &Config, seed: u64) -> Result<Self, NavigatorError> {
+    pub fn new(model: M, config: &Config, seed: u64) -> Result<Self, NavigatorError> {
         config.validate()?;
-        let mut model = model;
-        model.limits = config.allowed(&model.limits);
+        let model = model.with_attitude_share(config.attitude_share);
         Ok(Self {
             guard: Guard::new(config.guard),
             frame: Frame::default(),
-            sensors: SensorModel::of(&model.effects),
+            sensors: model.sensors(),
             controller: Controller::new(config.controller.clone(), model, seed)?,
             chart_at_ns: None,
             odometry: None,
@@ -93,7 +92,12 @@ impl Pilot {
     }
 
     /// The command for now, or the reason for none. `now_ns` is on the clock of the measurements.
-    pub fn decide(&mut self, now_ns: u64, chart: Option<Chart<'_>>, destination: &Destination) -> Decision {
+    pub fn decide(
+        &mut self,
+        now_ns: u64,
+        chart: Option<Chart<'_>>,
+        destination: &Destination,
+    ) -> Decision<M::Command> {
         self.elapsed_s =
             self.decided_at_ns.map_or(0.0, |then_ns| now_ns.saturating_sub(then_ns) as f64 * 1e-9);
         let decision = match self.ready(now_ns, chart) {
@@ -103,7 +107,7 @@ impl Pilot {
                 decision
             }
         };
-        self.guard.note_command(decision.command(Command::default()).speed_mps);
+        self.guard.note_command(decision.command(M::Command::default()).speed_mps());
         self.decided_at_ns = Some(now_ns);
         self.cycle += 1;
         decision
@@ -120,7 +124,7 @@ impl Pilot {
     }
 
     /// The controller, for its diagnostics and rollouts.
-    pub fn controller(&self) -> &Controller {
+    pub fn controller(&self) -> &Controller<M> {
         &self.controller
     }
 
@@ -161,9 +165,9 @@ impl Pilot {
 
     /// Takes in what the actuators were told last, as the vehicle says with the odometry that [`Pilot::admit`] is to be
     /// shown next. Delays are replayed from it and the next plan starts from it, see [`Controller::note_sent`].
-    pub fn note_applied(&mut self, applied: &Applied) {
+    pub fn note_applied(&mut self, applied: &Applied<M::Command>) {
         let Applied { command, since_ns, by } = *applied;
-        self.guard.note_command(command.speed_mps);
+        self.guard.note_command(command.speed_mps());
         let Some(decided_at_ns) = self.decided_at_ns else { return };
         let after_s = since_ns.wrapping_sub(decided_at_ns).cast_signed() as f64 * 1e-9;
         match by {
@@ -173,12 +177,21 @@ impl Pilot {
     }
 
     /// What the controller needs to be asked, or what to do without asking it.
-    fn ready<'a>(&self, now_ns: u64, chart: Option<Chart<'a>>) -> Result<(Chart<'a>, Odometry), Decision> {
+    fn ready<'a>(
+        &self,
+        now_ns: u64,
+        chart: Option<Chart<'a>>,
+    ) -> Result<(Chart<'a>, Odometry), Decision<M::Command>> {
         self.fault.map_or_else(|| self.guard.check(now_ns), Err).map_err(Decision::Stop)?;
         chart.zip(self.odometry).ok_or(Decision::Hold(HoldReason::NoMap))
     }
 
-    fn ask(&mut self, chart: &Chart<'_>, odometry: &Odometry, destination: &Destination) -> Decision {
+    fn ask(
+        &mut self,
+        chart: &Chart<'_>,
+        odometry: &Odometry,
+        destination: &Destination,
+    ) -> Decision<M::Command> {
         let before_ns = self.chart_at_ns.replace(chart.odometry_at_ns);
         if let Some(jump) = before_ns.and_then(|at_ns| self.frame.shift(at_ns, chart.odometry_at_ns)) {
             self.controller.carry(|pose| jump.pose(pose));
@@ -205,13 +218,14 @@ impl Pilot {
 
     /// State and goal in the frame of a chart. What it tells of the time to the goal leads to where the goal was until
     /// the next chart comes.
-    fn on_chart(&self, odometry: &Odometry, of_ns: u64, goal_m: [f64; 2]) -> (State, [f64; 2]) {
-        let state = odometry.state();
+    fn on_chart(&self, odometry: &Odometry, of_ns: u64, goal_m: [f64; 2]) -> (M::State, [f64; 2]) {
+        let state = self.controller.model().measured_state(odometry);
         let Some(jump) = self.frame.since(of_ns) else { return (state, goal_m) };
         let back = jump.inverse();
+        let state: MotionState = state.into();
         let [x_m, y_m, yaw_rad] = back.pose([state.x_m, state.y_m, state.yaw_rad]);
         let [goal_x_m, goal_y_m, _] = back.pose([goal_m[0], goal_m[1], 0.0]);
-        (State { x_m, y_m, yaw_rad, ..state }, [goal_x_m, goal_y_m])
+        (MotionState { x_m, y_m, yaw_rad, ..state }.into(), [goal_x_m, goal_y_m])
     }
 }
 

@@ -208,7 +208,10 @@ fn block(risks: &mut [Risk], view: &RiskMapView<'_>, stuck: &StuckPose, length_m
         if dx_m * dx_m + dy_m * dy_m <= radius_m * radius_m {
             for bin in &bins {
                 let risk = &mut risks[index * n_yaws + bin];
-                *risk = risk.blocked();
+                // The border stays what it is.
+                if *risk != Risk::OUTSIDE {
+                    *risk = risk.blocked();
+                }
             }
         }
     }
@@ -233,7 +236,8 @@ mod tests {
         let grid = GridGeometry::centred(0.25, 41, 41, 0.0, 0.0);
         let mut map = RiskMap::constant(grid, 16, Risk::NONE);
         let known = map.clone();
-        block(map.arrays_mut().0, &known.view(), &StuckPose { position_m: [0.0, 0.0], yaw_rad: 0.2 }, 3.4);
+        let pose = StuckPose { position_m: [0.0, 0.0], yaw_rad: 0.2 };
+        map.fill(|risks, _| block(risks, &known.view(), &pose, 3.4));
         let view = map.view();
         assert!(view.risk_at(0.0, 0.0, 0.2).is_blocked() && view.risk_at(1.2, 0.2, 0.2).is_blocked());
         assert!(!view.risk_at(0.0, 0.0, 0.2 + std::f64::consts::PI).is_blocked(), "turned around");

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use bicycle::{Odometry, SensorModel, StopReason, Vehicle};
+use bicycle::{Geometry, Odometry, SensorModel, StopReason};
 use terrain::{
     AssumedGround, CellRegion, ElevationConfig, ElevationMap, Footprint, FuseError, FuseReport, GridMap,
     Pose, Scan, SurfaceCell,
@@ -70,7 +70,7 @@ pub struct Surveyor {
 impl Surveyor {
     /// A map of nothing.
     pub fn new(
-        vehicle: &Vehicle,
+        vehicle: &impl AsRef<Geometry>,
         elevation: ElevationConfig,
         guard: GuardConfig,
         surface: Surface,
@@ -84,7 +84,7 @@ impl Surveyor {
                 Surface::Sensed => None,
                 Surface::Given(surface) => Some(surface),
             },
-            assumed: assumed_ground(vehicle),
+            assumed: assumed_ground(vehicle.as_ref()),
             has_ground: false,
             shift: Jump::NONE,
             n_jumps: 0,
@@ -218,8 +218,7 @@ impl Surveyor {
     }
 }
 
-fn assumed_ground(vehicle: &Vehicle) -> AssumedGround {
-    let geometry = &vehicle.geometry;
+fn assumed_ground(geometry: &Geometry) -> AssumedGround {
     // A quarter of the length more on every side: the blind zone of a roof sensor reaches beyond the bumpers.
     let margin_m = 0.25 * geometry.length_m;
     AssumedGround {

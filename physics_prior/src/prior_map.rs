@@ -147,21 +147,21 @@ impl PriorMap {
         let field = &self.field;
         let geometry = *self.map.geometry();
         let n_yaws = self.map.view().n_yaws;
-        let (risks, ground) = self.map.arrays_mut();
-        let cells = dirty.rows.start * geometry.n_cols..dirty.rows.end * geometry.n_cols;
-        let risk_rows =
-            risks[cells.start * n_yaws..cells.end * n_yaws].par_chunks_mut(geometry.n_cols * n_yaws);
-        let lines = risk_rows.zip(ground[cells].par_chunks_mut(geometry.n_cols));
-        lines.enumerate().for_each_init(BlockPrior::default, |block, (line, (risks, ground))| {
-            let row = geometry.origin[1] + (dirty.rows.start + line) as i64;
-            for yaw in 0..n_yaws {
-                judge_row(field, [geometry.origin[0], row], &dirty.cols, (yaw, n_yaws), block, risks);
-            }
-            for col in dirty.cols.clone() {
-                ground[col] = field.ground_in([geometry.origin[0] + col as i64, row], surface);
-            }
+        self.map.fill(|risks, ground| {
+            let cells = dirty.rows.start * geometry.n_cols..dirty.rows.end * geometry.n_cols;
+            let risk_rows =
+                risks[cells.start * n_yaws..cells.end * n_yaws].par_chunks_mut(geometry.n_cols * n_yaws);
+            let lines = risk_rows.zip(ground[cells].par_chunks_mut(geometry.n_cols));
+            lines.enumerate().for_each_init(BlockPrior::default, |block, (line, (risks, ground))| {
+                let row = geometry.origin[1] + (dirty.rows.start + line) as i64;
+                for yaw in 0..n_yaws {
+                    judge_row(field, [geometry.origin[0], row], &dirty.cols, (yaw, n_yaws), block, risks);
+                }
+                for col in dirty.cols.clone() {
+                    ground[col] = field.ground_in([geometry.origin[0] + col as i64, row], surface);
+                }
+            });
         });
-        self.map.close_border();
     }
 }
 

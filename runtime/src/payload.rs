@@ -98,11 +98,11 @@ pub fn risk_views<'a>(
     // Times are interpolated between cells: one row or column has nothing to interpolate between.
     let geometry = Some(geometry).filter(|geometry| geometry.n_rows.min(geometry.n_cols) >= 2)?;
     let parts = RiskParts::new(&geometry, n_yaws);
-    (parts.n_elements() == payload.len()).then(|| {
-        let map =
-            RiskMapView { geometry, n_yaws, risks: parts.risks(payload), ground: parts.ground(payload) };
-        (map, CostToGoView { geometry, seconds: parts.seconds(payload) })
-    })
+    if parts.n_elements() != payload.len() {
+        return None;
+    }
+    let map = RiskMapView::new(geometry, n_yaws, parts.risks(payload), parts.ground(payload)).ok()?;
+    Some((map, CostToGoView { geometry, seconds: parts.seconds(payload) }))
 }
 
 /// Hash of a payload, as headers carry it.
@@ -247,14 +247,15 @@ mod tests {
     fn told() -> (RiskMap, RiskHeader, Vec<[f32; 4]>) {
         let geometry = GridGeometry { resolution_m: 0.2, origin: [-3, 4], n_rows: 3, n_cols: 5 };
         let mut map = RiskMap::constant(geometry, 3, Risk::NONE);
-        let (risks, ground) = map.arrays_mut();
-        for (k, risk) in risks.iter_mut().enumerate() {
-            risk.pitch_rad = k as f32;
-        }
-        for (k, ground) in ground.iter_mut().enumerate() {
-            *ground =
-                Ground { gradient: [k as f32, -0.5], class: (k % 4) as u8, flags: GroundFlags(k as u8) };
-        }
+        map.fill(|risks, ground| {
+            for (k, risk) in risks.iter_mut().enumerate() {
+                risk.pitch_rad = k as f32;
+            }
+            for (k, ground) in ground.iter_mut().enumerate() {
+                *ground =
+                    Ground { gradient: [k as f32, -0.5], class: (k % 4) as u8, flags: GroundFlags(k as u8) };
+            }
+        });
         let parts = RiskParts::new(&geometry, 3);
         let known = map.view();
         let payload = (0..parts.n_elements()).map(|place| parts.element(&known, place)).collect();

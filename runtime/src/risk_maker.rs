@@ -108,8 +108,10 @@ impl RiskMaker {
         let (geometry, n_yaws) = (known.geometry, known.n_yaws);
         let parts = RiskParts::new(&geometry, n_yaws);
         self.assessor.amend(parts.risks_mut(payload));
-        let map =
-            RiskMapView { geometry, n_yaws, risks: parts.risks(payload), ground: parts.ground(payload) };
+        // The parts have the lengths of a map of this shape.
+        let Ok(map) = RiskMapView::new(geometry, n_yaws, parts.risks(payload), parts.ground(payload)) else {
+            return Ok(RiskHeader::default());
+        };
         self.assessor.time_to_goal(map, goal_m)?;
         parts.seconds_mut(payload).copy_from_slice(self.assessor.last_time_to_goal().seconds);
         Ok(RiskHeader {

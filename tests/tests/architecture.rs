@@ -59,8 +59,20 @@ const MAY_TOUCH_FILES: [&str; 4] = ["formats", "runtime", "cli", "tests"];
 /// Where unsafe code may stand: the rollout kernel, and the allocator that counts in a test.
 const MAY_BE_UNSAFE: [&str; 3] = ["mppi/src/kernel.rs", "mppi/src/kernel/", "mppi/tests/allocation.rs"];
 /// The model's dynamics, which no plant may use.
-const DYNAMICS: [&str; 8] =
-    ["Effect", "GroundSample", "LaneState", "Model", "Stepper", "effect", "lanes", "*"];
+const DYNAMICS: [&str; 12] = [
+    "Effect",
+    "GroundSample",
+    "LaneState",
+    "Model",
+    "MotionModel",
+    "MotionStepper",
+    "SkidSteer",
+    "SkidSteerStepper",
+    "Stepper",
+    "effect",
+    "lanes",
+    "*",
+];
 
 static METADATA: LazyLock<Metadata> = LazyLock::new(|| MetadataCommand::new().no_deps().exec().unwrap());
 

@@ -183,7 +183,7 @@ fn drive(isa: Isa) -> [u64; 3] {
     config.controller.isa = isa;
     let checkpoint = Arc::new(evidential::shipped(evidential::Method::Pietra, &vehicle.geometry).unwrap());
     let mut navigator = Navigator::new(Setup {
-        vehicle: &vehicle,
+        geometry: &vehicle.geometry,
         model: Model::of(&vehicle),
         config,
         belief: Belief::Learned { checkpoint, unfamiliar: Unfamiliar::Avoid },

@@ -34,18 +34,18 @@ fn main() -> Result<(), Box<dyn Error>> {
     let n_yaws = 8;
     let mut map = RiskMap::constant(geometry, n_yaws, Risk::NONE);
     let rock = geometry.cell_at(-3.0, 0.0).ok_or("expected a place on the map")?;
-    let (risks, _ground) = map.arrays_mut();
-    for index in 0..geometry.n_cells() {
-        let cell: Cell = geometry.cell(index);
-        let here = &mut risks[index * n_yaws..][..n_yaws];
-        if (0.0..2.0).contains(&geometry.centre_m(cell)[0]) {
-            here.fill(risk);
+    map.fill(|risks, _ground| {
+        for index in 0..geometry.n_cells() {
+            let cell: Cell = geometry.cell(index);
+            let here = &mut risks[index * n_yaws..][..n_yaws];
+            if (0.0..2.0).contains(&geometry.centre_m(cell)[0]) {
+                here.fill(risk);
+            }
+            if cell == rock {
+                here.iter_mut().for_each(|risk| *risk = risk.blocked());
+            }
         }
-        if cell == rock {
-            here.iter_mut().for_each(|risk| *risk = risk.blocked());
-        }
-    }
-    map.close_border();
+    });
 
     let view = map.view();
     for x_m in [-3.0, -1.0, 1.0, 7.0] {

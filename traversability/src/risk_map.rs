@@ -1,5 +1,6 @@
 //! The risk map: worst expected traversability for every cell and yaw, and the ground under it.
 
+use std::ops::Deref;
 use terrain::{Cell, GridGeometry, TerrainClass};
 
 /// Worst expected traversability of one pose: left-tail CVaR of traction, right-tail CVaR of attitude
@@ -79,10 +80,10 @@ impl Default for Ground {
     }
 }
 
-/// A risk map that owns its arrays. The pose that a cell and a yaw bin stand for is that of the body frame:
-/// the rear axle's centre in the cell's centre, the yaw in the bin's centre.
+/// A risk map that owns its arrays, their shape and its border. The pose that a cell and a yaw bin stand for is that of the
+/// body frame: the rear axle's centre in the cell's centre, the yaw in the bin's centre.
 ///
-/// The outermost ring of cells is [`Risk::OUTSIDE`] by construction.
+/// The outermost ring of cells is [`Risk::OUTSIDE`], whatever is filled in.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RiskMap {
     geometry: GridGeometry,
@@ -91,9 +92,14 @@ pub struct RiskMap {
     ground: Vec<Ground>,
 }
 
-/// A borrowed risk map: what the controller reads, wherever the arrays lie.
+/// A borrowed risk map: what the controller reads, wherever the arrays lie. Their shape is that of the geometry; what it
+/// is made of can be read as fields and not changed, see [`RiskMapParts`].
 #[derive(Clone, Copy, Debug)]
-pub struct RiskMapView<'a> {
+pub struct RiskMapView<'a>(RiskMapParts<'a>);
+
+/// What a [`RiskMapView`] is made of.
+#[derive(Clone, Copy, Debug)]
+pub struct RiskMapParts<'a> {
     /// Where the cells lie; row-major, row 0 = south.
     pub geometry: GridGeometry,
     /// Number of yaw bins; bin k is centred at (k + 1/2) 2 pi / n_yaws.
@@ -102,6 +108,26 @@ pub struct RiskMapView<'a> {
     pub risks: &'a [Risk],
     /// Shape [row, col].
     pub ground: &'a [Ground],
+}
+
+/// Arrays that are no risk map.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "{array} of a risk map of {n_rows} x {n_cols} cells and {n_yaws} yaws: expected {expected} values, found {found}"
+)]
+pub struct RiskMapError {
+    /// Which array.
+    pub array: &'static str,
+    /// Rows of the geometry.
+    pub n_rows: usize,
+    /// Columns of the geometry.
+    pub n_cols: usize,
+    /// Yaw bins.
+    pub n_yaws: usize,
+    /// Length that the array should have.
+    pub expected: usize,
+    /// Length that it has.
+    pub found: usize,
 }
 
 impl RiskMap {
@@ -117,8 +143,15 @@ impl RiskMap {
         map
     }
 
-    /// Sets the outermost ring to [`Risk::OUTSIDE`]; to be called after the map was filled.
-    pub fn close_border(&mut self) {
+    /// Lets risks [row, col, yaw] and ground [row, col] be filled in place. What is written to the risks of the border
+    /// does not stay.
+    pub fn fill<T>(&mut self, write: impl FnOnce(&mut [Risk], &mut [Ground]) -> T) -> T {
+        let result = write(&mut self.risks, &mut self.ground);
+        self.close_border();
+        result
+    }
+
+    fn close_border(&mut self) {
         let (n_rows, n_cols, n_yaws) = (self.geometry.n_rows, self.geometry.n_cols, self.n_yaws);
         for row in 0..n_rows {
             let whole_row = row == 0 || row + 1 == n_rows;
@@ -136,11 +169,6 @@ impl RiskMap {
         &self.geometry
     }
 
-    /// Risks [row, col, yaw] and ground [row, col], to be filled in place.
-    pub fn arrays_mut(&mut self) -> (&mut [Risk], &mut [Ground]) {
-        (&mut self.risks, &mut self.ground)
-    }
-
     /// Moves the window without touching the values; the caller refills them.
     pub fn place_at(&mut self, origin: [i64; 2]) {
         self.geometry.origin = origin;
@@ -148,7 +176,40 @@ impl RiskMap {
 
     /// The map as the controller reads it.
     pub fn view(&self) -> RiskMapView<'_> {
-        RiskMapView { geometry: self.geometry, n_yaws: self.n_yaws, risks: &self.risks, ground: &self.ground }
+        let Self { geometry, n_yaws, risks, ground } = self;
+        RiskMapView(RiskMapParts { geometry: *geometry, n_yaws: *n_yaws, risks, ground })
+    }
+}
+
+impl<'a> RiskMapView<'a> {
+    /// Arrays that lie elsewhere as a risk map: risks [row, col, yaw] and ground [row, col]. Whoever filled them answers
+    /// for the border, which is [`Risk::OUTSIDE`] in every map of a [`RiskMap`].
+    ///
+    /// # Errors
+    /// An array of another length than the geometry says.
+    pub fn new(
+        geometry: GridGeometry,
+        n_yaws: usize,
+        risks: &'a [Risk],
+        ground: &'a [Ground],
+    ) -> Result<Self, RiskMapError> {
+        let GridGeometry { n_rows, n_cols, .. } = geometry;
+        let n_cells = n_rows.saturating_mul(n_cols);
+        let n_risks = n_cells.saturating_mul(n_yaws);
+        for (array, expected, found) in [("risks", n_risks, risks.len()), ("ground", n_cells, ground.len())] {
+            if expected != found {
+                return Err(RiskMapError { array, n_rows, n_cols, n_yaws, expected, found });
+            }
+        }
+        Ok(Self(RiskMapParts { geometry, n_yaws, risks, ground }))
+    }
+}
+
+/// Read-only.
+impl<'a> Deref for RiskMapView<'a> {
+    type Target = RiskMapParts<'a>;
+    fn deref(&self) -> &RiskMapParts<'a> {
+        &self.0
     }
 }
 
@@ -200,12 +261,12 @@ mod tests {
 
     fn marked_map(n_yaws: usize) -> RiskMap {
         let mut map = RiskMap::constant(geometry(), n_yaws, Risk::NONE);
-        let (risks, _) = map.arrays_mut();
-        for (i, risk) in risks.iter_mut().enumerate() {
-            let cell = geometry().cell(i / n_yaws);
-            *risk = marked(cell.row, cell.col, i % n_yaws);
-        }
-        map.close_border();
+        map.fill(|risks, _| {
+            for (i, risk) in risks.iter_mut().enumerate() {
+                let cell = geometry().cell(i / n_yaws);
+                *risk = marked(cell.row, cell.col, i % n_yaws);
+            }
+        });
         map
     }
 
@@ -227,6 +288,26 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn arrays_of_another_shape_are_no_map() {
+        let map = marked_map(3);
+        let RiskMapParts { geometry, n_yaws, risks, ground } = *map.view();
+        let same = RiskMapView::new(geometry, n_yaws, risks, ground).map(|view| view.risks.len());
+        assert_eq!(same, Ok(120));
+        let told = |geometry, n_yaws, risks, ground| {
+            RiskMapView::new(geometry, n_yaws, risks, ground)
+                .map_or_else(|error| error.to_string(), |_| String::new())
+        };
+        assert_eq!(
+            told(geometry, n_yaws, &risks[1..], ground),
+            "risks of a risk map of 5 x 8 cells and 3 yaws: expected 120 values, found 119"
+        );
+        assert!(told(geometry, 4, risks, ground).starts_with("risks of"));
+        assert!(told(geometry, n_yaws, risks, &ground[..39]).contains("expected 40 values, found 39"));
+        let endless = GridGeometry { n_rows: usize::MAX, n_cols: usize::MAX, ..geometry };
+        assert!(told(endless, n_yaws, risks, ground).contains("found 120"));
     }
 
     #[test]

@@ -99,10 +99,12 @@ fn map_of(machine: &TestMachine) -> RiskMap {
     let GridGeometry { resolution_m, origin, n_rows, n_cols } = *world.geometry();
     let geometry = GridGeometry { resolution_m, origin, n_rows, n_cols };
     let mut map = RiskMap::constant(geometry, 1, Risk::NONE);
-    for (index, ground) in map.arrays_mut().1.iter_mut().enumerate() {
-        let [x_m, y_m] = geometry.centre_m(geometry.cell(index));
-        let gradient = world.gradient(x_m, y_m).map(|value| value as f32);
-        *ground = Ground { gradient, class: world.patch(x_m, y_m).class as u8, ..Ground::default() };
-    }
+    map.fill(|_, grounds| {
+        for (index, ground) in grounds.iter_mut().enumerate() {
+            let [x_m, y_m] = geometry.centre_m(geometry.cell(index));
+            let gradient = world.gradient(x_m, y_m).map(|value| value as f32);
+            *ground = Ground { gradient, class: world.patch(x_m, y_m).class as u8, ..Ground::default() };
+        }
+    });
     map
 }

@@ -2,16 +2,19 @@
 
 use super::{Controller, LONGEST_STEPS};
 use crate::config::{Actuation, Temperature};
-use crate::judgement::Judge;
-use crate::kernel;
+use crate::cost::{Frame, RolloutCost, StepCost};
+use crate::diagnostics::CostTerm;
+use crate::driven::Driven;
+use crate::kernel::CHUNK;
 use crate::objective::{Input, Objective, ReferencePath, ReferenceStep, Terminal, TerminalField};
 use crate::recovery::Mode;
-use crate::rollout::{GoalTask, Grid, MAX_SLOTS, Prices, RollOut, Scene, Start, Task};
+use crate::rollout::{GoalTask, Grid, Job, MAX_SLOTS, Prices, Scene, Start, Task};
 use crate::sampling::{Control, Sample, Sampler};
 use crate::summary::Accumulate;
 use crate::weights::{Weigh, WeightSummary};
-use bicycle::{Command, State};
+use bicycle::{MotionLimits, MotionState, MotionStepper};
 use std::f64::consts::TAU;
+use std::ops::Range;
 use traversability::RiskMapView;
 
 /// What to sample for, in metres.
@@ -21,22 +24,22 @@ pub(super) enum TaskOrder<'a> {
     Path(ReferencePath<'a>),
 }
 
-impl Controller {
+impl<M: Driven, S: StepCost, R: RolloutCost> Controller<M, S, R> {
     /// The measured state, carried over the known delay by the commands that are already on their way.
-    pub(super) fn predict_start(&self, input: &Input<'_>) -> State {
+    pub(super) fn predict_start(&self, input: &Input<'_, MotionState>) -> MotionState {
         let mut state = input.state;
         let n_steps = (self.config.delay_s / self.config.step_s).ceil() as usize;
         if n_steps == 0 {
             return state;
         }
         let step_s = self.config.delay_s / n_steps as f64;
-        let judge = Judge { stepper: &self.stepper, limits: &self.model.limits, map: input.map };
+        let judge = self.judge_over(input.map);
         let mut memory = self.slots.map(f64::from);
         for k in 0..n_steps {
             // In force during this step: the command that was sent a delay ago.
             let age_s = self.config.delay_s - (k as f64 + 0.5) * step_s;
-            let next =
-                judge.step(&state, self.ledger.at(age_s).unwrap_or(as_command(&state)), &mut memory, k);
+            let sent = self.ledger.at(age_s).map_or(as_control(&state), Into::into);
+            let next = judge.step(&state, sent, &mut memory, k);
             let share = step_s / self.config.step_s;
             state = between(&state, &next, share);
         }
@@ -44,7 +47,7 @@ impl Controller {
     }
 
     /// Lets what the effects hold follow the step that was driven since the last cycle.
-    pub(super) fn follow_held(&mut self, input: &Input<'_>) {
+    pub(super) fn follow_held(&mut self, input: &Input<'_, MotionState>) {
         let Some(before) = self.before else { return };
         let is_step = input.elapsed_s > 0.0 && input.elapsed_s < LONGEST_STEPS * self.config.step_s;
         if self.held_mps2.is_empty() || !is_step {
@@ -53,14 +56,14 @@ impl Controller {
         let age_s = self.config.delay_s + input.elapsed_s;
         self.recall_slots(before, age_s);
         let mut memory = self.slots.map(f64::from);
-        let judge = Judge { stepper: &self.stepper, limits: &self.model.limits, map: input.map };
-        let command = self.ledger.at(age_s - 0.5 * input.elapsed_s).unwrap_or(as_command(&before));
-        let expected = judge.step(&before, command, &mut memory, 0);
+        let sent = self.ledger.at(age_s - 0.5 * input.elapsed_s).map_or(as_control(&before), Into::into);
+        let expected = self.judge_over(input.map).step(&before, sent, &mut memory, 0);
         let share = input.elapsed_s / self.config.step_s;
         let gained_mps = input.state.speed_mps - before.speed_mps;
         let faster_mps = gained_mps / share - (expected.speed_mps - before.speed_mps);
         self.stepper.correct_held(&mut memory, faster_mps * share);
-        self.held_mps2.copy_from_slice(self.stepper.held(&mut memory));
+        let held = self.held_slots();
+        self.held_mps2.copy_from_slice(&memory[held]);
     }
 
     /// Forgets what was held: the vehicle stands, or the step was not driven.
@@ -70,46 +73,48 @@ impl Controller {
     }
 
     /// What the effects remember at `state`, whose actuators follow the commands `delay_s` late.
-    pub(super) fn recall_slots(&mut self, state: State, delay_s: f64) {
-        let (ledger, slots) = (&self.ledger, &mut self.slots);
-        let past = |age_s: f64| ledger.at(age_s + delay_s).unwrap_or(as_command(&state));
+    pub(super) fn recall_slots(&mut self, state: MotionState, delay_s: f64) {
+        let ledger = &self.ledger;
+        let past = |age_s: f64| ledger.at(age_s + delay_s).map_or(as_control(&state), Into::into);
         let mut memory = [0.0; MAX_SLOTS];
-        self.stepper.held(&mut memory).copy_from_slice(&self.held_mps2);
+        memory[self.held_slots()].copy_from_slice(&self.held_mps2);
         self.stepper.recall(&past, &mut memory[..self.stepper.n_slots()]);
-        *slots = memory.map(|value| value as f32);
+        self.slots = memory.map(|value| value as f32);
+    }
+
+    /// Where the memory of the effects holds accelerations.
+    fn held_slots(&self) -> Range<usize> {
+        self.stepper.n_slots() - self.stepper.n_held()..self.stepper.n_slots()
     }
 
     /// Where the commands of the plan start from: the last command, held as near to the measured state as the lag that
     /// the model knows of allows.
     fn start_control(&self) -> Control {
-        let limits = &self.model.limits;
-        let reached = [self.start.speed_mps, self.start.steering_rad];
-        let last = self
-            .ledger
-            .last()
-            .map_or(reached, |command| [f64::from(command.speed_mps), f64::from(command.steering_rad)]);
-        let rates = [limits.acceleration_max_mps2, limits.steering_rate_max_radps];
-        let reach = [0, 1].map(|c| rates[c] * (self.config.tracking_s + self.lag_s[c]));
+        let reached = [self.start.speed_mps, self.start.turn];
+        let last = self.ledger.last().map_or(reached, |command| {
+            let channels: Control = command.into();
+            channels.map(f64::from)
+        });
+        let reach = [0, 1].map(|c| self.limits.rates[c] * (self.config.tracking_s + self.lag_s[c]));
         [0, 1].map(|c| last[c].clamp(reached[c] - reach[c], reached[c] + reach[c]) as f32)
     }
 
     pub(super) fn sample(&mut self, key: [u32; 4], mode: Mode) {
-        let limits = &self.model.limits;
+        let MotionLimits { low, high, rates, .. } = self.limits;
         let step_s = self.config.step_s;
         let start = self.start_control();
         self.plan.prepare(start, self.config.control_cost * f64::from(self.weighing_temperature_s()));
         let change = match self.config.actuation {
             Actuation::Instant => [f32::INFINITY; 2],
-            Actuation::Limited => [limits.acceleration_max_mps2, limits.steering_rate_max_radps]
-                .map(|rate| (rate * step_s) as f32),
+            Actuation::Limited => rates.map(|rate| (rate * step_s) as f32),
         };
-        let speed_max_mps = if mode == Mode::Onward { limits.speed_max_mps } else { 0.0 };
+        let speed_max_mps = if mode == Mode::Onward { high[0] } else { 0.0 };
         let sampler = Sampler {
             steps: &self.plan.steps,
             kept_noise: [self.plan.correlation(); 2],
             kept_control: self.plan.kept_control(),
-            low: [-limits.reverse_speed_max_mps as f32, -limits.steering_max_rad as f32],
-            high: [speed_max_mps as f32, limits.steering_max_rad as f32],
+            low: low.map(|value| value as f32),
+            high: [speed_max_mps as f32, high[1] as f32],
             change,
             start,
             key,
@@ -117,7 +122,7 @@ impl Controller {
         let (instructions, n_used) = (self.instructions, self.n_used);
         self.workers.run(&mut self.chunks, |index, chunk| {
             if index < n_used {
-                kernel::run(instructions, Sample { sampler: &sampler, index, chunk });
+                Sample { sampler: &sampler, index, chunk }.on(instructions);
             }
         });
     }
@@ -129,7 +134,7 @@ impl Controller {
         }
     }
 
-    pub(super) fn task<'a>(&self, input: &Input<'a>, mode: Mode) -> TaskOrder<'a> {
+    pub(super) fn task<'a>(&self, input: &Input<'a, MotionState>, mode: Mode) -> TaskOrder<'a> {
         match (mode, input.objective) {
             (Mode::BackUp { target_m }, _) => TaskOrder::Goal(target_m, 0.0, Terminal::StraightLine),
             (Mode::Onward, Objective::Goal { goal_m, tolerance_m, terminal }) => {
@@ -139,10 +144,11 @@ impl Controller {
         }
     }
 
-    pub(super) fn roll_out(&mut self, input: &Input<'_>, order: TaskOrder<'_>) {
+    pub(super) fn roll_out(&mut self, input: &Input<'_, MotionState>, order: TaskOrder<'_>) {
         let geometry = &input.map.geometry;
-        let (corner_m, cell_m) = (geometry.south_west_m(), geometry.resolution_m);
-        let cells = |at_m: [f64; 2]| [0, 1].map(|axis| (at_m[axis] - corner_m[axis]) / cell_m);
+        let frame = Frame { corner_m: geometry.south_west_m(), cell_m: geometry.resolution_m };
+        let cell_m = frame.cell_m;
+        let cells = |at_m: [f64; 2]| frame.cells(at_m);
         if let TaskOrder::Path(path) = order {
             let passed_m = path.project([self.start.x_m, self.start.y_m]);
             let (costs, step_s) = (&self.config.costs, self.config.step_s);
@@ -174,7 +180,6 @@ impl Controller {
             }
         };
         let [x_cells, y_cells] = cells([self.start.x_m, self.start.y_m]);
-        let judge = Judge { stepper: &self.stepper, limits: &self.model.limits, map: input.map };
         let scene = Scene {
             stepper: &self.cell_stepper,
             grid: grid(&input.map),
@@ -183,28 +188,54 @@ impl Controller {
                 y_cells,
                 turns: (self.start.yaw_rad / TAU).rem_euclid(1.0),
                 speed_mps: self.start.speed_mps,
-                steering_rad: self.start.steering_rad,
+                turn: self.start.turn,
             },
-            tilted_start: judge.tilt(&self.start),
+            tilted_start: self.judge_over(input.map).tilt(&self.start),
             slots: &self.slots[..self.cell_stepper.n_slots()],
             prices: self.prices(),
             task,
+            cost: &self.step_cost,
+            frame,
+            keeps_ends: !R::IS_NOTHING,
         };
         let (instructions, n_used) = (self.instructions, self.n_used);
         self.workers.run(&mut self.chunks, |index, chunk| {
             if index < n_used {
-                kernel::run(instructions, RollOut { scene: &scene, chunk });
+                S::roll_out::<M>(Job { instructions, scene: &scene, chunk });
             }
         });
     }
 
+    /// Asks what whole rollouts cost.
+    pub(super) fn add_rollout_cost(&mut self, input: &Input<'_, MotionState>) {
+        if R::IS_NOTHING {
+            return;
+        }
+        let geometry = &input.map.geometry;
+        let frame = Frame { corner_m: geometry.south_west_m(), cell_m: geometry.resolution_m };
+        let n = self.n_rollouts();
+        let (futures, added_s) = (&mut self.futures[..n], &mut self.added_s[..n]);
+        for (number, future) in futures.iter_mut().enumerate() {
+            *future = self.chunks[number / CHUNK].future(number % CHUNK, &frame);
+        }
+        added_s.fill(0.0);
+        self.rollout_cost.add(futures, added_s);
+        for (number, added_s) in added_s.iter().enumerate() {
+            let (chunk, lane) = (&mut self.chunks[number / CHUNK], number % CHUNK);
+            let term_s = &mut chunk.terms[CostTerm::Added as usize].0[lane];
+            // Without a step cost nobody has written the term of this cycle.
+            *term_s = added_s + if S::IS_NOTHING { 0.0 } else { *term_s };
+            chunk.costs.0[lane] += added_s;
+        }
+    }
+
     fn prices(&self) -> Prices {
-        let (limits, costs) = (&self.model.limits, &self.config.costs);
+        let (limits, costs) = (&self.limits, &self.config.costs);
         Prices {
             roll_max_rad: limits.roll_max_rad,
             pitch_max_rad: limits.pitch_max_rad,
             attitude_s: costs.attitude_s,
-            lateral_max_mps2: self.lateral_max_mps2,
+            lateral_max_mps2: limits.lateral_acceleration_max_mps2,
             lateral_s: costs.lateral_s,
             reverse_s: costs.reverse_s,
         }
@@ -216,7 +247,7 @@ impl Controller {
             temperature: self.config.temperature,
             last_s: self.temperature_s,
         };
-        let summary = kernel::run(self.instructions, work);
+        let summary = work.on(self.instructions);
         self.temperature_s = summary.temperature_s;
         summary
     }
@@ -226,7 +257,7 @@ impl Controller {
         let (instructions, n_used) = (self.instructions, self.n_used);
         self.workers.run(&mut self.chunks, |index, chunk| {
             if index < n_used {
-                kernel::run(instructions, Accumulate { chunk });
+                Accumulate { chunk }.on(instructions);
             }
         });
         self.plan.nominal.fill([0.0; 2]);
@@ -251,19 +282,19 @@ fn grid<'a>(map: &RiskMapView<'a>) -> Grid<'a> {
 }
 
 /// The state a share of the way from one to the other; yaw the short way round.
-fn between(from: &State, to: &State, share: f64) -> State {
+fn between(from: &MotionState, to: &MotionState, share: f64) -> MotionState {
     let blend = |from: f64, to: f64| from + share * (to - from);
     let turn_rad = (to.yaw_rad - from.yaw_rad + TAU / 2.0).rem_euclid(TAU) - TAU / 2.0;
-    State {
+    MotionState {
         x_m: blend(from.x_m, to.x_m),
         y_m: blend(from.y_m, to.y_m),
         yaw_rad: from.yaw_rad + share * turn_rad,
         speed_mps: blend(from.speed_mps, to.speed_mps),
-        steering_rad: blend(from.steering_rad, to.steering_rad),
+        turn: blend(from.turn, to.turn),
     }
 }
 
 /// The command that keeps a state's actuators where they are.
-fn as_command(state: &State) -> Command {
-    Command { speed_mps: state.speed_mps as f32, steering_rad: state.steering_rad as f32 }
+pub(super) fn as_control(state: &MotionState) -> Control {
+    [state.speed_mps as f32, state.turn as f32]
 }

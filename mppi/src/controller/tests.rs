@@ -2,9 +2,10 @@
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
 use super::*;
+use crate::config::Actuation;
 use crate::kernel::CHUNK;
 use crate::{Costs, Objective, Terminal};
-use bicycle::{GroundSample, Limits};
+use bicycle::{Command, Effect, GroundSample, Limits, State, Stepper};
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use traversability::{GridGeometry, Risk, RiskMap};
@@ -33,8 +34,7 @@ fn model(drag_mps2: f64) -> Model {
 #[test]
 fn what_is_held_is_what_the_model_does_not_know_to_be_cancelled() {
     for (known_mps2, held_mps2) in [(0.0, 0.0), (0.6, 0.6)] {
-        let mut map = RiskMap::constant(GridGeometry::centred(0.25, 160, 160, 0.0, 0.0), 1, Risk::NONE);
-        map.close_border();
+        let map = RiskMap::constant(GridGeometry::centred(0.25, 160, 160, 0.0, 0.0), 1, Risk::NONE);
         let objective =
             Objective::Goal { goal_m: [19.0, 0.0], tolerance_m: 0.5, terminal: Terminal::StraightLine };
         let config = Config { n_threads: 1, n_rollouts: 256, ..Config::default() };
@@ -63,19 +63,21 @@ fn obstacles(random: &mut Xoshiro256PlusPlus, n: usize) -> RiskMap {
     for kind in 0..n {
         let [x_m, y_m] = [0, 1].map(|_| random.random_range(-6.0..6.0_f64));
         let radius_m = random.random_range(0.5..1.5);
-        for (index, risks) in map.arrays_mut().0.chunks_exact_mut(16).enumerate() {
-            let centre_m = geometry.centre_m(geometry.cell(index));
-            if (centre_m[0] - x_m).hypot(centre_m[1] - y_m) < radius_m {
-                let is_middle = (centre_m[0] - x_m).hypot(centre_m[1] - y_m) < 0.5 * radius_m;
-                let tilt_rad = if is_middle { 0.8 } else { 0.6 };
-                let tilted = |risk: &Risk| match kind % 3 {
-                    0 => Risk { roll_rad: tilt_rad, ..*risk },
-                    1 => Risk { pitch_rad: tilt_rad, ..*risk },
-                    _ => risk.blocked(),
-                };
-                risks.iter_mut().for_each(|risk| *risk = tilted(risk));
+        map.fill(|risks, _| {
+            for (index, risks) in risks.chunks_exact_mut(16).enumerate() {
+                let centre_m = geometry.centre_m(geometry.cell(index));
+                if (centre_m[0] - x_m).hypot(centre_m[1] - y_m) < radius_m {
+                    let is_middle = (centre_m[0] - x_m).hypot(centre_m[1] - y_m) < 0.5 * radius_m;
+                    let tilt_rad = if is_middle { 0.8 } else { 0.6 };
+                    let tilted = |risk: &Risk| match kind % 3 {
+                        0 => Risk { roll_rad: tilt_rad, ..*risk },
+                        1 => Risk { pitch_rad: tilt_rad, ..*risk },
+                        _ => risk.blocked(),
+                    };
+                    risks.iter_mut().for_each(|risk| *risk = tilted(risk));
+                }
             }
-        }
+        });
     }
     map
 }
@@ -83,11 +85,15 @@ fn obstacles(random: &mut Xoshiro256PlusPlus, n: usize) -> RiskMap {
 /// Whether the judge says that a rollout breaks a limit in the poses that the rollouts look at: all after the start but
 /// the last. None where a millimetre or a tenth of a milliradian at the start would change the answer.
 fn judged(controller: &Controller, map: &RiskMap, (chunk, lane): (usize, usize)) -> Option<bool> {
-    let judge = Judge { stepper: &controller.stepper, limits: &controller.model.limits, map: map.view() };
+    let judge = controller.judge_over(map.view());
     let breaks = |east_m: f64, north_m: f64, left_rad: f64| {
-        let State { x_m, y_m, yaw_rad, .. } = controller.start;
-        let start =
-            State { x_m: x_m + east_m, y_m: y_m + north_m, yaw_rad: yaw_rad + left_rad, ..controller.start };
+        let MotionState { x_m, y_m, yaw_rad, .. } = controller.start;
+        let start = MotionState {
+            x_m: x_m + east_m,
+            y_m: y_m + north_m,
+            yaw_rad: yaw_rad + left_rad,
+            ..controller.start
+        };
         let controls = controller.chunks[chunk].controls_of(lane).take(controller.config.n_steps - 1);
         let mut memory = controller.slots.map(f64::from);
         judge.breaks_limits(&start, controls, &mut memory)
@@ -153,10 +159,12 @@ fn a_feasible_rollout_is_driven_though_the_mean_and_the_cheapest_break_a_limit()
     let mut map = RiskMap::constant(GridGeometry::centred(0.25, 160, 160, 0.0, 0.0), 1, Risk::NONE);
     let geometry = *map.geometry();
     let is_wall = |x_m: f64, y_m: f64| (1.0..3.0).contains(&x_m) && y_m.abs() < 6.0;
-    for (index, risk) in map.arrays_mut().0.iter_mut().enumerate() {
-        let [x_m, y_m] = geometry.centre_m(geometry.cell(index));
-        *risk = if is_wall(x_m, y_m) { risk.blocked() } else { *risk };
-    }
+    map.fill(|risks, _| {
+        for (index, risk) in risks.iter_mut().enumerate() {
+            let [x_m, y_m] = geometry.centre_m(geometry.cell(index));
+            *risk = if is_wall(x_m, y_m) { risk.blocked() } else { *risk };
+        }
+    });
     let objective =
         Objective::Goal { goal_m: [15.0, 0.0], tolerance_m: 0.5, terminal: Terminal::StraightLine };
     let mut n_alone = 0;

@@ -3,7 +3,7 @@
 use super::Memory;
 use crate::kernel::Kernel;
 use bicycle::lanes::Real;
-use bicycle::{GroundSample, LaneState, Rates, Stepper};
+use bicycle::{GroundSample, LaneState, MotionStepper, Rates};
 
 /// What of a step there is to compute.
 pub(super) trait Motion {
@@ -13,8 +13,8 @@ pub(super) trait Motion {
     const HAS_MANOEUVRES: bool;
     /// Whether the vehicle stands beyond a limit of attitude.
     const IS_LEAVING: bool;
-    fn step<K: Kernel>(
-        stepper: &Stepper,
+    fn step<K: Kernel, P: MotionStepper>(
+        stepper: &P,
         state: &mut LaneState<K>,
         command: [Real<K>; 2],
         ground: &GroundSample<Real<K>>,
@@ -36,8 +36,8 @@ impl Motion for Bare {
     const HAS_MANOEUVRES: bool = false;
     const IS_LEAVING: bool = false;
     #[inline(always)]
-    fn step<K: Kernel>(
-        stepper: &Stepper,
+    fn step<K: Kernel, P: MotionStepper>(
+        stepper: &P,
         state: &mut LaneState<K>,
         command: [Real<K>; 2],
         ground: &GroundSample<Real<K>>,
@@ -52,8 +52,8 @@ impl Motion for Plain {
     const HAS_MANOEUVRES: bool = true;
     const IS_LEAVING: bool = false;
     #[inline(always)]
-    fn step<K: Kernel>(
-        stepper: &Stepper,
+    fn step<K: Kernel, P: MotionStepper>(
+        stepper: &P,
         state: &mut LaneState<K>,
         command: [Real<K>; 2],
         ground: &GroundSample<Real<K>>,
@@ -68,8 +68,8 @@ impl Motion for Whole {
     const HAS_MANOEUVRES: bool = true;
     const IS_LEAVING: bool = false;
     #[inline(always)]
-    fn step<K: Kernel>(
-        stepper: &Stepper,
+    fn step<K: Kernel, P: MotionStepper>(
+        stepper: &P,
         state: &mut LaneState<K>,
         command: [Real<K>; 2],
         ground: &GroundSample<Real<K>>,
@@ -84,8 +84,8 @@ impl Motion for Leaving {
     const HAS_MANOEUVRES: bool = true;
     const IS_LEAVING: bool = true;
     #[inline(always)]
-    fn step<K: Kernel>(
-        stepper: &Stepper,
+    fn step<K: Kernel, P: MotionStepper>(
+        stepper: &P,
         state: &mut LaneState<K>,
         command: [Real<K>; 2],
         ground: &GroundSample<Real<K>>,

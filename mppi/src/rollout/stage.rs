@@ -1,57 +1,115 @@
-//! What the steps and the end of a rollout cost beside the limits: to a goal, and along a path.
+//! What the controller prices itself, beside the limits of attitude: the way to a goal or along a path, lateral
+//! acceleration, reverse.
 
-use super::{Flight, GoalTask};
+use super::GoalTask;
+use crate::cost::{Place, Step, StepCost};
 use crate::kernel::Kernel;
 use crate::objective::ReferenceStep;
-use bicycle::lanes::Real;
+use bicycle::lanes::{Lanes, Real};
 
-/// What a step and the end cost beside the limits.
-pub(super) trait Stage<K: Kernel> {
-    fn step(&self, t: usize, flight: &mut Flight<K>);
-    fn finish(&self, flight: &Flight<K>) -> Real<K>;
+/// The task of the rollouts: a cost that knows when it is done, and where its end may be looked up in a table.
+pub(super) trait Stage<K: Kernel>: StepCost {
+    /// Where the way goes on after a step.
+    fn goes_on(&self, step: &Step<'_, K>, under_way: K::Mask) -> K::Mask;
+    /// Cost of where a rollout ends that is under way [s].
+    fn finish(&self, end: &Place<'_, K>) -> Real<K>;
+}
+
+impl GoalTask<'_> {
+    /// Distance to the goal [cells].
+    #[inline(always)]
+    fn distance<L: Lanes>(&self, place: &Place<'_, L>) -> Real<L> {
+        let lanes = place.lanes();
+        let dx = place.state.x - lanes.real(self.x_cells);
+        let dy = place.state.y - lanes.real(self.y_cells);
+        dx.mul_add(dx, dy * dy).sqrt()
+    }
+}
+
+impl StepCost for GoalTask<'_> {
+    #[inline(always)]
+    fn step<L: Lanes>(&self, step: &Step<'_, L>) -> Real<L> {
+        let lanes = step.lanes();
+        self.distance(step).mul_add(lanes.real(self.distance_s), lanes.real(self.step_s))
+    }
+
+    /// The straight line.
+    #[inline(always)]
+    fn end<L: Lanes>(&self, end: &Place<'_, L>) -> Real<L> {
+        self.distance(end) * end.lanes().real(self.rest_s)
+    }
 }
 
 impl<K: Kernel> Stage<K> for GoalTask<'_> {
     #[inline(always)]
-    fn step(&self, _t: usize, flight: &mut Flight<K>) {
-        let kernel = flight.state.x.0;
-        let dx = flight.state.x - kernel.real(self.x_cells);
-        let dy = flight.state.y - kernel.real(self.y_cells);
-        flight.distance = dx.mul_add(dx, dy * dy).sqrt();
-        let cost = flight.distance.mul_add(kernel.real(self.distance_s), kernel.real(self.step_s));
-        flight.running = flight.running.add_where(flight.under_way, cost);
-        let away = kernel.real(self.tolerance_cells).less(flight.distance);
-        flight.under_way = kernel.and(flight.under_way, away);
+    fn goes_on(&self, step: &Step<'_, K>, under_way: K::Mask) -> K::Mask {
+        let kernel = step.lanes();
+        kernel.and(under_way, kernel.real(self.tolerance_cells).less(self.distance(step)))
     }
 
     #[inline(always)]
-    fn finish(&self, flight: &Flight<K>) -> Real<K> {
-        let kernel = flight.distance.0;
-        let rest = match &self.field {
-            None => flight.distance * kernel.real(self.rest_s),
-            Some(field) => field.seconds(flight.state.x, flight.state.y),
-        };
-        kernel.real(0.0).add_where(flight.under_way, rest)
+    fn finish(&self, end: &Place<'_, K>) -> Real<K> {
+        match &self.field {
+            None => self.end(end),
+            Some(field) => field.seconds(end.state.x, end.state.y),
+        }
     }
 }
 
 /// A moving point to keep up with.
 pub(super) struct PathTask<'a>(pub(super) &'a [ReferenceStep]);
 
+impl StepCost for PathTask<'_> {
+    #[inline(always)]
+    fn step<L: Lanes>(&self, step: &Step<'_, L>) -> Real<L> {
+        let (lanes, reference) = (step.lanes(), &self.0[step.t]);
+        let dx = step.state.x - lanes.real(reference.x_cells);
+        let dy = step.state.y - lanes.real(reference.y_cells);
+        let [tx, ty] = reference.tangent.map(|value| lanes.real(value));
+        let (along, across) = (dx.mul_add(tx, dy * ty), dy.mul_add(tx, -(dx * ty)));
+        let along = along * along * lanes.real(reference.along_s);
+        (across * across).mul_add(lanes.real(reference.across_s), along)
+    }
+}
+
 impl<K: Kernel> Stage<K> for PathTask<'_> {
     #[inline(always)]
-    fn step(&self, t: usize, flight: &mut Flight<K>) {
-        let (kernel, reference) = (flight.state.x.0, &self.0[t]);
-        let dx = flight.state.x - kernel.real(reference.x_cells);
-        let dy = flight.state.y - kernel.real(reference.y_cells);
-        let [tx, ty] = reference.tangent.map(|value| kernel.real(value));
-        let (along, across) = (dx.mul_add(tx, dy * ty), dy.mul_add(tx, -(dx * ty)));
-        let along = along * along * kernel.real(reference.along_s);
-        flight.running = flight.running + (across * across).mul_add(kernel.real(reference.across_s), along);
+    fn goes_on(&self, _: &Step<'_, K>, under_way: K::Mask) -> K::Mask {
+        under_way
     }
 
     #[inline(always)]
-    fn finish(&self, flight: &Flight<K>) -> Real<K> {
-        flight.state.x.0.real(0.0)
+    fn finish(&self, end: &Place<'_, K>) -> Real<K> {
+        self.end(end)
+    }
+}
+
+/// Steps beyond a lateral acceleration.
+pub(super) struct Lateral {
+    pub(super) most_mps2: f64,
+    /// Of a step [s].
+    pub(super) price_s: f64,
+}
+
+impl StepCost for Lateral {
+    #[inline(always)]
+    fn step<L: Lanes>(&self, step: &Step<'_, L>) -> Real<L> {
+        let (lanes, rates) = (step.lanes(), step.rates());
+        let sideways = (rates.speed * rates.yaw_rate).abs().exceeds(lanes.real(self.most_mps2));
+        lanes.real(0.0).add_where(sideways, lanes.real(self.price_s))
+    }
+}
+
+/// Steps in reverse.
+pub(super) struct Reverse {
+    /// Of a step [s].
+    pub(super) price_s: f64,
+}
+
+impl StepCost for Reverse {
+    #[inline(always)]
+    fn step<L: Lanes>(&self, step: &Step<'_, L>) -> Real<L> {
+        let (lanes, zero) = (step.lanes(), step.lanes().real(0.0));
+        zero.add_where(step.rates().speed.less(zero), lanes.real(self.price_s))
     }
 }

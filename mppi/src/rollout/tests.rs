@@ -1,11 +1,13 @@
 //! Rollouts against a plain f64 loop over equation 2 and the map's own lookup, on every instruction set.
 #![allow(clippy::unwrap_used, reason = "a test that cannot be set up has failed")]
 
+mod skid_steer;
+
 use super::*;
 use crate::cost_to_go::CostToGoView;
 use crate::kernel;
 use bicycle::lanes::Instructions;
-use bicycle::{Command, Effect, Limits, Model, State};
+use bicycle::{Command, Effect, Limits, Model, State, Stepper};
 use traversability::{GridGeometry, Ground, RiskMap};
 
 const N_STEPS: usize = 40;
@@ -40,16 +42,17 @@ fn stepper(resolution_m: f64) -> Stepper {
 /// Ground whose risk changes by cell and yaw.
 fn map() -> RiskMap {
     let mut map = RiskMap::constant(GridGeometry::centred(0.5, 60, 50, 1.0, -2.0), 13, Risk::NONE);
-    for (index, risk) in map.arrays_mut().0.iter_mut().enumerate() {
-        let wave = |factor: usize| ((index * factor) % 101) as f32 / 100.0;
-        *risk = Risk {
-            linear_traction: 0.5 + 0.5 * wave(7),
-            angular_traction: 0.4 + 0.6 * wave(13),
-            roll_rad: 0.55 * wave(29),
-            pitch_rad: 0.53 * wave(43),
-        };
-    }
-    map.close_border();
+    map.fill(|risks, _| {
+        for (index, risk) in risks.iter_mut().enumerate() {
+            let wave = |factor: usize| ((index * factor) % 101) as f32 / 100.0;
+            *risk = Risk {
+                linear_traction: 0.5 + 0.5 * wave(7),
+                angular_traction: 0.4 + 0.6 * wave(13),
+                roll_rad: 0.55 * wave(29),
+                pitch_rad: 0.53 * wave(43),
+            };
+        }
+    });
     map
 }
 
@@ -131,16 +134,27 @@ fn goal<'a>(map: &RiskMap, distance_s_per_m: f64, field: Option<TerminalField<'a
     }
 }
 
-fn scene<'a>(map: &'a RiskMap, stepper: &'a Stepper, task: Task<'a>) -> Scene<'a> {
+fn scene<'a>(map: &'a RiskMap, stepper: &'a Stepper, task: Task<'a>) -> Scene<'a, Stepper, ()> {
     let corner_m = map.geometry().south_west_m();
     let start = Start {
         x_cells: (START[0] - corner_m[0]) / 0.5,
         y_cells: (START[1] - corner_m[1]) / 0.5,
         turns: START[2] / std::f64::consts::TAU,
         speed_mps: 0.0,
-        steering_rad: 0.0,
+        turn: 0.0,
     };
-    Scene { stepper, grid: grid(map), start, tilted_start: None, slots: &[], prices: PRICES, task }
+    Scene {
+        stepper,
+        grid: grid(map),
+        start,
+        tilted_start: None,
+        slots: &[],
+        prices: PRICES,
+        task,
+        cost: &(),
+        frame: Frame { corner_m, cell_m: 0.5 },
+        keeps_ends: false,
+    }
 }
 
 /// Lanes whose f64 path comes within 1e-4 of an edge are left out: there the last bit decides.
@@ -257,14 +271,16 @@ fn whole_model() -> Model {
 /// Slopes and plants that change from cell to cell.
 fn hilly() -> RiskMap {
     let mut map = map();
-    for (index, ground) in map.arrays_mut().1.iter_mut().enumerate() {
-        let wave = |factor: usize| ((index * factor) % 97) as f32 / 96.0 - 0.5;
-        *ground = Ground {
-            gradient: [0.3 * wave(5), 0.3 * wave(11)],
-            class: (index % 3) as u8,
-            ..Ground::default()
-        };
-    }
+    map.fill(|_, grounds| {
+        for (index, ground) in grounds.iter_mut().enumerate() {
+            let wave = |factor: usize| ((index * factor) % 97) as f32 / 96.0 - 0.5;
+            *ground = Ground {
+                gradient: [0.3 * wave(5), 0.3 * wave(11)],
+                class: (index % 3) as u8,
+                ..Ground::default()
+            };
+        }
+    });
     map
 }
 
@@ -337,7 +353,7 @@ fn rollouts_of_a_whole_model_go_where_one_vehicle_goes() {
         let [x_cells, y_cells] = [0, 1].map(|axis| (goal_m[axis] - corner_m[axis]) / 0.5);
         let task = Task::Goal(GoalTask { x_cells, y_cells, ..goal(&map, 0.0, None) });
         let mut scene = scene(&map, &stepper, task);
-        (scene.slots, scene.start.speed_mps, scene.start.steering_rad) = (&slots, 0.8, 0.1);
+        (scene.slots, scene.start.speed_mps, scene.start.turn) = (&slots, 0.8, 0.1);
         for machine in machines() {
             let mut chunk = chunk();
             kernel::run(machine, RollOut { scene: &scene, chunk: &mut chunk });
@@ -365,16 +381,17 @@ fn rollouts_of_a_whole_model_go_where_one_vehicle_goes() {
 fn broken(field: usize, number: f32) -> RiskMap {
     let mut map = RiskMap::constant(GridGeometry::centred(0.5, 60, 50, 1.0, -2.0), 13, Risk::NONE);
     let geometry = *map.geometry();
-    let (risks, grounds) = map.arrays_mut();
-    for (index, (risks, ground)) in risks.chunks_exact_mut(13).zip(grounds).enumerate() {
-        if geometry.centre_m(geometry.cell(index))[0] > 3.0 {
-            match field {
-                0 => risks.iter_mut().for_each(|risk| risk.linear_traction = number),
-                1 => risks.iter_mut().for_each(|risk| risk.angular_traction = number),
-                _ => ground.gradient = [number, 0.1],
+    map.fill(|risks, grounds| {
+        for (index, (risks, ground)) in risks.chunks_exact_mut(13).zip(grounds).enumerate() {
+            if geometry.centre_m(geometry.cell(index))[0] > 3.0 {
+                match field {
+                    0 => risks.iter_mut().for_each(|risk| risk.linear_traction = number),
+                    1 => risks.iter_mut().for_each(|risk| risk.angular_traction = number),
+                    _ => ground.gradient = [number, 0.1],
+                }
             }
         }
-    }
+    });
     map
 }
 

@@ -3,7 +3,7 @@
 
 use super::*;
 use crate::{GuardConfig, RiskMapConfig};
-use bicycle::{Geometry, Limits, State};
+use bicycle::{Command, Geometry, Limits, State};
 use mppi::{CostToGo, CostToGoConfig};
 use physics_prior::PriorConfig;
 use terrain::ElevationConfig;

@@ -7,3 +7,4 @@ mod faults;
 mod goals;
 mod repeats;
 mod sensors;
+mod skid_steer;

@@ -17,7 +17,7 @@ use runtime::message::{
 use runtime::payload::{RiskParts, risk_views};
 use runtime::status::Role;
 use terrain::GridGeometry;
-use traversability::{Risk, RiskMap, RiskMapView};
+use traversability::{Risk, RiskMap};
 
 use crate::fixture::{Run, machine};
 
@@ -336,9 +336,8 @@ fn what_is_written_after_sending_is_read() {
     let at = memory.messages[0][1] + size_of::<RiskHeader>() as u64;
     memory.write(at, &vec![0xff; 16 * parts().n_elements()]);
     let read = |message: &runtime::channel::Message<RiskHeader, [f32; 4]>| -> [bool; 2] {
-        let (RiskMapView { risks, .. }, CostToGoView { seconds, .. }) =
-            risk_views(message.header(), message.payload()).unwrap();
-        [risks[0].roll_rad.is_nan(), seconds[seconds.len() - 1].is_nan()]
+        let (map, CostToGoView { seconds, .. }) = risk_views(message.header(), message.payload()).unwrap();
+        [map.risks[0].roll_rad.is_nan(), seconds[seconds.len() - 1].is_nan()]
     };
     assert_eq!(read(&message), [true, true]);
 }

@@ -1,0 +1,26 @@
+//! Which motion models a controller can drive.
+
+use crate::rollout::Job;
+use bicycle::{Model, MotionModel, SkidSteer};
+
+/// A motion model that a [`crate::Controller`] can drive: `impl Driven for MyModel {}` is all that it takes.
+pub trait Driven: MotionModel {
+    /// Rolls out some futures. Models of this crate override it with the same, so that their loops are compiled here
+    /// and once.
+    #[doc(hidden)]
+    fn roll_out(job: Job<'_, Self::Stepper, ()>) {
+        job.run();
+    }
+}
+
+impl Driven for Model {
+    fn roll_out(job: Job<'_, Self::Stepper, ()>) {
+        job.run();
+    }
+}
+
+impl Driven for SkidSteer {
+    fn roll_out(job: Job<'_, Self::Stepper, ()>) {
+        job.run();
+    }
+}

@@ -1,0 +1,185 @@
+//! Costs that a user brings along: what they come to, and what they change.
+#![allow(clippy::unwrap_used, reason = "a test that cannot be set up has failed")]
+
+mod fixture;
+
+use bicycle::lanes::{Lanes, Real};
+use bicycle::{Command, Decision, GroundSample, Model, MotionState, State, Stepper};
+use fixture::{STEP_S, goal, level, model, rough};
+use mppi::{Config, Controller, CostTerm, Future, Input, Isa, RolloutCost, Step, StepCost};
+use traversability::RiskMap;
+
+/// The same for every step.
+struct PerStep(f64);
+
+impl StepCost for PerStep {
+    fn step<L: Lanes>(&self, step: &Step<'_, L>) -> Real<L> {
+        step.lanes().real(self.0)
+    }
+}
+
+/// A second for every step within a disc.
+struct KeepOut {
+    centre_m: [f64; 2],
+    radius_m: f64,
+}
+
+impl StepCost for KeepOut {
+    fn step<L: Lanes>(&self, step: &Step<'_, L>) -> Real<L> {
+        let lanes = step.lanes();
+        let inside = step.distance_m(self.centre_m).less(lanes.real(self.radius_m));
+        lanes.real(0.0).add_where(inside, lanes.real(1.0))
+    }
+}
+
+/// Seconds per metre of how far north a rollout ends.
+struct NotNorth(f32);
+
+impl RolloutCost for NotNorth {
+    fn add(&self, futures: &[Future], added_s: &mut [f32]) {
+        for (future, added_s) in futures.iter().zip(added_s) {
+            *added_s += self.0 * future.end.y_m as f32;
+        }
+    }
+}
+
+/// Takes away that a rollout is finite.
+struct Broken;
+
+impl RolloutCost for Broken {
+    fn add(&self, _: &[Future], added_s: &mut [f32]) {
+        added_s[..100].fill(f32::NAN);
+    }
+}
+
+fn input(map: &RiskMap, cycle: u64) -> Input<'_> {
+    let elapsed_s = if cycle == 0 { 0.0 } else { STEP_S };
+    Input { state: State::default(), elapsed_s, map: map.view(), objective: goal([15.0, 0.0]), cycle }
+}
+
+fn controller<S: StepCost, R: RolloutCost>(costs: (S, R)) -> Controller<Model, S, R> {
+    Controller::with_costs(Config::default(), model(), costs, 3).unwrap()
+}
+
+/// Mean cost of what was added, over all rollouts [s].
+fn added_s<S: StepCost, R: RolloutCost>(controller: &Controller<Model, S, R>) -> f32 {
+    controller.diagnostics().mean_terms_s[CostTerm::Added as usize]
+}
+
+/// Nothing to pay is the controller without costs, to the bit, whatever it is called.
+#[test]
+fn a_cost_of_nothing_changes_no_bit() {
+    let map = rough(4);
+    let decisions = |mut decide: Box<dyn FnMut(&Input<'_>) -> Decision>| -> Vec<Decision> {
+        (0..5).map(|cycle| decide(&input(&map, cycle))).collect()
+    };
+    let (mut none, mut nothing) = (controller(((), ())), controller((PerStep(0.0), NotNorth(0.0))));
+    let mut new = Controller::new(Config::default(), model(), 3).unwrap();
+    let expected = decisions(Box::new(move |input| new.decide(input)));
+    assert_eq!(decisions(Box::new(move |input| none.decide(input))), expected);
+    assert_eq!(decisions(Box::new(move |input| nothing.decide(input))), expected);
+}
+
+/// No rollout of 5 s at 2 m/s reaches a goal 15 m away: all 50 steps count. Costs add up, alone and as tuples, and do not
+/// pile up from cycle to cycle.
+#[test]
+fn costs_of_steps_add_up() {
+    let map = level();
+    for isa in [Isa::Portable, Isa::Avx2, Isa::Avx512] {
+        let config = Config { isa, ..Config::default() };
+        let costs = (PerStep(0.01), PerStep(0.02), KeepOut { centre_m: [0.0, 0.0], radius_m: 100.0 });
+        let Ok(mut controller) = Controller::with_costs(config, model(), (costs, ()), 3) else { continue };
+        for cycle in 0..3 {
+            assert!(matches!(controller.decide(&input(&map, cycle)), Decision::Drive(_)));
+            assert!((added_s(&controller) - 51.5).abs() < 1e-3, "{isa:?} {}", added_s(&controller));
+        }
+        controller.step_cost_mut().0 = PerStep(0.03);
+        controller.decide(&input(&map, 3));
+        assert!((added_s(&controller) - 52.5).abs() < 1e-3, "changed between decisions");
+    }
+}
+
+/// Steps count until the goal is reached: 2 m away, that is long before the horizon.
+#[test]
+fn costs_end_at_the_goal() {
+    let map = level();
+    let mut controller = controller((PerStep(1.0), ()));
+    let state = State { speed_mps: 2.0, ..State::default() };
+    controller.decide(&Input { state, objective: goal([2.0, 0.0]), ..input(&map, 0) });
+    let best = controller.diagnostics().best_terms_s[CostTerm::Added as usize];
+    // 1.5 m to the rim at 2 m/s: with the eighth step.
+    assert!((8.0..=9.0).contains(&best), "{best}");
+}
+
+/// A rollout's end is told in the map frame, and its cost is what the diagnostics say.
+#[test]
+fn futures_are_told_where_they_end() {
+    struct Recorded(std::sync::Mutex<Vec<Future>>);
+    impl RolloutCost for Recorded {
+        fn add(&self, futures: &[Future], _: &mut [f32]) {
+            *self.0.lock().unwrap() = futures.to_vec();
+        }
+    }
+    let map = rough(2);
+    let mut controller = controller(((), Recorded(std::sync::Mutex::default())));
+    let state = State { x_m: 1.0, y_m: -2.0, yaw_rad: 0.4, ..State::default() };
+    controller.decide(&Input { state, ..input(&map, 0) });
+    let best = controller.best_rollouts(20, map.view());
+    let futures = controller.rollout_cost_mut().0.lock().unwrap().clone();
+    assert_eq!(futures.len(), 1024);
+    let mut n_matched = 0;
+    for rollout in &best {
+        let end = MotionState::from(*rollout.states.last().unwrap());
+        let future = futures.iter().find(|future| future.cost_s == rollout.cost_s).unwrap();
+        let off_m = (future.end.x_m - end.x_m).hypot(future.end.y_m - end.y_m);
+        // Where rounding decides between two cells, the twin goes another way.
+        n_matched += usize::from(off_m < 1e-3 && (future.end.speed_mps - end.speed_mps).abs() < 1e-4);
+    }
+    assert!(n_matched >= 10, "{n_matched} of {}", best.len());
+}
+
+/// The straight way leads through the disc, the cost leads around it.
+#[test]
+fn a_disc_to_keep_out_of_is_driven_around() {
+    let nearest_m = |mut decide: Box<dyn FnMut(&Input<'_>) -> Decision>| {
+        let (map, stepper) = (level(), Stepper::new(&model(), STEP_S, 1.0));
+        let (mut state, mut nearest_m) = (State::default(), f64::INFINITY);
+        for cycle in 0..150 {
+            let decision = decide(&Input { state, objective: goal([12.0, 0.0]), ..input(&map, cycle) });
+            if matches!(decision, Decision::Hold(_)) {
+                return nearest_m;
+            }
+            let command = decision.command(Command::default());
+            state = stepper.step_state(&state, command, &GroundSample::FIRM, &mut [], 0);
+            nearest_m = nearest_m.min((state.x_m - 6.0).hypot(state.y_m - 0.2));
+        }
+        panic!("not there: {state:?}")
+    };
+    let mut without = controller(((), ()));
+    assert!(nearest_m(Box::new(move |input| without.decide(input))) < 0.8);
+    let mut with = controller((KeepOut { centre_m: [6.0, 0.2], radius_m: 1.5 }, ()));
+    let kept_m = nearest_m(Box::new(move |input| with.decide(input)));
+    assert!(kept_m > 1.4, "{kept_m} m");
+}
+
+/// What ends north costs: the plan bends south, and the other way round.
+#[test]
+fn a_cost_of_whole_rollouts_bends_the_plan() {
+    let map = level();
+    let north_m = |price_s_per_m: f32| {
+        let mut controller = controller(((), NotNorth(price_s_per_m)));
+        for cycle in 0..5 {
+            controller.decide(&input(&map, cycle));
+        }
+        controller.nominal_trajectory(map.view()).last().unwrap().y_m
+    };
+    assert!(north_m(2.0) < -0.3 && north_m(-2.0) > 0.3, "{} {}", north_m(2.0), north_m(-2.0));
+}
+
+#[test]
+fn a_cost_that_is_no_number_leaves_the_rollout_out() {
+    let map = level();
+    let mut controller = controller(((), Broken));
+    assert!(matches!(controller.decide(&input(&map, 0)), Decision::Drive(_)));
+    assert_eq!(controller.diagnostics().n_non_finite, 100);
+}
