@@ -89,6 +89,16 @@ pub(super) fn duration_s(word: &str) -> Result<f64, String> {
     number_where(word, "a finite number of seconds above 0", |value| value > 0.0 && value.is_finite())
 }
 
+/// A distance that counts as there [m].
+pub(super) fn tolerance_m(word: &str) -> Result<f64, String> {
+    number_where(word, "a distance above 0 and up to 100 metres", |value| value > 0.0 && value <= 100.0)
+}
+
+/// A speed along a path [m/s].
+pub(super) fn speed_mps(word: &str) -> Result<f64, String> {
+    number_where(word, "a speed above 0 and up to 50 m/s", |value| value > 0.0 && value <= 50.0)
+}
+
 /// A height above the ground [m].
 pub(super) fn height_m(word: &str) -> Result<f64, String> {
     number_where(word, "a height from 0 to 2 metres", |value| (0.0..=2.0).contains(&value))

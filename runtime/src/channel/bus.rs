@@ -6,11 +6,12 @@ use std::os::unix::fs::MetadataExt;
 use std::str::FromStr;
 
 use iceoryx2::config::Config;
-use iceoryx2::node::{Node, NodeBuilder};
+use iceoryx2::node::{Node, NodeBuilder, NodeState};
 use iceoryx2::port::publisher::PublisherCreateError;
 use iceoryx2::port::subscriber::SubscriberCreateError;
 use iceoryx2::prelude::{
-    FileName, LogLevel, Path, PortFactory as _, SemanticString, SignalHandlingMode, ipc, set_log_level,
+    CallbackProgression, FileName, LogLevel, Path, PortFactory as _, SemanticString, SignalHandlingMode, ipc,
+    set_log_level,
 };
 use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
 
@@ -65,6 +66,33 @@ impl RunName {
 
     const fn prefix_of_all() -> &'static str {
         "surefoot_"
+    }
+
+    /// The runs of this user that have a process which is alive, in the order of their names.
+    ///
+    /// # Errors
+    /// The user's folder is not his alone.
+    pub fn alive() -> Result<Vec<Self>, ChannelError> {
+        set_log_level(LogLevel::Fatal);
+        folder::claim(std::path::Path::new(&folder::root()), folder::user())?;
+        let folders = std::fs::read_dir(folder::root()).into_iter().flatten().flatten();
+        let names = folders.filter_map(|folder| folder.file_name().to_str()?.parse::<Self>().ok());
+        let mut alive: Vec<Self> = names.filter(Self::is_alive).collect();
+        alive.sort_by(|one, other| one.0.cmp(&other.0));
+        Ok(alive)
+    }
+
+    /// Whether it has a process that is alive.
+    fn is_alive(&self) -> bool {
+        let Ok(config) = config(self) else { return false };
+        let mut is_alive = false;
+        // Who cannot be listed cannot be talked to.
+        Node::<ipc::Service>::list(&config, |state| {
+            is_alive |= matches!(state, NodeState::Alive(_));
+            if is_alive { CallbackProgression::Stop } else { CallbackProgression::Continue }
+        })
+        .ok();
+        is_alive
     }
 
     /// Folder of the files by which its processes find one another, in the one that its user has alone.
@@ -125,7 +153,8 @@ impl Bus {
     ) -> Result<Outlet<H, T>, ChannelError> {
         let service = self.service(channel)?;
         self.await_place(channel.name, &service)?;
-        let n_samples = service.static_config().max_subscribers() * (2 * channel.depth + 1) + 2;
+        let n_samples =
+            service.static_config().max_subscribers() * (2 * channel.depth + 1) + channel.history + 2;
         check_memory((n_samples * n_max * size_of::<T>()) as f64)?;
         let failures = Failures::default();
         let publisher = service
@@ -197,7 +226,7 @@ impl Bus {
             .max_subscribers(channel.n_readers + self.n_third_parties)
             .subscriber_max_buffer_size(channel.depth)
             .subscriber_max_borrowed_samples(channel.depth + 1)
-            .history_size(0)
+            .history_size(channel.history)
             .enable_safe_overflow(true)
             .open_or_create()
             .map_err(|error| open_error(channel.name, error))?;

@@ -5,5 +5,6 @@
 mod course;
 mod faults;
 mod goals;
+mod missions;
 mod repeats;
 mod sensors;
