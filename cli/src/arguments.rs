@@ -33,7 +33,7 @@ pub use orders::{AlphaArguments, AskedRun, GoalArguments, PathArguments};
 pub use replay::ReplayArguments;
 pub use train::{TrainArguments, TrainCommand};
 pub use up::{UpArguments, UpRole};
-pub use values::{Goal, StartPose, WorldSource};
+pub use values::{Goal, StartPose, WorldSource, place_with_minus};
 
 /// Everything after `surefoot`.
 #[derive(Debug, Parser)]

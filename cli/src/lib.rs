@@ -98,7 +98,8 @@ pub use failure::{UsageError, WorkFailed};
 /// Runs the command line of this process.
 pub fn run() -> ExitCode {
     be_quiet_when_nobody_reads();
-    let result = match Arguments::try_parse() {
+    let words = std::env::args_os().map(arguments::place_with_minus);
+    let result = match Arguments::try_parse_from(words) {
         Ok(arguments) => dispatch(arguments.command),
         Err(error) => answer(&error),
     };

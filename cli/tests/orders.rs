@@ -38,7 +38,7 @@ fn assert_refused(code: i32, words: &[&str], parts: &[&str]) {
 fn what_is_no_order_is_refused_before_anybody_hears_of_it() {
     assert_refused(2, &["goal"], &["X,Y"]);
     assert_refused(2, &["goal", "1,nan"], &["finite numbers", "1,nan"]);
-    assert_refused(2, &["goal", "1,2", "--tolerance", "0"], &["--tolerance", "above 0"]);
+    assert_refused(2, &["goal", "-1,-2", "--tolerance", "0"], &["--tolerance", "above 0"]);
     assert_refused(2, &["path", "1,2", "3,4"], &["--speed"]);
     assert_refused(2, &["path", "1,2", "3,4", "--speed", "0"], &["--speed", "above 0"]);
     assert_refused(2, &["path", "1,2", "--speed", "1"], &["X,Y"]);

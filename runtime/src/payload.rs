@@ -242,8 +242,8 @@ pub(crate) fn check_mission(_: &Stamp, payload: &[MissionRecord]) -> Result<(), 
     let numbers = goal_m.iter().chain([tolerance_m, path_speed_mps, alpha]).chain(corners);
     require(numbers.clone().all(|value| value.is_finite()), Refusal::NonFinite)?;
     let is_path = *path_speed_mps == 0.0 || (*path_speed_mps > 0.0 && mission.n_corners >= 2);
-    require(is_path && mission.state <= MISSION_STATES_MAX, Refusal::Malformed)?;
-    require((0.0..=1.0).contains(alpha) && *tolerance_m >= 0.0, Refusal::Malformed)
+    let is_plan = (0.0..=1.0).contains(alpha) && *tolerance_m >= 0.0;
+    require(is_path && is_plan && mission.state <= MISSION_STATES_MAX, Refusal::Malformed)
 }
 
 /// What an order says is judged by whoever takes it, and answered.
@@ -371,7 +371,7 @@ mod tests {
         let mut lost = path;
         lost.corner_y_m[31] = f64::NAN;
         assert_eq!(check_mission(&stamp, &[lost]), Err(Refusal::NonFinite));
-        let order = OrderHeader { kind: 1, ..OrderHeader::default() };
+        let order = OrderHeader::default();
         assert_eq!(check_order(&order, &[[0.0, 1.0]]), Ok(()));
         assert_eq!(check_order(&order, &[[0.0, f64::INFINITY]]), Err(Refusal::NonFinite));
         assert_eq!(check_order(&OrderHeader { alpha: f64::NAN, ..order }, &[]), Err(Refusal::NonFinite));

@@ -18,7 +18,7 @@ pub struct AskedRun {
 #[command(after_long_help = AFTER_HELP)]
 pub struct GoalArguments {
     /// Where to go, in this order: x [m], y [m]
-    #[arg(value_name = "X,Y", required = true, allow_hyphen_values = true)]
+    #[arg(value_name = "X,Y", required = true)]
     pub goals: Vec<Goal>,
 
     /// How near to a goal counts as there [m] [default: as the run was started]
@@ -35,7 +35,7 @@ pub struct GoalArguments {
 #[command(after_long_help = AFTER_HELP)]
 pub struct PathArguments {
     /// Corners of the path, two or more: x [m], y [m]
-    #[arg(value_name = "X,Y", required = true, num_args = 2.., allow_hyphen_values = true)]
+    #[arg(value_name = "X,Y", required = true, num_args = 2..)]
     pub corners: Vec<Goal>,
 
     /// Speed along it [m/s]

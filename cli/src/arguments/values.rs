@@ -1,5 +1,6 @@
 //! Values with a shape of their own: how a word of the command line becomes one, and what to say if it does not.
 
+use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
@@ -67,6 +68,15 @@ impl FromStr for Goal {
         let [x_m, y_m] = numbers(word, "X,Y: metres, metres")?;
         Ok(Self { x_m, y_m })
     }
+}
+
+/// A word such as -3,4 with a blank before it, so that it is read as a place and not as an option; any other as it is.
+pub fn place_with_minus(word: OsString) -> OsString {
+    let is_place = |word: &str| {
+        let number = |part: &str| part.trim().parse::<f64>().is_ok();
+        word.starts_with('-') && word.contains(',') && word.split(',').next().is_some_and(number)
+    };
+    if word.to_str().is_some_and(is_place) { [" ".into(), word].into_iter().collect() } else { word }
 }
 
 fn numbers<const N: usize>(word: &str, shape: &str) -> Result<[f64; N], String> {
@@ -171,6 +181,16 @@ mod tests {
         for bad in ["", "1,2", "1,2,3,4", "1,2,nan", "1,inf,0", "1;2;3", "1,,3"] {
             let message = bad.parse::<StartPose>().unwrap_err();
             assert!(message.contains("X,Y,YAW") && message.contains(bad), "{message}");
+        }
+    }
+
+    #[test]
+    fn a_place_in_the_south_west_is_no_option() {
+        let read = |word: &str| place_with_minus(word.into()).into_string().unwrap();
+        assert_eq!(read("-3,4").parse(), Ok(Goal { x_m: -3.0, y_m: 4.0 }));
+        assert_eq!(["-3,4", "-.5,-1", "-1,2,-0.5"].map(read), [" -3,4", " -.5,-1", " -1,2,-0.5"]);
+        for other in ["--run", "-h", "-3", "3,-4", "-x,4", ""] {
+            assert_eq!(read(other), other);
         }
     }
 

@@ -27,7 +27,7 @@ fn to_the_end(closed: &mut ClosedLoop) -> Outcome {
 #[test]
 fn goals_are_passed_in_their_order_without_a_stop_and_the_last_one_ends_the_drive() {
     // The straight way to the first goal leads past the last one, within its tolerance.
-    let goals_m = [[10.0, 0.0], [14.0, 4.0], [6.0, 0.5]];
+    let goals_m = [[11.0, -5.0], [15.0, 0.0], [7.0, -1.8]];
     let mut course = Course::flat(6.0);
     course.episode.rules.time_limit_s = 60.0;
     let mut closed = course.begin();
@@ -38,7 +38,9 @@ fn goals_are_passed_in_their_order_without_a_stop_and_the_last_one_ends_the_driv
         }
         let decision = closed.cycle().unwrap().decision;
         let is_first = closed.episode.n_cycles() < 5;
-        assert!(is_first || matches!(decision, Decision::Drive(_)), "{decision:?}");
+        let is_last = closed.navigator.mission().progress() == (2, 3);
+        let may_hold = is_last && decision == Decision::Hold(HoldReason::AtGoal);
+        assert!(is_first || may_hold || matches!(decision, Decision::Drive(_)), "{decision:?}");
     };
     assert_eq!(outcome, Outcome::Goal);
     // The place where each was passed lies behind that of the one before on the way.
@@ -49,22 +51,22 @@ fn goals_are_passed_in_their_order_without_a_stop_and_the_last_one_ends_the_driv
 
 #[test]
 fn a_path_is_followed_at_its_speed_to_its_end() {
-    // Four metres of detour that no goal would ask for.
-    let corners_m = [[4.0, 0.0], [8.0, 0.0], [8.0, 4.0], [16.0, 4.0]];
+    // A detour of four metres to the side that no goal would ask for.
+    let corners_m = [[4.0, 0.0], [8.0, 1.0], [12.0, 4.0], [16.0, 4.0], [20.0, 1.0]];
     let speed_mps = 0.7;
-    let mut course = Course::flat(12.0);
+    let mut course = Course::flat(16.0);
     course.episode.rules.time_limit_s = 60.0;
     let mut closed = course.begin();
     closed.follow(Route::path(corners_m.to_vec(), speed_mps, 1.0).unwrap()).unwrap();
     assert_eq!(to_the_end(&mut closed), Outcome::Goal);
-    // The turning circle of the vehicle cuts the corners.
+    // The turning circle of the vehicle cuts corners.
     let off_m =
         |at_m: [f64; 2]| corners_m.windows(2).map(|ends| off_line_m(at_m, ends)).fold(f64::MAX, f64::min);
     let farthest_m = places_m(&closed).into_iter().map(off_m).fold(0.0, f64::max);
-    assert!(farthest_m < 1.5, "{farthest_m} m off the path");
+    assert!(farthest_m < 1.0, "{farthest_m} m off the path");
     let time_s = closed.episode.time_s();
-    // 15 m up to the tolerance, corners cut and a start from rest.
-    assert!((15.0..32.0).contains(&time_s), "{time_s} s");
+    // 18 m up to the tolerance at 0.7 m/s take 25 s; at the full speed of 1 m/s they would take 18 s.
+    assert!((22.0..35.0).contains(&time_s), "{time_s} s");
 }
 
 fn off_line_m(at_m: [f64; 2], ends: &[[f64; 2]]) -> f64 {
