@@ -31,9 +31,7 @@ pub(crate) fn alpha(arguments: &AlphaArguments) -> anyhow::Result<()> {
 /// Says an order to the run that is meant, and shows what the vehicle does now.
 pub(crate) fn tell(asked: &AskedRun, order: &Order) -> anyhow::Result<()> {
     let run = choose(asked)?;
-    // Whatever room its channels have for readers, this asks for none of its own.
-    let bus = Bus::join_with_room(&run, 0)?;
-    match operator::tell(&bus, order) {
+    match operator::tell(&Bus::visit(&run)?, order) {
         Ok(mission) => {
             println!("run {run}: {mission}");
             Ok(())

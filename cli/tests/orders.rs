@@ -58,7 +58,11 @@ fn of_several_runs_one_must_be_named() {
         &["--run", "expected one of the runs that are there", &names[0], &names[1]],
     );
     // It is there, and nobody in it takes orders.
-    assert_refused(1, &["resume", "--run", &names[0]], &[&names[0], "expected an answer", "found none"]);
+    assert_refused(
+        1,
+        &["resume", "--run", &names[0]],
+        &[&names[0], "channel mission: expected a process", "found none"],
+    );
 }
 
 /// A run that waits for orders; it ends with this.

@@ -144,6 +144,12 @@ pub enum ChannelError {
         /// What the system said.
         problem: String,
     },
+    /// The run has no such channel.
+    #[error("channel {channel}: expected a process of the run that uses it, found none")]
+    Absent {
+        /// Its name.
+        channel: &'static str,
+    },
     /// Somebody else has the channel.
     #[error(
         "channel {channel}: expected to be its only publisher, found another process that publishes on it; end that \

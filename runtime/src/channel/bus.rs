@@ -13,6 +13,7 @@ use iceoryx2::prelude::{
     CallbackProgression, FileName, LogLevel, Path, PortFactory as _, SemanticString, SignalHandlingMode, ipc,
     set_log_level,
 };
+use iceoryx2::service::builder::publish_subscribe::PublishSubscribeOpenError;
 use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
 
 use super::failures::Failures;
@@ -104,7 +105,16 @@ impl RunName {
 /// The process's way to its channels.
 pub struct Bus {
     node: Node<ipc::Service>,
-    n_third_parties: usize,
+    manner: Manner,
+}
+
+/// What a process is among the others of a run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Manner {
+    /// It makes the channels that are not there yet, with room for so many readers beside the run's own.
+    Member { n_third_parties: usize },
+    /// It takes the channels as they are: whoever opens one first decides what it is like.
+    Visitor,
 }
 
 /// Of how many dead processes what they left behind was cleared away, and of how many it could not be.
@@ -131,6 +141,18 @@ impl Bus {
     /// decides, so all processes of a run are given the same number. A publisher reserves memory for every place: one
     /// more costs each channel of maps 2 x depth + 1 maps.
     pub fn join_with_room(run: &RunName, n_third_parties: usize) -> Result<Self, ChannelError> {
+        Self::begin(run, Manner::Member { n_third_parties })
+    }
+
+    /// Joins a run that is there, for a moment: makes no channel.
+    ///
+    /// # Errors
+    /// Those of [`Bus::join`].
+    pub fn visit(run: &RunName) -> Result<Self, ChannelError> {
+        Self::begin(run, Manner::Visitor)
+    }
+
+    fn begin(run: &RunName, manner: Manner) -> Result<Self, ChannelError> {
         // Failures come back as values; what else it says is for its own developers.
         set_log_level(LogLevel::Fatal);
         let refused = |problem: String| ChannelError::Join { run: run.to_string(), problem };
@@ -138,7 +160,7 @@ impl Bus {
         let config = config(run).map_err(refused)?;
         let builder = NodeBuilder::new().config(&config).signal_handling_mode(SignalHandlingMode::Disabled);
         let node = builder.create::<ipc::Service>().map_err(|error| refused(error.to_string()))?;
-        Ok(Self { node, n_third_parties })
+        Ok(Self { node, manner })
     }
 
     /// The way into a channel, for messages of up to `n_max` elements. There is one at a time, whatever process has it;
@@ -217,19 +239,26 @@ impl Bus {
     fn service<H: Header, T: Element>(&self, channel: &Channel<H, T>) -> Result<Service<H, T>, ChannelError> {
         let name = channel.name.try_into().map_err(|error| open_error(channel.name, error))?;
         // A reader may hold as many as can wait and one that it goes on using: so a look ends, whatever comes meanwhile.
-        let service = self
+        let builder = self
             .node
             .service_builder(&name)
             .publish_subscribe::<[T]>()
             .user_header::<H>()
             .max_publishers(1)
-            .max_subscribers(channel.n_readers + self.n_third_parties)
             .subscriber_max_buffer_size(channel.depth)
             .subscriber_max_borrowed_samples(channel.depth + 1)
             .history_size(channel.history)
-            .enable_safe_overflow(true)
-            .open_or_create()
-            .map_err(|error| open_error(channel.name, error))?;
+            .enable_safe_overflow(true);
+        let service = match self.manner {
+            Manner::Member { n_third_parties } => builder
+                .max_subscribers(channel.n_readers + n_third_parties)
+                .open_or_create()
+                .map_err(|error| open_error(channel.name, error))?,
+            Manner::Visitor => builder.open().map_err(|error| match error {
+                PublishSubscribeOpenError::DoesNotExist => ChannelError::Absent { channel: channel.name },
+                error => open_error(channel.name, error),
+            })?,
+        };
         // Whoever made it may have meant it for several: then its readers need not agree on whom they hear.
         match service.static_config().max_publishers() {
             1 => Ok(service),
