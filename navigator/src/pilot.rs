@@ -10,6 +10,7 @@ use crate::applied::{Applied, AppliedBy};
 use crate::frame::Frame;
 use crate::guard::{Admitted, Guard};
 use crate::risk::StuckPose;
+use crate::route::PATH_END_SHARE;
 use crate::{CORNERS_MAX, Config, Instruction, Jump, NavigatorError, Target};
 
 /// What the pilot drives on.
@@ -253,7 +254,8 @@ fn objective_on_chart<'a>(
         Target::Path(path) => {
             corners_m.clear();
             corners_m.extend(path.points_m.iter().take(CORNERS_MAX).copied().map(carried));
-            Objective::Path(ReferencePath { points_m: corners_m, ..*path })
+            let tolerance_m = PATH_END_SHARE * path.tolerance_m;
+            Objective::Path(ReferencePath { points_m: corners_m, tolerance_m, ..*path })
         }
     }
 }
