@@ -7,7 +7,9 @@ use std::time::Instant;
 
 use bicycle::{Decision, Model, Vehicle};
 use evidential::{Checkpoint, ShippedError, Unfamiliar, shipped};
-use navigator::{Belief, Config, Navigator, NavigatorError, RiskOracle, Setup, Surface};
+use navigator::{
+    Belief, Config, Destination, Navigator, NavigatorError, Order, RiskOracle, Route, Setup, Surface,
+};
 use rayon::prelude::*;
 use scenarios::{Episode, EpisodeConfig, EpisodeError, Task, Traversability, Truth, TruthField, World};
 use serde::{Deserialize, Serialize};
@@ -171,7 +173,15 @@ impl ClosedLoop {
         Ok(Self { episode: Episode::new(task, vehicle, episode, seed)?, navigator })
     }
 
-    /// Observes, decides and drives on for one control cycle.
+    /// Drives a route in place of the task's one goal.
+    pub fn follow(&mut self, route: Route) -> Result<(), DriveError> {
+        let now_ns = self.episode.observe().valid_at_ns;
+        // Nothing speaks against an order of now.
+        self.navigator.order(Order::Drive(route), now_ns)?.ok();
+        Ok(())
+    }
+
+    /// Observes, decides and drives on for one control cycle. The episode ends at the last goal of the mission.
     pub fn cycle(&mut self) -> Result<Cycle, DriveError> {
         let observation = self.episode.observe();
         let began = Instant::now();
@@ -179,6 +189,10 @@ impl ClosedLoop {
         let mapped = Instant::now();
         let decision = self.navigator.decide(observation.valid_at_ns);
         let decided = Instant::now();
+        if let Some(target) = self.navigator.mission().target() {
+            let Destination { goal_m, tolerance_m } = target.end();
+            self.episode.set_goal(goal_m, tolerance_m);
+        }
         self.episode.apply(&decision)?;
         let milliseconds = |from: Instant, to: Instant| to.duration_since(from).as_secs_f64() * 1e3;
         Ok(Cycle {

@@ -34,6 +34,10 @@ pub enum HoldReason {
     AtGoal,
     /// Nobody has said where to go, or whoever did has said that it is over.
     NoMission,
+    /// The mission is paused.
+    Paused,
+    /// An operator has the wheel.
+    Manual,
 }
 
 /// Why the vehicle must stop.
@@ -62,4 +66,6 @@ pub enum StopReason {
     InputOutOfOrder,
     /// A measurement claims to be of a time that is still to come.
     InputFromFuture,
+    /// Somebody has told it to, and nobody has reset that yet.
+    EmergencyStop,
 }

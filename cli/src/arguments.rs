@@ -9,6 +9,7 @@ mod gap;
 mod gap_check;
 mod inspect;
 mod learned_map;
+mod orders;
 mod plant;
 mod replay;
 mod train;
@@ -29,11 +30,12 @@ pub use gap::{GapApplyArguments, GapCommand, GapDiagnoseArguments, GapEffectsArg
 pub use gap_check::{GapScoreArguments, GapSealArguments};
 pub use inspect::InspectArguments;
 pub use learned_map::{BenchLearnedMapArguments, NetworkSizes};
+pub use orders::{AlphaArguments, AskedRun, GoalArguments, PathArguments};
 pub use plant::BenchPlantArguments;
 pub use replay::ReplayArguments;
 pub use train::{TrainArguments, TrainCommand};
 pub use up::{UpArguments, UpRole};
-pub use values::{Goal, StartPose, WorldSource};
+pub use values::{Goal, StartPose, WorldSource, place_with_minus};
 
 /// Everything after `surefoot`.
 #[derive(Debug, Parser)]
@@ -61,6 +63,24 @@ pub enum Command {
     /// Drive with every part a process of its own, as on a robot
     #[command(long_about = up::LONG_ABOUT)]
     Up(Box<UpArguments>),
+    /// Send a run to goals, one after the other
+    Goal(GoalArguments),
+    /// Send a run along a path
+    Path(PathArguments),
+    /// Let a run stand, and go on with `resume`
+    Pause(AskedRun),
+    /// Go on after `pause`, `manual` or `reset`
+    Resume(AskedRun),
+    /// Drop the mission of a run: it stands and waits for the next
+    Cancel(AskedRun),
+    /// Give the wheel to an operator, until `resume`: the run commands to stand meanwhile
+    Manual(AskedRun),
+    /// Stop a run, whatever else is said, until `reset`
+    Estop(AskedRun),
+    /// End an emergency stop; nothing moves before `resume` or the next goal
+    Reset(AskedRun),
+    /// Change the risk tolerance of a run
+    Alpha(AlphaArguments),
     /// Make every decision of a recording again, to the last bit
     #[command(long_about = replay::LONG_ABOUT)]
     Replay(ReplayArguments),
@@ -103,6 +123,7 @@ Examples:
   surefoot drive --world arena          an RC car in a hall with a ramp and bushes
   surefoot drive --help                 every option, with its unit and default
   surefoot up                           the same drive by processes that survive one another
+  surefoot goal 30,25 40,10             where that run shall go next
   surefoot collect                      data to learn from, out of 200 simulated trials
   surefoot train traversability --train train.safetensors --validation validation.safetensors
                                         networks that know what the drives have taught

@@ -30,6 +30,7 @@ pub(crate) fn run(arguments: &DriveArguments) -> anyhow::Result<()> {
     arguments.bush_height_m()?;
     let scene = scene::prepare(arguments)?;
     let mut closed = ClosedLoop::new(drive(arguments, &scene)?).map_err(|error| refused(arguments, error))?;
+    closed.follow(scene::route(arguments, &scene.task)?)?;
     let files = OutputFiles::prepare(arguments)?;
     let config_hash = config_hash(&(&scene.config, &scene.model, &scene.vehicle))?;
     let about = about(arguments, &scene, &config_hash);
@@ -213,6 +214,7 @@ fn summarise(
         world: scene.task.world.name.clone(),
         start: StartPose { x_m, y_m, yaw_rad },
         goal: Goal { x_m: goal_m[0], y_m: goal_m[1] },
+        goals: arguments.goal.clone(),
         method: scene.knowledge.method,
         alpha: arguments.alpha,
         deviations: arguments.deviation.iter().map(|asked| asked.words.clone()).collect(),

@@ -76,6 +76,7 @@ mod failure;
 mod gap;
 mod inspect;
 pub mod interrupt;
+mod orders;
 pub mod output;
 pub mod picture;
 pub mod progress;
@@ -89,6 +90,7 @@ use std::process::ExitCode;
 
 use clap::Parser;
 use clap::error::ErrorKind;
+use navigator::Order;
 
 use arguments::{Arguments, BenchCommand, Command, TrainCommand};
 pub use failure::{UsageError, WorkFailed};
@@ -96,7 +98,8 @@ pub use failure::{UsageError, WorkFailed};
 /// Runs the command line of this process.
 pub fn run() -> ExitCode {
     be_quiet_when_nobody_reads();
-    let result = match Arguments::try_parse() {
+    let words = std::env::args_os().map(arguments::place_with_minus);
+    let result = match Arguments::try_parse_from(words) {
         Ok(arguments) => dispatch(arguments.command),
         Err(error) => answer(&error),
     };
@@ -124,6 +127,15 @@ fn dispatch(command: Command) -> anyhow::Result<()> {
     match command {
         Command::Drive(drive) => drive::run(&drive),
         Command::Up(up) => up::run(&up),
+        Command::Goal(goal) => orders::goals(&goal),
+        Command::Path(path) => orders::path(&path),
+        Command::Pause(run) => orders::tell(&run, &Order::Pause),
+        Command::Resume(run) => orders::tell(&run, &Order::Resume),
+        Command::Cancel(run) => orders::tell(&run, &Order::Cancel),
+        Command::Manual(run) => orders::tell(&run, &Order::TakeOver),
+        Command::Estop(run) => orders::tell(&run, &Order::EmergencyStop),
+        Command::Reset(run) => orders::tell(&run, &Order::Reset),
+        Command::Alpha(alpha) => orders::alpha(&alpha),
         Command::Replay(replay) => replay::run(&replay),
         Command::Inspect(inspect) => inspect::run(&inspect),
         Command::Gap { command } => gap::run(&command),

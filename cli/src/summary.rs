@@ -82,6 +82,8 @@ pub struct Summary {
     pub start: StartPose,
     /// Where it should have ended.
     pub goal: Goal,
+    /// All goals that were asked for, in their order; none where the seed picked one.
+    pub goals: Vec<Goal>,
     /// What the controller knew of the ground.
     pub method: Method,
     /// Risk tolerance (CVaR level).
@@ -219,6 +221,7 @@ mod tests {
             world: "rocks".to_owned(),
             start: StartPose { x_m: 5.0, y_m: 25.0, yaw_rad: 0.0 },
             goal: Goal { x_m: 45.0, y_m: 25.0 },
+            goals: Vec::new(),
             method: Method::Physics,
             alpha: 0.6,
             deviations: vec!["steering_delay=0.2".to_owned()],

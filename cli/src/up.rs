@@ -11,7 +11,7 @@ use std::process::Command;
 use runtime::RuntimeError;
 use runtime::channel::ChannelError;
 use runtime::status::Role;
-use runtime::supervisor::{RestartPolicy, RunEnd, RunReport, Supervisor};
+use runtime::supervisor::{RestartPolicy, RunEnd, RunReport, Start, Supervisor};
 
 use crate::arguments::{MapSource, Method, Pace, UpArguments, UpRole};
 use crate::{UsageError, WorkFailed, failure, interrupt};
@@ -57,16 +57,24 @@ fn refuse_what_needs_one_process(arguments: &UpArguments) -> Result<(), UsageErr
 
 /// Words that ask one role for something more. Processes that `--role all` starts are given them all.
 fn refuse_what_concerns_another_role(arguments: &UpArguments) -> Result<(), UsageError> {
-    let UpArguments { role, supervised, live, learn, validation, realtime, drive, .. } = arguments;
+    let UpArguments { role, supervised, standby, live, learn, validation, realtime, drive, .. } = arguments;
     let asked = [
         ("--live", live.is_some(), &[UpRole::Live][..]),
+        ("--standby", *standby, &[UpRole::Plant, UpRole::Mission]),
         ("--learn", *learn, &[UpRole::Learning]),
         ("--validation", validation.is_some(), &[UpRole::Learning]),
         ("--json", drive.json.is_some(), &[UpRole::Plant]),
         (
             "--realtime",
             *realtime,
-            &[UpRole::Plant, UpRole::Mapping, UpRole::Learning, UpRole::Control, UpRole::Recorder],
+            &[
+                UpRole::Plant,
+                UpRole::Mapping,
+                UpRole::Learning,
+                UpRole::Control,
+                UpRole::Recorder,
+                UpRole::Mission,
+            ],
         ),
     ];
     let is_ignored = |roles: &[UpRole]| !supervised && *role != UpRole::All && !roles.contains(role);
@@ -104,13 +112,18 @@ fn refused(error: anyhow::Error) -> anyhow::Error {
 }
 
 fn supervise(arguments: &UpArguments) -> anyhow::Result<()> {
-    // What cannot be is said once, before five processes say it.
-    roles::prepare(arguments)?;
+    // What cannot be is said once, before six processes say it.
+    let task = roles::prepare(arguments)?;
+    let words_of_route = roles::words_of_route(arguments, &task);
+    drop(task);
     let program = std::env::current_exe()?;
     let words = own_words(std::env::args_os().skip(1));
-    let command = |role: Role| {
+    let command = |role: Role, start: Start| {
         let mut command = Command::new(&program);
         command.args(&words).args(["--role", role.name(), "--supervised"]);
+        if role == Role::Mission {
+            command.args(&words_of_route).args(Some("--again").filter(|_| start == Start::Again));
+        }
         command.stdout(std::process::Stdio::null());
         command
     };
@@ -119,7 +132,7 @@ fn supervise(arguments: &UpArguments) -> anyhow::Result<()> {
     let mut supervisor = Supervisor::new(&bus, &Role::ALL, RestartPolicy::default(), &command)?;
     let end = supervisor.run(&interrupt::interrupted, &mut |lines, mission| {
         if let Some(mission) = mission {
-            println!("{:.1} s", mission.time_s);
+            println!("{:.1} s, {mission}", mission.time_s);
         }
         lines.iter().for_each(|line| println!("  {line}"));
     });
@@ -132,6 +145,7 @@ fn supervise(arguments: &UpArguments) -> anyhow::Result<()> {
             Ok(())
         }
         RunEnd::Plant(_) => Err(WorkFailed("goal not reached; the vehicle's process says why".into()).into()),
+        RunEnd::Interrupted if arguments.standby => Ok(()),
         RunEnd::Interrupted => Err(WorkFailed("goal not reached: interrupted by the user".into()).into()),
         RunEnd::GaveUp { role, why } => Err(WorkFailed(format!("{}: {why}", role.name())).into()),
     }

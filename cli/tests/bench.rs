@@ -63,7 +63,9 @@ fn plant_writes_its_curves_and_labels() {
     assert!(told.contains("rc_car") && told.contains("times real time"), "{told}");
     let written: Value =
         serde_json::from_slice(&std::fs::read(out.join("plant.json")).expect("the file")).expect("JSON");
-    for row in written["cornering"].as_array().expect("rows") {
+    // Up to 10 degrees: at 15 m/s that is 2.6 m/s of sliding, short of where asphalt's friction falls.
+    let rows = written["cornering"].as_array().expect("rows").iter();
+    for row in rows.filter(|row| row["angle_deg"].as_f64().is_some_and(|angle_deg| angle_deg <= 10.0)) {
         let expected = row["closed_form"].as_f64().expect("a number");
         for found in row["plant"].as_array().expect("one of each speed") {
             assert!((found.as_f64().expect("a number") - expected).abs() < 0.03, "{row}");

@@ -66,8 +66,9 @@ fn what_up_would_ignore_is_refused() {
     only(&["--role", "control", "--live"], "live");
     only(&["--role", "mapping", "--learn"], "learning");
     only(&["--role", "plant", "--validation", "v.safetensors"], "learning");
+    only(&["--role", "control", "--standby"], "plant, mission");
     only(&["--role", "recorder", "--json", "s.json"], "plant");
-    only(&["--role", "live", "--realtime"], "plant, mapping, learning, control, recorder");
+    only(&["--role", "live", "--realtime"], "plant, mapping, learning, control, recorder, mission");
 }
 
 #[test]
@@ -207,7 +208,7 @@ fn a_drive_of_processes_is_recorded_and_made_again_and_what_is_cut_off_is_named(
     let run = json(&folder.path().join("runtime.json"));
     assert!(run["control"]["n_decisions"].as_u64().unwrap() > 20, "{run}");
     assert_eq!(run["control"]["period_ms"], 100.0);
-    assert_eq!(run["processes"].as_array().unwrap().len(), 5);
+    assert_eq!(run["processes"].as_array().unwrap().len(), 6);
     assert!(run["processes"][0]["resident_max_mb"].as_f64().unwrap() > 1.0, "{run}");
 
     let summary = json(&folder.path().join("summary.json"));

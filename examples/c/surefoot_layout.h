@@ -1,4 +1,4 @@
-/* Messages of Surefoot, layout version 4. Written from its types; do not edit. */
+/* Messages of Surefoot, layout version 5. Written from its types; do not edit. */
 #ifndef SUREFOOT_LAYOUT_H
 #define SUREFOOT_LAYOUT_H
 
@@ -6,7 +6,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#define SUREFOOT_LAYOUT_VERSION 4u
+#define SUREFOOT_LAYOUT_VERSION 5u
 
 /* First field of every header: whose message it is, and of when. Known to the channels as surefoot.Stamp. */
 typedef struct SurefootStamp {
@@ -187,12 +187,14 @@ typedef struct SurefootRiskHeader {
     SurefootSource stuck;
     /* Where the time to the goal leads [m]. */
     double goal_m[2];
+    /* Share of the worst outcomes that was judged for, in (0, 1]. */
+    double alpha;
     /* First 8 bytes of the SHA-256 of the networks' weights; 0 = none. */
     uint64_t checkpoint;
     /* XXH3 of the payload. */
     uint64_t content_hash;
 } SurefootRiskHeader;
-static_assert(sizeof(SurefootRiskHeader) == 168, "RiskHeader");
+static_assert(sizeof(SurefootRiskHeader) == 176, "RiskHeader");
 static_assert(offsetof(SurefootRiskHeader, stamp) == 0, "RiskHeader.stamp");
 static_assert(offsetof(SurefootRiskHeader, grid) == 40, "RiskHeader.grid");
 static_assert(offsetof(SurefootRiskHeader, n_yaws) == 80, "RiskHeader.n_yaws");
@@ -201,8 +203,9 @@ static_assert(offsetof(SurefootRiskHeader, surface) == 96, "RiskHeader.surface")
 static_assert(offsetof(SurefootRiskHeader, odometry_at_ns) == 112, "RiskHeader.odometry_at_ns");
 static_assert(offsetof(SurefootRiskHeader, stuck) == 120, "RiskHeader.stuck");
 static_assert(offsetof(SurefootRiskHeader, goal_m) == 136, "RiskHeader.goal_m");
-static_assert(offsetof(SurefootRiskHeader, checkpoint) == 152, "RiskHeader.checkpoint");
-static_assert(offsetof(SurefootRiskHeader, content_hash) == 160, "RiskHeader.content_hash");
+static_assert(offsetof(SurefootRiskHeader, alpha) == 152, "RiskHeader.alpha");
+static_assert(offsetof(SurefootRiskHeader, checkpoint) == 160, "RiskHeader.checkpoint");
+static_assert(offsetof(SurefootRiskHeader, content_hash) == 168, "RiskHeader.content_hash");
 
 /* What the vehicle shall do. It grows old from when what it was decided on was measured, whenever it is sent. Known to the channels as surefoot.Command. */
 typedef struct SurefootCommandRecord {
@@ -294,22 +297,78 @@ static_assert(sizeof(SurefootStuckRecord) == 24, "StuckRecord");
 static_assert(offsetof(SurefootStuckRecord, position_m) == 0, "StuckRecord.position_m");
 static_assert(offsetof(SurefootStuckRecord, yaw_rad) == 16, "StuckRecord.yaw_rad");
 
-/* Where to go; whoever runs the vehicle says so once a second, and when it is over. Unless repeated, it is lost. Known to the channels as surefoot.Mission. */
+/* What the vehicle is told to do: said again once a second, and at once when it changes. Unless repeated, it is lost. Known to the channels as surefoot.Mission. */
 typedef struct SurefootMissionRecord {
-    /* The place in the map frame [m]. */
+    /* The place in the map frame that is headed for: a goal, or the end of the part of a path that is shown [m]. */
     double goal_m[2];
-    /* How near counts as there [m]. */
+    /* How near counts as there; 0 = to be passed through, because others follow [m]. */
     double tolerance_m;
-    /* Time since the vehicle began [s]. */
+    /* Time since the mission began [s]. */
     double time_s;
     /* 0 = under way, else how it ended; see docs/runtime.md. */
     uint64_t outcome;
+    /* 0 = drive, 1 = there is no mission, 2 = paused, 3 = an operator has the wheel, 4 = emergency stop. */
+    uint64_t state;
+    /* Missions so far, this one included. */
+    uint64_t number;
+    /* The point of the route that is headed for, from 0. */
+    uint64_t leg;
+    /* Points of the route. */
+    uint64_t n_legs;
+    /* Share of the worst outcomes to plan for, in (0, 1]; 0 = as the run was started. */
+    double alpha;
+    /* The order that was judged last. */
+    SurefootSource order;
+    /* What became of it: 0 = taken, else why it was refused; see docs/runtime.md. */
+    uint64_t verdict;
+    /* Orders refused so far. */
+    uint64_t n_refused;
+    /* Speed along the path [m/s]; 0 = there is no path, but a goal. */
+    double path_speed_mps;
+    /* Corners of the part of the path that is shown. */
+    uint64_t n_corners;
+    /* Where they lie, east [m]. */
+    double corner_x_m[32];
+    /* Where they lie, north [m]. */
+    double corner_y_m[32];
 } SurefootMissionRecord;
-static_assert(sizeof(SurefootMissionRecord) == 40, "MissionRecord");
+static_assert(sizeof(SurefootMissionRecord) == 640, "MissionRecord");
 static_assert(offsetof(SurefootMissionRecord, goal_m) == 0, "MissionRecord.goal_m");
 static_assert(offsetof(SurefootMissionRecord, tolerance_m) == 16, "MissionRecord.tolerance_m");
 static_assert(offsetof(SurefootMissionRecord, time_s) == 24, "MissionRecord.time_s");
 static_assert(offsetof(SurefootMissionRecord, outcome) == 32, "MissionRecord.outcome");
+static_assert(offsetof(SurefootMissionRecord, state) == 40, "MissionRecord.state");
+static_assert(offsetof(SurefootMissionRecord, number) == 48, "MissionRecord.number");
+static_assert(offsetof(SurefootMissionRecord, leg) == 56, "MissionRecord.leg");
+static_assert(offsetof(SurefootMissionRecord, n_legs) == 64, "MissionRecord.n_legs");
+static_assert(offsetof(SurefootMissionRecord, alpha) == 72, "MissionRecord.alpha");
+static_assert(offsetof(SurefootMissionRecord, order) == 80, "MissionRecord.order");
+static_assert(offsetof(SurefootMissionRecord, verdict) == 96, "MissionRecord.verdict");
+static_assert(offsetof(SurefootMissionRecord, n_refused) == 104, "MissionRecord.n_refused");
+static_assert(offsetof(SurefootMissionRecord, path_speed_mps) == 112, "MissionRecord.path_speed_mps");
+static_assert(offsetof(SurefootMissionRecord, n_corners) == 120, "MissionRecord.n_corners");
+static_assert(offsetof(SurefootMissionRecord, corner_x_m) == 128, "MissionRecord.corner_x_m");
+static_assert(offsetof(SurefootMissionRecord, corner_y_m) == 384, "MissionRecord.corner_y_m");
+
+/* Header of an order; the payload is the points of the route, east and north [m], two f64 each. Known to the channels as surefoot.OrderHeader. */
+typedef struct SurefootOrderHeader {
+    /* Whose and of when: valid_at_ns is when it was said. */
+    SurefootStamp stamp;
+    /* 1 goals, 2 path, 3 pause, 4 resume, 5 cancel, 6 take over, 7 emergency stop, 8 reset, 9 share of outcomes. */
+    uint64_t kind;
+    /* How near to a point counts as there [m]; 0 = as the run was started. */
+    double tolerance_m;
+    /* Speed along a path [m/s]. */
+    double speed_mps;
+    /* Share of the worst outcomes to plan for, in (0, 1]. */
+    double alpha;
+} SurefootOrderHeader;
+static_assert(sizeof(SurefootOrderHeader) == 72, "OrderHeader");
+static_assert(offsetof(SurefootOrderHeader, stamp) == 0, "OrderHeader.stamp");
+static_assert(offsetof(SurefootOrderHeader, kind) == 40, "OrderHeader.kind");
+static_assert(offsetof(SurefootOrderHeader, tolerance_m) == 48, "OrderHeader.tolerance_m");
+static_assert(offsetof(SurefootOrderHeader, speed_mps) == 56, "OrderHeader.speed_mps");
+static_assert(offsetof(SurefootOrderHeader, alpha) == 64, "OrderHeader.alpha");
 
 /* Header of networks learned while driving; the payload is weights, then sidecar, as the bytes of their files. Known to the channels as surefoot.CheckpointHeader. */
 typedef struct SurefootCheckpointHeader {
@@ -336,7 +395,7 @@ static_assert(offsetof(SurefootCheckpointHeader, original_emd2) == 88, "Checkpoi
 
 /* How a process is doing, twice a second. Known to the channels as surefoot.Status. */
 typedef struct SurefootStatusRecord {
-    /* 1 plant, 2 mapping, 3 learning, 4 control, 5 recorder. */
+    /* 1 plant, 2 mapping, 3 learning, 4 control, 5 recorder, 6 mission. */
     uint64_t role;
     /* Process id. */
     uint64_t process;

@@ -28,13 +28,13 @@ class Quad(ctypes.Structure):
         return "[f32; 4]"
 
 
-# Name: header, element, depth, readers of the run's own.
+# Name: header, element, depth, readers of the run's own, messages that late ones are given.
 CHANNELS = {
-    "odometry": (layout.Stamp, layout.OdometryRecord, 32, 5),
-    "scan": (layout.ScanHeader, layout.PointRecord, 2, 2),
-    "risk": (layout.RiskHeader, Quad, 1, 4),
-    "command": (layout.Stamp, layout.CommandRecord, 4, 4),
-    "mission": (layout.Stamp, layout.MissionRecord, 2, 6),
+    "odometry": (layout.Stamp, layout.OdometryRecord, 32, 6, 0),
+    "scan": (layout.ScanHeader, layout.PointRecord, 2, 2, 0),
+    "risk": (layout.RiskHeader, Quad, 1, 4, 0),
+    "command": (layout.Stamp, layout.CommandRecord, 4, 4, 0),
+    "mission": (layout.Stamp, layout.MissionRecord, 2, 8, 1),
 }
 
 
@@ -76,7 +76,7 @@ class Bus:
 
     def service(self, name: str):
         """The channel of this name."""
-        header, element, depth, n_readers = CHANNELS[name]
+        header, element, depth, n_readers, n_kept = CHANNELS[name]
         return (
             self.node.service_builder(iox2.ServiceName.new(name))
             .publish_subscribe(iox2.Slice[element])
@@ -85,7 +85,7 @@ class Bus:
             .max_subscribers(n_readers + THIRD_PARTIES)
             .subscriber_max_buffer_size(depth)
             .subscriber_max_borrowed_samples(depth + 1)
-            .history_size(0)
+            .history_size(n_kept)
             .enable_safe_overflow(True)
             .open_or_create()
         )

@@ -1,8 +1,8 @@
-"""Messages of Surefoot, layout version 4. Written from its types; do not edit."""
+"""Messages of Surefoot, layout version 5. Written from its types; do not edit."""
 
 import ctypes
 
-LAYOUT_VERSION = 4
+LAYOUT_VERSION = 5
 
 
 class Stamp(ctypes.Structure):
@@ -249,6 +249,8 @@ class RiskHeader(ctypes.Structure):
         ("stuck", Source),
         # Where the time to the goal leads [m].
         ("goal_m", ctypes.c_double * 2),
+        # Share of the worst outcomes that was judged for, in (0, 1].
+        ("alpha", ctypes.c_double),
         # First 8 bytes of the SHA-256 of the networks' weights; 0 = none.
         ("checkpoint", ctypes.c_uint64),
         # XXH3 of the payload.
@@ -260,7 +262,7 @@ class RiskHeader(ctypes.Structure):
         return "surefoot.RiskHeader"
 
 
-assert ctypes.sizeof(RiskHeader) == 168
+assert ctypes.sizeof(RiskHeader) == 176
 assert RiskHeader.stamp.offset == 0
 assert RiskHeader.grid.offset == 40
 assert RiskHeader.n_yaws.offset == 80
@@ -269,8 +271,9 @@ assert RiskHeader.surface.offset == 96
 assert RiskHeader.odometry_at_ns.offset == 112
 assert RiskHeader.stuck.offset == 120
 assert RiskHeader.goal_m.offset == 136
-assert RiskHeader.checkpoint.offset == 152
-assert RiskHeader.content_hash.offset == 160
+assert RiskHeader.alpha.offset == 152
+assert RiskHeader.checkpoint.offset == 160
+assert RiskHeader.content_hash.offset == 168
 
 
 class CommandRecord(ctypes.Structure):
@@ -391,17 +394,41 @@ assert StuckRecord.yaw_rad.offset == 16
 
 
 class MissionRecord(ctypes.Structure):
-    """Where to go; whoever runs the vehicle says so once a second, and when it is over. Unless repeated, it is lost."""
+    """What the vehicle is told to do: said again once a second, and at once when it changes. Unless repeated, it is lost."""
 
     _fields_ = [
-        # The place in the map frame [m].
+        # The place in the map frame that is headed for: a goal, or the end of the part of a path that is shown [m].
         ("goal_m", ctypes.c_double * 2),
-        # How near counts as there [m].
+        # How near counts as there; 0 = to be passed through, because others follow [m].
         ("tolerance_m", ctypes.c_double),
-        # Time since the vehicle began [s].
+        # Time since the mission began [s].
         ("time_s", ctypes.c_double),
         # 0 = under way, else how it ended; see docs/runtime.md.
         ("outcome", ctypes.c_uint64),
+        # 0 = drive, 1 = there is no mission, 2 = paused, 3 = an operator has the wheel, 4 = emergency stop.
+        ("state", ctypes.c_uint64),
+        # Missions so far, this one included.
+        ("number", ctypes.c_uint64),
+        # The point of the route that is headed for, from 0.
+        ("leg", ctypes.c_uint64),
+        # Points of the route.
+        ("n_legs", ctypes.c_uint64),
+        # Share of the worst outcomes to plan for, in (0, 1]; 0 = as the run was started.
+        ("alpha", ctypes.c_double),
+        # The order that was judged last.
+        ("order", Source),
+        # What became of it: 0 = taken, else why it was refused; see docs/runtime.md.
+        ("verdict", ctypes.c_uint64),
+        # Orders refused so far.
+        ("n_refused", ctypes.c_uint64),
+        # Speed along the path [m/s]; 0 = there is no path, but a goal.
+        ("path_speed_mps", ctypes.c_double),
+        # Corners of the part of the path that is shown.
+        ("n_corners", ctypes.c_uint64),
+        # Where they lie, east [m].
+        ("corner_x_m", ctypes.c_double * 32),
+        # Where they lie, north [m].
+        ("corner_y_m", ctypes.c_double * 32),
     ]
 
     @staticmethod
@@ -409,11 +436,52 @@ class MissionRecord(ctypes.Structure):
         return "surefoot.Mission"
 
 
-assert ctypes.sizeof(MissionRecord) == 40
+assert ctypes.sizeof(MissionRecord) == 640
 assert MissionRecord.goal_m.offset == 0
 assert MissionRecord.tolerance_m.offset == 16
 assert MissionRecord.time_s.offset == 24
 assert MissionRecord.outcome.offset == 32
+assert MissionRecord.state.offset == 40
+assert MissionRecord.number.offset == 48
+assert MissionRecord.leg.offset == 56
+assert MissionRecord.n_legs.offset == 64
+assert MissionRecord.alpha.offset == 72
+assert MissionRecord.order.offset == 80
+assert MissionRecord.verdict.offset == 96
+assert MissionRecord.n_refused.offset == 104
+assert MissionRecord.path_speed_mps.offset == 112
+assert MissionRecord.n_corners.offset == 120
+assert MissionRecord.corner_x_m.offset == 128
+assert MissionRecord.corner_y_m.offset == 384
+
+
+class OrderHeader(ctypes.Structure):
+    """Header of an order; the payload is the points of the route, east and north [m], two f64 each."""
+
+    _fields_ = [
+        # Whose and of when: valid_at_ns is when it was said.
+        ("stamp", Stamp),
+        # 1 goals, 2 path, 3 pause, 4 resume, 5 cancel, 6 take over, 7 emergency stop, 8 reset, 9 share of outcomes.
+        ("kind", ctypes.c_uint64),
+        # How near to a point counts as there [m]; 0 = as the run was started.
+        ("tolerance_m", ctypes.c_double),
+        # Speed along a path [m/s].
+        ("speed_mps", ctypes.c_double),
+        # Share of the worst outcomes to plan for, in (0, 1].
+        ("alpha", ctypes.c_double),
+    ]
+
+    @staticmethod
+    def type_name() -> str:
+        return "surefoot.OrderHeader"
+
+
+assert ctypes.sizeof(OrderHeader) == 72
+assert OrderHeader.stamp.offset == 0
+assert OrderHeader.kind.offset == 40
+assert OrderHeader.tolerance_m.offset == 48
+assert OrderHeader.speed_mps.offset == 56
+assert OrderHeader.alpha.offset == 64
 
 
 class CheckpointHeader(ctypes.Structure):
@@ -452,7 +520,7 @@ class StatusRecord(ctypes.Structure):
     """How a process is doing, twice a second."""
 
     _fields_ = [
-        # 1 plant, 2 mapping, 3 learning, 4 control, 5 recorder.
+        # 1 plant, 2 mapping, 3 learning, 4 control, 5 recorder, 6 mission.
         ("role", ctypes.c_uint64),
         # Process id.
         ("process", ctypes.c_uint64),

@@ -12,7 +12,24 @@ use crate::{Config, Jump, NavigatorError};
 /// Judges the ground and finds the least time over it to the goal.
 pub struct Assessor {
     layer: RiskLayer,
+    recipe: Recipe,
     cost_to_go: CostToGo,
+}
+
+/// What the ground is judged with.
+struct Recipe {
+    geometry: Geometry,
+    config: Config,
+    belief: Belief,
+    level: CvarLevel,
+    instructions: Instructions,
+}
+
+impl Recipe {
+    fn layer(&self) -> Result<RiskLayer, NavigatorError> {
+        let Self { geometry, config, belief, level, instructions } = self;
+        Ok(RiskLayer::new(belief, *level, geometry, config, *instructions)?)
+    }
 }
 
 impl Assessor {
@@ -28,8 +45,16 @@ impl Assessor {
         config.validate()?;
         let window = config.risk_map;
         let instructions = Instructions::find(config.controller.isa).map_err(mppi::ConfigError::from)?;
+        let recipe = Recipe {
+            geometry: *vehicle.as_ref(),
+            config: config.clone(),
+            belief: belief.clone(),
+            level,
+            instructions,
+        };
         Ok(Self {
-            layer: RiskLayer::new(belief, level, vehicle.as_ref(), config, instructions)?,
+            layer: recipe.layer()?,
+            recipe,
             cost_to_go: CostToGo::new(
                 config.cost_to_go,
                 limits.into().with_attitude_share(config.attitude_share),
@@ -37,6 +62,24 @@ impl Assessor {
                 window.n_cols,
             )?,
         })
+    }
+
+    /// Share of the worst outcomes that is planned for.
+    pub fn level(&self) -> CvarLevel {
+        self.recipe.level
+    }
+
+    /// Judges for another share of the worst outcomes from the next update on, which judges the whole window. What driving
+    /// has proved stays.
+    pub fn judge_at(&mut self, level: CvarLevel) -> Result<(), NavigatorError> {
+        if level == self.recipe.level {
+            return Ok(());
+        }
+        self.recipe.level = level;
+        let mut layer = self.recipe.layer()?;
+        self.layer.stuck().iter().for_each(|pose| layer.note_stuck(*pose));
+        self.layer = layer;
+        Ok(())
     }
 
     /// Follows the vehicle and judges anew what changed of the surface.

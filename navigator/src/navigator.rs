@@ -7,7 +7,10 @@ use mppi::{Controller, Driven};
 use terrain::{GridGeometry, GridMap, Scan, SurfaceCell};
 use traversability::{CvarLevel, Risk, RiskMap, RiskMapView};
 
-use crate::{Assessor, Belief, Chart, Config, Destination, Pilot, ScanTally, Surveyor, Whereabouts};
+use crate::{
+    Assessor, Belief, Chart, Config, Mission, Order, OrderRefusal, Pilot, Route, RouteError, Said, ScanTally,
+    Surveyor, Whereabouts,
+};
 
 /// Where the map of the ground comes from.
 #[derive(Clone)]
@@ -71,6 +74,9 @@ pub enum NavigatorError {
     /// The controller refused its settings.
     #[error(transparent)]
     Controller(#[from] mppi::ConfigError),
+    /// Where to go is nowhere.
+    #[error(transparent)]
+    Route(#[from] RouteError),
 }
 
 /// The planner: its three parts, one after the other, behind two calls.
@@ -84,13 +90,24 @@ pub struct Navigator<M: Driven = Model> {
     map_at_ns: u64,
     /// Whether the localisation has jumped since.
     is_map_behind: bool,
-    destination: Destination,
+    mission: Mission,
+    /// Orders so far.
+    n_orders: u64,
+    /// The goal that the times of the assessor lead to [m].
+    goal_m: [f64; 2],
 }
+
+/// Orders are given in the same process: they are of now.
+const ORDER_AGE_MAX_NS: u64 = 0;
 
 impl<M: Driven> Navigator<M> {
     /// A pipeline that has seen nothing.
     pub fn new(setup: Setup<'_, M>) -> Result<Self, NavigatorError> {
         let Setup { geometry, model, config, belief, surface, level, seed, goal_m, tolerance_m } = setup;
+        let mut mission = Mission::new(ORDER_AGE_MAX_NS);
+        let route = Route::goals(vec![goal_m], tolerance_m)?;
+        // Nothing speaks against the first order.
+        mission.order(Order::Drive(route), Said { sequence: 1, ..Said::default() }, 0).ok();
         Ok(Self {
             surveyor: Surveyor::new(geometry, config.elevation, config.guard, surface)?
                 .with_sensors(model.sensors()),
@@ -99,8 +116,27 @@ impl<M: Driven> Navigator<M> {
             map: None,
             map_at_ns: 0,
             is_map_behind: false,
-            destination: Destination { goal_m, tolerance_m },
+            mission,
+            n_orders: 1,
+            goal_m,
         })
+    }
+
+    /// Directs the vehicle otherwise from now on; the first mission is that of [`Setup`].
+    ///
+    /// # Errors
+    /// The ground cannot be judged for that share of outcomes.
+    pub fn order(&mut self, order: Order, now_ns: u64) -> Result<Result<(), OrderRefusal>, NavigatorError> {
+        self.n_orders += 1;
+        let said = Said { at_ns: now_ns, sender_ns: 0, sequence: self.n_orders };
+        let taken = self.mission.order(order, said, now_ns);
+        self.assessor.judge_at(self.mission.level().unwrap_or(self.assessor.level()))?;
+        Ok(taken)
+    }
+
+    /// What the vehicle is told to do.
+    pub fn mission(&self) -> &Mission {
+        &self.mission
     }
 
     /// Takes in what was measured; returns whether the risk map was renewed. A scan is placed by its own time, which
@@ -110,6 +146,9 @@ impl<M: Driven> Navigator<M> {
     pub fn observe(&mut self, odometry: &Odometry, scan: Option<&Scan>) -> Result<bool, NavigatorError> {
         self.pilot.admit(odometry);
         let Ok(jump) = self.surveyor.admit(odometry) else { return Ok(false) };
+        if let Some(odometry) = self.pilot.odometry() {
+            self.mission.advance(odometry);
+        }
         if let Some(jump) = jump {
             self.assessor.follow_jump(&jump);
             self.surveyor.follow_jump(odometry, &jump)?;
@@ -135,8 +174,10 @@ impl<M: Driven> Navigator<M> {
         let time_to_goal = self.assessor.last_time_to_goal();
         // What was given lies in the frame of the map, whatever the localisation says.
         let odometry_at_ns = if self.surveyor.is_given() { u64::MAX } else { self.map_at_ns };
-        let chart = self.map.as_ref().map(|map| Chart { map: map.view(), time_to_goal, odometry_at_ns });
-        let decision = self.pilot.decide(now_ns, chart, &self.destination);
+        let goal_m = self.goal_m;
+        let chart =
+            self.map.as_ref().map(|map| Chart { map: map.view(), time_to_goal, goal_m, odometry_at_ns });
+        let decision = self.pilot.decide(now_ns, chart, &self.mission.instruction());
         self.surveyor.note_command(decision.command(M::Command::default()).speed_mps());
         if let Some(pose) = self.pilot.take_stuck() {
             self.assessor.note_stuck(pose);
@@ -208,7 +249,8 @@ impl<M: Driven> Navigator<M> {
             self.map.get_or_insert_with(|| RiskMap::constant(known.geometry, known.n_yaws, Risk::OUTSIDE));
         take_over(map, &known);
         map.fill(|risks, _| self.assessor.amend(risks));
-        self.assessor.time_to_goal(map.view(), self.destination.goal_m)?;
+        self.goal_m = self.mission.target().map_or(self.goal_m, |target| target.end().goal_m);
+        self.assessor.time_to_goal(map.view(), self.goal_m)?;
         Ok(())
     }
 }

@@ -3,14 +3,15 @@
 use std::collections::BTreeMap;
 
 use bicycle::{Decision, HoldReason, Model, MotionCommand, MotionState, Odometry, SensorModel, StopReason};
-use mppi::{Controller, CostToGoView, Driven, Input, Objective, Terminal};
+use mppi::{Controller, CostToGoView, Driven, Input, Objective, ReferencePath, Terminal};
 use traversability::RiskMapView;
 
 use crate::applied::{Applied, AppliedBy};
 use crate::frame::Frame;
 use crate::guard::{Admitted, Guard};
 use crate::risk::StuckPose;
-use crate::{Config, Jump, NavigatorError};
+use crate::route::PATH_END_SHARE;
+use crate::{CORNERS_MAX, Config, Instruction, Jump, NavigatorError, Target};
 
 /// What the pilot drives on.
 #[derive(Clone, Copy, Debug)]
@@ -19,6 +20,8 @@ pub struct Chart<'a> {
     pub map: RiskMapView<'a>,
     /// Least time to the goal over it.
     pub time_to_goal: CostToGoView<'a>,
+    /// The goal that it leads to, as it was said [m]; to any other the straight line is taken.
+    pub goal_m: [f64; 2],
     /// Time of the odometry in whose frame both lie [ns]; later jumps of the localisation have left them behind.
     pub odometry_at_ns: u64,
 }
@@ -40,6 +43,8 @@ pub struct Pilot<M: Driven = Model> {
     controller: Controller<M>,
     /// Of the chart that the controller was asked on last, in whose frame it remembers places [ns].
     chart_at_ns: Option<u64>,
+    /// Corners of a path in the frame of the chart; their memory is kept.
+    corners_m: Vec<[f64; 2]>,
     odometry: Option<Odometry>,
     fault: Option<StopReason>,
     decided_at_ns: Option<u64>,
@@ -59,6 +64,7 @@ impl<M: Driven> Pilot<M> {
             sensors: model.sensors(),
             controller: Controller::new(config.controller.clone(), model, seed)?,
             chart_at_ns: None,
+            corners_m: Vec::with_capacity(CORNERS_MAX),
             odometry: None,
             fault: None,
             decided_at_ns: None,
@@ -92,16 +98,18 @@ impl<M: Driven> Pilot<M> {
     }
 
     /// The command for now, or the reason for none. `now_ns` is on the clock of the measurements.
+    ///
+    /// What is wrong with the measurements is the more urgent reason to stand, and a map that is missing the less urgent.
     pub fn decide(
         &mut self,
         now_ns: u64,
         chart: Option<Chart<'_>>,
-        destination: &Destination,
+        instruction: &Instruction<'_>,
     ) -> Decision<M::Command> {
         self.elapsed_s =
             self.decided_at_ns.map_or(0.0, |then_ns| now_ns.saturating_sub(then_ns) as f64 * 1e-9);
-        let decision = match self.ready(now_ns, chart) {
-            Ok((chart, odometry)) => self.ask(&chart, &odometry, destination),
+        let decision = match self.ready(now_ns, chart, instruction) {
+            Ok((chart, odometry, target)) => self.ask(&chart, &odometry, &target),
             Err(decision) => {
                 self.controller.stand_by(&decision, self.elapsed_s);
                 decision
@@ -177,36 +185,37 @@ impl<M: Driven> Pilot<M> {
     }
 
     /// What the controller needs to be asked, or what to do without asking it.
-    fn ready<'a>(
+    fn ready<'a, 'b>(
         &self,
         now_ns: u64,
         chart: Option<Chart<'a>>,
-    ) -> Result<(Chart<'a>, Odometry), Decision<M::Command>> {
+        instruction: &Instruction<'b>,
+    ) -> Result<(Chart<'a>, Odometry, Target<'b>), Decision<M::Command>> {
         self.fault.map_or_else(|| self.guard.check(now_ns), Err).map_err(Decision::Stop)?;
-        chart.zip(self.odometry).ok_or(Decision::Hold(HoldReason::NoMap))
+        let target = match *instruction {
+            Instruction::Drive(target) => target,
+            Instruction::Stand(Decision::Hold(reason)) => return Err(Decision::Hold(reason)),
+            Instruction::Stand(Decision::Stop(reason)) => return Err(Decision::Stop(reason)),
+            Instruction::Stand(Decision::Drive(never)) => match never {},
+        };
+        let (chart, odometry) = chart.zip(self.odometry).ok_or(Decision::Hold(HoldReason::NoMap))?;
+        Ok((chart, odometry, target))
     }
 
-    fn ask(
-        &mut self,
-        chart: &Chart<'_>,
-        odometry: &Odometry,
-        destination: &Destination,
-    ) -> Decision<M::Command> {
+    fn ask(&mut self, chart: &Chart<'_>, odometry: &Odometry, target: &Target<'_>) -> Decision<M::Command> {
         let before_ns = self.chart_at_ns.replace(chart.odometry_at_ns);
         if let Some(jump) = before_ns.and_then(|at_ns| self.frame.shift(at_ns, chart.odometry_at_ns)) {
             self.controller.carry(|pose| jump.pose(pose));
         }
-        let (state, goal_m) = self.on_chart(odometry, chart.odometry_at_ns, destination.goal_m);
+        // A chart cannot be turned: until the next one, vehicle and target are carried back to where they stood on it.
+        let back = self.frame.since(chart.odometry_at_ns).map(|jump| jump.inverse());
         let was_recovering = self.controller.diagnostics().is_recovering;
-        let decision = self.controller.decide(&Input {
-            state,
+        let Self { controller, corners_m, .. } = self;
+        let decision = controller.decide(&Input {
+            state: on_chart(controller.model().measured_state(odometry), back.as_ref()),
             elapsed_s: self.elapsed_s,
             map: chart.map,
-            objective: Objective::Goal {
-                goal_m,
-                tolerance_m: destination.tolerance_m,
-                terminal: Terminal::CostToGo(chart.time_to_goal),
-            },
+            objective: objective_on_chart(chart, target, back.as_ref(), corners_m),
             cycle: self.cycle,
         });
         if self.controller.diagnostics().is_recovering && !was_recovering {
@@ -215,17 +224,40 @@ impl<M: Driven> Pilot<M> {
         }
         decision
     }
+}
 
-    /// State and goal in the frame of a chart. What it tells of the time to the goal leads to where the goal was until
-    /// the next chart comes.
-    fn on_chart(&self, odometry: &Odometry, of_ns: u64, goal_m: [f64; 2]) -> (M::State, [f64; 2]) {
-        let state = self.controller.model().measured_state(odometry);
-        let Some(jump) = self.frame.since(of_ns) else { return (state, goal_m) };
-        let back = jump.inverse();
-        let state: MotionState = state.into();
-        let [x_m, y_m, yaw_rad] = back.pose([state.x_m, state.y_m, state.yaw_rad]);
-        let [goal_x_m, goal_y_m, _] = back.pose([goal_m[0], goal_m[1], 0.0]);
-        (MotionState { x_m, y_m, yaw_rad, ..state }.into(), [goal_x_m, goal_y_m])
+fn on_chart<S: Into<MotionState> + From<MotionState>>(state: S, back: Option<&Jump>) -> S {
+    let Some(back) = back else { return state };
+    let state: MotionState = state.into();
+    let [x_m, y_m, yaw_rad] = back.pose([state.x_m, state.y_m, state.yaw_rad]);
+    MotionState { x_m, y_m, yaw_rad, ..state }.into()
+}
+
+/// The target in the frame of a chart. What that tells of the time to the goal leads to where the goal was until the next
+/// one comes; if it leads to another goal, it is not asked.
+fn objective_on_chart<'a>(
+    chart: &Chart<'a>,
+    target: &Target<'a>,
+    back: Option<&Jump>,
+    corners_m: &'a mut Vec<[f64; 2]>,
+) -> Objective<'a> {
+    let carried = |[x_m, y_m]: [f64; 2]| {
+        let [x_m, y_m, _] = back.map_or([x_m, y_m, 0.0], |back| back.pose([x_m, y_m, 0.0]));
+        [x_m, y_m]
+    };
+    match target {
+        Target::Goal(Destination { goal_m, tolerance_m }) => {
+            let is_known = *goal_m == chart.goal_m;
+            let terminal =
+                if is_known { Terminal::CostToGo(chart.time_to_goal) } else { Terminal::StraightLine };
+            Objective::Goal { goal_m: carried(*goal_m), tolerance_m: *tolerance_m, terminal }
+        }
+        Target::Path(path) => {
+            corners_m.clear();
+            corners_m.extend(path.points_m.iter().take(CORNERS_MAX).copied().map(carried));
+            let tolerance_m = PATH_END_SHARE * path.tolerance_m;
+            Objective::Path(ReferencePath { points_m: corners_m, tolerance_m, ..*path })
+        }
     }
 }
 

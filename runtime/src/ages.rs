@@ -33,6 +33,8 @@ const DELAY_S: f64 = 0.08;
 const COMMAND_S: f64 = 0.3;
 const LEARNED_S: f64 = 0.6;
 const LEARNING_SILENCE_S: f64 = 0.4;
+/// Whoever says something expects it to happen now, not after a pause that nobody knows of [s].
+const ORDER_S: f64 = 1.0;
 
 impl Periods {
     /// What a guard lets pass at these periods: two odometry messages may be lost and four scans, and a map may have been
@@ -75,6 +77,8 @@ pub struct AgeLimits {
     pub learning_silence_ns: u64,
     /// Mission that has not been repeated.
     pub mission_ns: u64,
+    /// Order of somebody who directs the vehicle.
+    pub order_ns: u64,
 }
 
 /// Settings that cannot be together.
@@ -125,6 +129,7 @@ impl AgeLimits {
             learned_ns: clock::nanoseconds(LEARNED_S.max(3.0 * scan_s)),
             learning_silence_ns: clock::nanoseconds(silence_s),
             mission_ns: clock::nanoseconds(2.5 * mission_s),
+            order_ns: clock::nanoseconds(ORDER_S),
         })
     }
 }
@@ -150,6 +155,7 @@ mod tests {
             learned_ns: ms(600),
             learning_silence_ns: ms(400),
             mission_ns: ms(2500),
+            order_ns: ms(1000),
         };
         assert_eq!(limits(&periods, None), Ok(expected));
     }

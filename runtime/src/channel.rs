@@ -10,8 +10,8 @@ use std::fmt::Debug;
 use iceoryx2::prelude::ZeroCopySend;
 
 use crate::message::{
-    CheckpointHeader, CommandRecord, DecisionRecord, MissionRecord, OdometryRecord, PointRecord, RiskHeader,
-    ScanHeader, Stamp, StatusRecord, StuckRecord, SurfaceHeader,
+    CheckpointHeader, CommandRecord, DecisionRecord, MissionRecord, OdometryRecord, OrderHeader, PointRecord,
+    RiskHeader, ScanHeader, Stamp, StatusRecord, StuckRecord, SurfaceHeader,
 };
 use crate::payload;
 pub use bus::{Bus, Cleared, RunName, RunNameError};
@@ -48,7 +48,7 @@ macro_rules! header {
         }
     )* };
 }
-header!(ScanHeader, SurfaceHeader, RiskHeader, CheckpointHeader);
+header!(ScanHeader, SurfaceHeader, RiskHeader, CheckpointHeader, OrderHeader);
 
 /// An element of a payload.
 pub trait Element: ZeroCopySend + bytemuck::Pod + Default + Debug + 'static {}
@@ -60,6 +60,8 @@ pub struct Channel<H, T> {
     pub name: &'static str,
     /// Messages that wait for a subscriber; of more, the oldest is dropped.
     pub depth: usize,
+    /// Messages that a reader which comes late is still given.
+    pub history: usize,
     /// Processes of a run that read it, all of them and the live view. A [`Bus`] adds room for third parties.
     pub n_readers: usize,
     /// Refuses what no reader could use.
@@ -71,39 +73,46 @@ pub const THIRD_PARTIES: usize = 2;
 
 /// Where the vehicle is: whoever runs the vehicle.
 pub const ODOMETRY: Channel<Stamp, OdometryRecord> =
-    Channel { name: "odometry", depth: 32, n_readers: 5, check: payload::check_odometry };
+    Channel { name: "odometry", depth: 32, history: 0, n_readers: 6, check: payload::check_odometry };
 /// What the range sensor sees: whoever runs the vehicle.
 pub const SCAN: Channel<ScanHeader, PointRecord> =
-    Channel { name: "scan", depth: 2, n_readers: 2, check: payload::check_scan };
+    Channel { name: "scan", depth: 2, history: 0, n_readers: 2, check: payload::check_scan };
 /// The map of the ground: mapping.
 pub const SURFACE: Channel<SurfaceHeader, [f32; 8]> =
-    Channel { name: "surface", depth: 2, n_readers: 3, check: payload::check_surface };
+    Channel { name: "surface", depth: 2, history: 0, n_readers: 3, check: payload::check_surface };
 /// The risk map of what was learned: learning.
 pub const RISK: Channel<RiskHeader, [f32; 4]> =
-    Channel { name: "risk", depth: 1, n_readers: 4, check: payload::check_risk };
+    Channel { name: "risk", depth: 1, history: 0, n_readers: 4, check: payload::check_risk };
 /// The risk map of physics alone: mapping, while learning is silent.
 pub const RISK_PHYSICS: Channel<RiskHeader, [f32; 4]> =
     Channel { name: "risk_physics", n_readers: 3, ..RISK };
 /// What the vehicle shall do: control.
 pub const COMMAND: Channel<Stamp, CommandRecord> =
-    Channel { name: "command", depth: 4, n_readers: 4, check: payload::check_command };
+    Channel { name: "command", depth: 4, history: 0, n_readers: 4, check: payload::check_command };
 /// What each decision was made from: control.
 pub const DECISION: Channel<Stamp, DecisionRecord> =
-    Channel { name: "decision", depth: 16, n_readers: 2, check: payload::check_anything };
+    Channel { name: "decision", depth: 16, history: 0, n_readers: 2, check: payload::check_anything };
 /// Where the vehicle got stuck: control.
 pub const STUCK: Channel<Stamp, StuckRecord> =
-    Channel { name: "stuck", depth: 8, n_readers: 3, check: payload::check_stuck };
-/// Where to go: whoever runs the vehicle.
+    Channel { name: "stuck", depth: 8, history: 0, n_readers: 3, check: payload::check_stuck };
+/// What the vehicle is told to do: mission, or whoever runs the vehicle. Decisions are made from the last that was said,
+/// however long ago a reader came.
 pub const MISSION: Channel<Stamp, MissionRecord> =
-    Channel { name: "mission", depth: 2, n_readers: 6, check: payload::check_mission };
+    Channel { name: "mission", depth: 2, history: 1, n_readers: 8, check: payload::check_mission };
+/// What somebody who directs the vehicle says: one at a time, each for a moment.
+pub const ORDER: Channel<OrderHeader, [f64; 2]> =
+    Channel { name: "order", depth: 8, history: 0, n_readers: 2, check: payload::check_order };
+/// Emergency stops, which wait for nobody who says something else.
+pub const EMERGENCY_STOP: Channel<OrderHeader, [f64; 2]> =
+    Channel { name: "emergency_stop", depth: 8, history: 0, n_readers: 2, check: payload::check_order };
 
 /// Networks that were learned while driving: learning.
 pub const CHECKPOINT: Channel<CheckpointHeader, u8> =
-    Channel { name: "checkpoint", depth: 2, n_readers: 1, check: payload::check_checkpoint };
+    Channel { name: "checkpoint", depth: 2, history: 0, n_readers: 1, check: payload::check_checkpoint };
 
 /// How a process is doing. Several publish at once: one channel for each role.
 pub const fn status_channel(name: &'static str) -> Channel<Stamp, StatusRecord> {
-    Channel { name, depth: 2, n_readers: 3, check: payload::check_anything }
+    Channel { name, depth: 2, history: 0, n_readers: 3, check: payload::check_anything }
 }
 
 /// Why a channel cannot be used.
@@ -134,6 +143,12 @@ pub enum ChannelError {
         channel: &'static str,
         /// What the system said.
         problem: String,
+    },
+    /// The run has no such channel.
+    #[error("channel {channel}: expected a process of the run that uses it, found none")]
+    Absent {
+        /// Its name.
+        channel: &'static str,
     },
     /// Somebody else has the channel.
     #[error(

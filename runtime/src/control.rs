@@ -1,7 +1,7 @@
 //! The controller as a process: a decision at every deadline, on what there is, and never a wait for the map.
 
 use bicycle::{Decision, Model};
-use navigator::{Chart, Config, Pilot};
+use navigator::{Chart, Config, Destination, Instruction, Pilot};
 
 use crate::RuntimeError;
 use crate::ages::AgeLimits;
@@ -14,7 +14,7 @@ use crate::clock::{self, Cycle};
 use crate::message::{
     CommandRecord, DecisionRecord, MissionRecord, OdometryRecord, RiskHeader, Source, Stamp, StuckRecord,
 };
-use crate::mission::{Mission, NOWHERE, with_reason};
+use crate::mission::Heard;
 use crate::payload::risk_views;
 use crate::status::{Health, Meter, Role};
 
@@ -69,7 +69,7 @@ struct Inputs {
     physics: MapInput,
     last_odometry: Option<Stamp>,
     n_odometry: u64,
-    mission: Mission,
+    mission: Heard,
 }
 
 /// The newest map of an author.
@@ -110,7 +110,7 @@ impl Inputs {
             physics: map(&RISK_PHYSICS)?,
             last_odometry: None,
             n_odometry: 0,
-            mission: Mission::default(),
+            mission: Heard::default(),
         })
     }
 
@@ -141,6 +141,20 @@ impl Inputs {
     }
 }
 
+/// A risk map's message as the pilot reads it: control and its replay.
+pub(crate) fn chart_of<'a>(header: &RiskHeader, payload: &'a [[f32; 4]]) -> Option<Chart<'a>> {
+    let (map, time_to_goal) = risk_views(header, payload)?;
+    Some(Chart { map, time_to_goal, goal_m: header.goal_m, odometry_at_ns: header.odometry_at_ns })
+}
+
+/// Where an instruction leads; nowhere to stand.
+fn destination(instruction: &Instruction<'_>) -> Destination {
+    match instruction {
+        Instruction::Drive(target) => target.end(),
+        Instruction::Stand(_) => Destination { goal_m: [0.0; 2], tolerance_m: 0.0 },
+    }
+}
+
 /// Shows a pilot what the vehicle says of itself: control and its replay.
 pub(crate) fn show(pilot: &mut Pilot, stamp: &Stamp, record: &OdometryRecord) {
     pilot.note_applied(&record.applied());
@@ -167,23 +181,18 @@ impl Control {
         self.inputs.take(&mut self.pilot);
         let newest = self.inputs.map(began_ns, self.ages.learned_ns);
         let map = newest.map(|message| (*message.header(), message.payload()));
-        let chart = map.as_ref().and_then(|(header, payload)| {
-            let (map, time_to_goal) = risk_views(header, payload)?;
-            Some(Chart { map, time_to_goal, odometry_at_ns: header.odometry_at_ns })
-        });
+        let chart = map.as_ref().and_then(|(header, payload)| chart_of(header, payload));
         let cycle = self.pilot.cycle();
         let used = map.as_ref().map(|(header, _)| header).filter(|_| chart.is_some());
         if let Some(header) = used {
             self.pilot.note_scan(header.stamp.valid_at_ns);
         }
-        // Nowhere to go: the same as knowing nothing of the ground, but for the reason that is given.
-        let said = self.inputs.mission.destination(began_ns, self.ages.mission_ns);
-        let chart = chart.filter(|_| said.is_ok());
-        let destination = said.unwrap_or(NOWHERE);
+        let instruction = self.inputs.mission.instruction(began_ns, self.ages.mission_ns);
+        let destination = destination(&instruction);
         let n_rollouts = self.budget.n_rollouts();
         self.pilot.use_rollouts(n_rollouts);
         let thinking_ns = clock::now_ns();
-        let decision = with_reason(self.pilot.decide(began_ns, chart, &destination), said);
+        let decision = self.pilot.decide(began_ns, chart, &instruction);
         if matches!(decision, Decision::Drive(_)) {
             self.budget.learn(n_rollouts, clock::now_ns() - thinking_ns);
         }

@@ -108,7 +108,7 @@ impl Learning {
                 let checkpoint = news.change.as_ref().map(|(checkpoint, ..)| checkpoint.as_ref());
                 tell(Told::Round(&news.round, checkpoint));
                 if let Some((_, hash, assessor)) = news.change {
-                    self.maker.judge_by(assessor, hash);
+                    self.maker.judge_by(assessor, hash)?;
                 }
             }
             Some(Err(why)) => tell(Told::Ended(&why)),
@@ -119,7 +119,13 @@ impl Learning {
 
     fn look(&mut self) -> Result<(), RuntimeError> {
         let maker = &mut self.maker;
-        self.missions.poll(|_, missions| missions.iter().for_each(|mission| maker.set_goal(mission.goal_m)));
+        let mut followed = Ok(());
+        self.missions.poll(|_, missions| {
+            missions.iter().for_each(|mission| {
+                followed = std::mem::replace(&mut followed, Ok(())).and_then(|()| maker.follow(mission));
+            });
+        });
+        followed?;
         // What is judged is sent, so that whoever has the messages knows all that was judged.
         if let Some(surface) = self.surfaces.newest().filter(|_| maker.has_goal()) {
             let began_ns = clock::now_ns();

@@ -23,6 +23,7 @@ pub mod mapping;
 pub mod message;
 pub mod mission;
 pub mod online;
+pub mod operator;
 pub mod payload;
 pub mod plant;
 pub mod realtime;

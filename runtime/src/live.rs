@@ -31,8 +31,14 @@ const MAP_NS: u64 = SECOND_NS / 2;
 /// Messages that wait for a client; of more, the oldest is dropped.
 const BACKLOG: usize = 64;
 /// Topics of the statuses, by [`Role::ALL`].
-const STATUS_TOPICS: [&str; 5] =
-    ["/status/plant", "/status/mapping", "/status/learning", "/status/control", "/status/recorder"];
+const STATUS_TOPICS: [&str; 6] = [
+    "/status/plant",
+    "/status/mapping",
+    "/status/learning",
+    "/status/control",
+    "/status/recorder",
+    "/status/mission",
+];
 
 /// Serves a live view on this address until `is_over` says to end; `tell` hears where.
 ///
@@ -123,8 +129,7 @@ impl Live {
         let Self { topics, inlets, seen, .. } = self;
         inlets.odometry.poll(|stamp, records| seen.odometry(topics, stamp, records));
         inlets.missions.poll(|stamp, records| {
-            if let Some(mission) = records.first() {
-                let [x_m, y_m] = mission.goal_m;
+            if let Some([x_m, y_m]) = records.first().and_then(MissionRecord::destination_m) {
                 topics.goal(stamp.valid_at_ns, &Pose { x_m, y_m, ..Pose::default() });
             }
         });

@@ -130,7 +130,7 @@ impl Mapping {
             waiting.push_back(Waiting { since_ns: clock::now_ns(), stamp, scan });
         });
         self.take_waiting()?;
-        self.fallback.listen();
+        self.fallback.listen()?;
         self.report()
     }
 
@@ -236,11 +236,16 @@ impl Fallback {
         })
     }
 
-    fn listen(&mut self) {
+    fn listen(&mut self) -> Result<(), RuntimeError> {
         self.learned.poll(|_, _| ());
-        let maker = &mut self.maker;
-        self.missions.poll(|_, missions| missions.iter().for_each(|mission| maker.set_goal(mission.goal_m)));
+        let (maker, mut followed) = (&mut self.maker, Ok(()));
+        self.missions.poll(|_, missions| {
+            missions.iter().for_each(|mission| {
+                followed = std::mem::replace(&mut followed, Ok(())).and_then(|()| maker.follow(mission));
+            });
+        });
         self.stuck.poll(|stamp, stuck| stuck.iter().for_each(|stuck| maker.note_stuck(stamp, stuck)));
+        Ok(followed?)
     }
 
     fn is_needed(&self) -> bool {

@@ -9,7 +9,7 @@ pub(crate) use convert::drive_row;
 pub use convert::{HOLD_REASONS, STOP_REASONS};
 
 /// Version of everything in this file; messages of another are refused.
-pub const LAYOUT_VERSION: u32 = 4;
+pub const LAYOUT_VERSION: u32 = 5;
 
 record! {
     /// First field of every header: whose message it is, and of when.
@@ -156,6 +156,8 @@ record! {
         stuck: Source,
         /// Where the time to the goal leads [m].
         goal_m: [f64; 2],
+        /// Share of the worst outcomes that was judged for, in (0, 1].
+        alpha: f64,
         /// First 8 bytes of the SHA-256 of the networks' weights; 0 = none.
         checkpoint: u64,
         /// XXH3 of the payload.
@@ -232,16 +234,56 @@ record! {
 }
 
 record! {
-    /// Where to go; whoever runs the vehicle says so once a second, and when it is over. Unless repeated, it is lost.
+    /// What the vehicle is told to do: said again once a second, and at once when it changes. Unless repeated, it is lost.
     MissionRecord = "surefoot.Mission" {
-        /// The place in the map frame [m].
+        /// The place in the map frame that is headed for: a goal, or the end of the part of a path that is shown [m].
         goal_m: [f64; 2],
-        /// How near counts as there [m].
+        /// How near counts as there; 0 = to be passed through, because others follow [m].
         tolerance_m: f64,
-        /// Time since the vehicle began [s].
+        /// Time since the mission began [s].
         time_s: f64,
         /// 0 = under way, else how it ended; see docs/runtime.md.
         outcome: u64,
+        /// 0 = drive, 1 = there is no mission, 2 = paused, 3 = an operator has the wheel, 4 = emergency stop.
+        state: u64,
+        /// Missions so far, this one included.
+        number: u64,
+        /// The point of the route that is headed for, from 0.
+        leg: u64,
+        /// Points of the route.
+        n_legs: u64,
+        /// Share of the worst outcomes to plan for, in (0, 1]; 0 = as the run was started.
+        alpha: f64,
+        /// The order that was judged last.
+        order: Source,
+        /// What became of it: 0 = taken, else why it was refused; see docs/runtime.md.
+        verdict: u64,
+        /// Orders refused so far.
+        n_refused: u64,
+        /// Speed along the path [m/s]; 0 = there is no path, but a goal.
+        path_speed_mps: f64,
+        /// Corners of the part of the path that is shown.
+        n_corners: u64,
+        /// Where they lie, east [m].
+        corner_x_m: [f64; 32],
+        /// Where they lie, north [m].
+        corner_y_m: [f64; 32],
+    }
+}
+
+record! {
+    /// Header of an order; the payload is the points of the route, east and north [m], two f64 each.
+    OrderHeader = "surefoot.OrderHeader" {
+        /// Whose and of when: valid_at_ns is when it was said.
+        stamp: Stamp,
+        /// 1 goals, 2 path, 3 pause, 4 resume, 5 cancel, 6 take over, 7 emergency stop, 8 reset, 9 share of outcomes.
+        kind: u64,
+        /// How near to a point counts as there [m]; 0 = as the run was started.
+        tolerance_m: f64,
+        /// Speed along a path [m/s].
+        speed_mps: f64,
+        /// Share of the worst outcomes to plan for, in (0, 1].
+        alpha: f64,
     }
 }
 
@@ -266,7 +308,7 @@ record! {
 record! {
     /// How a process is doing, twice a second.
     StatusRecord = "surefoot.Status" {
-        /// 1 plant, 2 mapping, 3 learning, 4 control, 5 recorder.
+        /// 1 plant, 2 mapping, 3 learning, 4 control, 5 recorder, 6 mission.
         role: u64,
         /// Process id.
         process: u64,
@@ -304,6 +346,7 @@ pub fn layouts() -> Vec<RecordLayout> {
         DecisionRecord::layout(),
         StuckRecord::layout(),
         MissionRecord::layout(),
+        OrderHeader::layout(),
         CheckpointHeader::layout(),
         StatusRecord::layout(),
     ]

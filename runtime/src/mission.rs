@@ -1,102 +1,206 @@
-//! What control knows of where to go, and what it does when it knows nothing.
+//! The mission as a process: orders come in, and what the vehicle is told to do goes out, as long as this lives.
 
-use bicycle::{Decision, HoldReason, StopReason};
-use navigator::Destination;
+mod heard;
+mod record;
+mod told;
 
-use crate::message::{MissionRecord, Source, Stamp};
+use bicycle::{Model, SensorModel};
+use navigator::{Mission, Order, OrderRefusal, Route, Said};
 
-/// A destination for whoever must name one and has none.
-pub const NOWHERE: Destination = Destination { goal_m: [0.0; 2], tolerance_m: 0.0 };
+use crate::RuntimeError;
+use crate::ages::{AgeLimits, Periods};
+use crate::channel::{Bus, EMERGENCY_STOP, Inlet, MISSION, ODOMETRY, ORDER, Outlet};
+use crate::clock;
+use crate::message::{MissionRecord, OdometryRecord, OrderHeader, Source, Stamp};
+use crate::status::{Health, Meter, Role};
+pub use heard::Heard;
+use record::verdict_of;
+pub(crate) use record::{REACHED, taken_by};
 
-/// The outcome of a mission that is under way.
-const UNDER_WAY: u64 = 0;
+/// Time between two looks at the channels [ns].
+const POLL_NS: u64 = 5_000_000;
 
-/// The mission that was heard last.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Mission {
-    last: Option<(Stamp, MissionRecord)>,
+/// What leads.
+pub struct MissionSetup<'a> {
+    /// How it begins.
+    pub beginning: Beginning,
+    /// How near to a point counts as there where an order does not say [m].
+    pub tolerance_m: f64,
+    /// What is believed of the vehicle: how its sensors misstate its motion.
+    pub model: &'a Model,
+    /// How often the mission is said again.
+    pub periods: Periods,
+    /// How old orders may be.
+    pub ages: AgeLimits,
 }
 
-impl Mission {
-    /// Takes in what was said of where to go.
-    pub fn note(&mut self, stamp: &Stamp, record: &MissionRecord) {
-        self.last = Some((*stamp, *record));
+/// How a mission begins.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Beginning {
+    /// With nothing to do.
+    Idle,
+    /// On a route.
+    Driving(Route),
+    /// In the place of a process that has died: with the emergency stop latched, because nobody knows any more what was
+    /// ordered.
+    Latched,
+}
+
+/// Leads until `is_over` says to end.
+pub fn run(bus: &Bus, setup: MissionSetup<'_>, is_over: &dyn Fn() -> bool) -> Result<(), RuntimeError> {
+    let mut leader = Leader::new(bus, setup)?;
+    while !is_over() {
+        leader.look(clock::now_ns())?;
+        clock::sleep_until(clock::now_ns() + POLL_NS);
+    }
+    // What was driven since the mission was said last counts.
+    leader.look(clock::now_ns())?;
+    leader.tell()
+}
+
+/// Keeps the mission of a run.
+struct Leader {
+    mission: Mission,
+    tolerance_m: f64,
+    sensors: SensorModel,
+    orders: Inlet<OrderHeader, [f64; 2]>,
+    emergency_stops: Inlet<OrderHeader, [f64; 2]>,
+    odometry: Inlet<Stamp, OdometryRecord>,
+    outlet: Outlet<Stamp, MissionRecord>,
+    meter: Meter,
+    /// The order that was judged last, and what became of it.
+    judged: (Source, u64),
+    stopwatch: Stopwatch,
+    odometry_at_ns: Option<u64>,
+    period_ns: u64,
+    told_at_ns: Option<u64>,
+}
+
+impl Leader {
+    fn new(bus: &Bus, setup: MissionSetup<'_>) -> Result<Self, RuntimeError> {
+        let MissionSetup { beginning, tolerance_m, model, periods, ages } = setup;
+        Ok(Self {
+            mission: begun(beginning, ages.order_ns),
+            tolerance_m,
+            sensors: SensorModel::of(&model.effects),
+            orders: bus.inlet(&ORDER)?,
+            emergency_stops: bus.inlet(&EMERGENCY_STOP)?,
+            odometry: bus.inlet(&ODOMETRY)?,
+            outlet: bus.outlet(&MISSION, 1)?,
+            meter: Meter::new(bus, Role::Mission)?,
+            judged: (Source::default(), 0),
+            stopwatch: Stopwatch::default(),
+            odometry_at_ns: None,
+            period_ns: clock::nanoseconds(periods.mission_s),
+            told_at_ns: None,
+        })
     }
 
-    /// The message that it was heard by.
-    pub fn source(&self) -> Source {
-        self.last.map_or(Source::default(), |(stamp, _)| stamp.source())
-    }
-
-    /// When it was said last [ns]; `None` before the first time.
-    pub fn said_at_ns(&self) -> Option<u64> {
-        self.last.map(|(stamp, _)| stamp.valid_at_ns)
-    }
-
-    /// Where to go now, or why nowhere: there is no mission, it is over, or it was not repeated for longer than
-    /// `age_max_ns`.
-    pub fn destination(&self, now_ns: u64, age_max_ns: u64) -> Result<Destination, Decision> {
-        let Some((stamp, record)) = self.last.filter(|(_, record)| record.outcome == UNDER_WAY) else {
-            return Err(Decision::Hold(HoldReason::NoMission));
-        };
-        if now_ns.saturating_sub(stamp.valid_at_ns) > age_max_ns {
-            return Err(Decision::Stop(StopReason::StaleMission));
+    fn look(&mut self, now_ns: u64) -> Result<(), RuntimeError> {
+        self.follow_orders()?;
+        let has_changed = self.follow_odometry();
+        let is_due = self.told_at_ns.is_none_or(|at_ns| now_ns.saturating_sub(at_ns) >= self.period_ns);
+        if has_changed || is_due {
+            self.tell()?;
         }
-        Ok(Destination { goal_m: record.goal_m, tolerance_m: record.tolerance_m })
+        self.outlet.welcome();
+        let age_s = self.odometry_at_ns.map_or(-1.0, |at_ns| clock::age_s(now_ns, at_ns));
+        let n_refused = self.mission.refused().values().sum();
+        let health =
+            Health { age_s: [age_s, -1.0, -1.0, -1.0], messages: [0, n_refused, 0], ..Health::default() };
+        let counts = [self.orders.counts(), self.emergency_stops.counts(), self.odometry.counts()];
+        Ok(self.meter.report(now_ns, || counts.into_iter().fold(health, Health::with))?)
+    }
+
+    /// Every order is answered. Emergency stops come last: whatever else was said has then been heard.
+    fn follow_orders(&mut self) -> Result<(), RuntimeError> {
+        let mut waiting = Vec::new();
+        for inlet in [&mut self.orders, &mut self.emergency_stops] {
+            inlet.poll(|header, points_m| waiting.push((*header, points_m.to_vec())));
+        }
+        for (header, points_m) in waiting {
+            let tolerance_m = if header.tolerance_m == 0.0 { self.tolerance_m } else { header.tolerance_m };
+            let order = OrderHeader { tolerance_m, ..header }.order(&points_m);
+            let taken = self.take(order, header.said());
+            self.judged = (header.stamp.source(), verdict_of(taken));
+            self.tell()?;
+        }
+        Ok(())
+    }
+
+    fn take(&mut self, order: Result<Order, OrderRefusal>, said: Said) -> Result<(), OrderRefusal> {
+        let now_ns = clock::now_ns();
+        self.meter.count(now_ns.saturating_sub(said.at_ns));
+        match order {
+            Ok(order) => self.mission.order(order, said, now_ns),
+            Err(refusal) => {
+                self.mission.note_refused(refusal);
+                Err(refusal)
+            }
+        }
+    }
+
+    /// Returns whether the vehicle is to do something else now.
+    fn follow_odometry(&mut self) -> bool {
+        let Self { mission, sensors, odometry, odometry_at_ns, stopwatch, .. } = self;
+        let mut has_changed = false;
+        odometry.poll(|stamp, records| {
+            for record in records {
+                *odometry_at_ns = Some(stamp.valid_at_ns);
+                stopwatch.run(mission, stamp.valid_at_ns);
+                has_changed |= mission.advance(&sensors.corrected(&record.odometry(stamp.valid_at_ns)));
+            }
+        });
+        has_changed
+    }
+
+    fn tell(&mut self) -> Result<(), RuntimeError> {
+        let now_ns = clock::now_ns();
+        let (order, verdict) = self.judged;
+        let record = MissionRecord {
+            time_s: self.stopwatch.time_s(),
+            order,
+            verdict,
+            ..MissionRecord::of(&self.mission)
+        };
+        self.outlet.send_one(Stamp::default(), record, now_ns)?;
+        self.told_at_ns = Some(now_ns);
+        Ok(())
     }
 }
 
-/// Who is shown no map because there is nowhere to go waits for one: the reason is the mission then. Every other reason
-/// to stand is the more urgent one.
-pub fn with_reason(decision: Decision, destination: Result<Destination, Decision>) -> Decision {
-    match (decision, destination) {
-        (Decision::Hold(HoldReason::NoMap), Err(standing)) => standing,
-        _ => decision,
+fn begun(beginning: Beginning, order_age_max_ns: u64) -> Mission {
+    let mut mission = Mission::new(order_age_max_ns);
+    match beginning {
+        Beginning::Idle => {}
+        // The first order of all: nothing speaks against it, and every other is said later.
+        Beginning::Driving(route) => {
+            mission.order(Order::Drive(route), Said { sequence: 1, ..Said::default() }, 0).ok();
+        }
+        Beginning::Latched => mission = Mission::latched(order_age_max_ns),
     }
+    mission
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use bicycle::Command;
+/// Time of the mission: from the first odometry that it had until it was over.
+#[derive(Clone, Copy, Debug, Default)]
+struct Stopwatch {
+    number: u64,
+    began_ns: u64,
+    until_ns: u64,
+}
 
-    const AGE_MAX_NS: u64 = 2500;
-    const NO_MISSION: Decision = Decision::Hold(HoldReason::NoMission);
-
-    fn said(mission: &mut Mission, at_ns: u64, outcome: u64) {
-        let record =
-            MissionRecord { goal_m: [3.0, 4.0], tolerance_m: 1.0, outcome, ..MissionRecord::default() };
-        mission.note(&Stamp { valid_at_ns: at_ns, ..Stamp::default() }, &record);
+impl Stopwatch {
+    fn run(&mut self, mission: &Mission, at_ns: u64) {
+        if self.number != mission.number() {
+            *self = Self { number: mission.number(), began_ns: at_ns, until_ns: at_ns };
+        }
+        if mission.target().is_some() {
+            self.until_ns = at_ns;
+        }
     }
 
-    #[test]
-    fn a_mission_counts_while_it_is_repeated_and_until_it_is_over() {
-        let mut mission = Mission::default();
-        let now = |mission: &Mission, now_ns: u64| mission.destination(now_ns, AGE_MAX_NS);
-        let there = Ok(Destination { goal_m: [3.0, 4.0], tolerance_m: 1.0 });
-        assert_eq!(now(&mission, 5), Err(NO_MISSION), "nobody has said anything");
-        said(&mut mission, 1000, 0);
-        assert_eq!(now(&mission, 1000 + AGE_MAX_NS), there);
-        assert_eq!(now(&mission, 1001 + AGE_MAX_NS), Err(Decision::Stop(StopReason::StaleMission)));
-        said(&mut mission, 4000, 0);
-        assert_eq!(now(&mission, 4001), there, "it is said again");
-        said(&mut mission, 5000, 3);
-        assert_eq!(now(&mission, 5001), Err(NO_MISSION), "it is over");
-        assert_eq!(now(&mission, 1_000_000), Err(NO_MISSION), "what is over does not get lost");
-        said(&mut mission, 6000, 0);
-        assert_eq!(now(&mission, 6001), there, "the next one");
-    }
-
-    #[test]
-    fn what_is_more_urgent_than_the_mission_stays_the_reason() {
-        let lost = Err(Decision::Stop(StopReason::StaleMission));
-        let there = Ok(Destination { goal_m: [0.0; 2], tolerance_m: 1.0 });
-        let no_map = Decision::Hold(HoldReason::NoMap);
-        assert_eq!(with_reason(no_map, lost), Decision::Stop(StopReason::StaleMission));
-        assert_eq!(with_reason(no_map, there), no_map);
-        let blind = Decision::Stop(StopReason::StaleOdometry);
-        assert_eq!(with_reason(blind, lost), blind);
-        let drive = Decision::Drive(Command { speed_mps: 1.0, steering_rad: 0.0 });
-        assert_eq!(with_reason(drive, there), drive);
+    fn time_s(&self) -> f64 {
+        clock::age_s(self.until_ns, self.began_ns)
     }
 }

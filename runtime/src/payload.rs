@@ -8,12 +8,14 @@ use xxhash_rust::xxh3::xxh3_64;
 
 use crate::channel::{FUTURE_NS, Refusal};
 use crate::message::{
-    CheckpointHeader, CommandRecord, MissionRecord, OdometryRecord, PointRecord, RiskHeader, ScanHeader,
-    Stamp, StuckRecord, SurfaceHeader,
+    CheckpointHeader, CommandRecord, MissionRecord, OdometryRecord, OrderHeader, PointRecord, RiskHeader,
+    ScanHeader, Stamp, StuckRecord, SurfaceHeader,
 };
 
 /// Yaw bins beyond which nobody believes a map.
 const YAWS_MAX: u64 = 1024;
+/// Largest number of [`MissionRecord::state`].
+const MISSION_STATES_MAX: u64 = 4;
 /// Bytes of an element of a risk map.
 const QUAD: usize = size_of::<[f32; 4]>();
 
@@ -231,10 +233,24 @@ pub(crate) fn check_checkpoint(header: &CheckpointHeader, payload: &[u8]) -> Res
     require(errors.clone().all(|value| value.is_finite()), Refusal::NonFinite)
 }
 
+/// Every state and outcome is a reason to stand but one; a number that is none of them is no mission.
 pub(crate) fn check_mission(_: &Stamp, payload: &[MissionRecord]) -> Result<(), Refusal> {
     let mission = check_one(payload)?;
-    let numbers = mission.goal_m.iter().chain([&mission.tolerance_m]);
-    require(numbers.clone().all(|value| value.is_finite()), Refusal::NonFinite)
+    let MissionRecord { goal_m, tolerance_m, path_speed_mps, alpha, .. } = mission;
+    require(mission.n_corners <= mission.corner_x_m.len() as u64, Refusal::Malformed)?;
+    let corners = mission.corner_x_m.iter().chain(&mission.corner_y_m);
+    let numbers = goal_m.iter().chain([tolerance_m, path_speed_mps, alpha]).chain(corners);
+    require(numbers.clone().all(|value| value.is_finite()), Refusal::NonFinite)?;
+    let is_path = *path_speed_mps == 0.0 || (*path_speed_mps > 0.0 && mission.n_corners >= 2);
+    let is_plan = (0.0..=1.0).contains(alpha) && *tolerance_m >= 0.0;
+    require(is_path && is_plan && mission.state <= MISSION_STATES_MAX, Refusal::Malformed)
+}
+
+/// What an order says is judged by whoever takes it, and answered.
+pub(crate) fn check_order(header: &OrderHeader, payload: &[[f64; 2]]) -> Result<(), Refusal> {
+    let numbers = [header.tolerance_m, header.speed_mps, header.alpha];
+    let mut numbers = numbers.iter().chain(payload.as_flattened());
+    require(numbers.all(|value| value.is_finite()), Refusal::NonFinite)
 }
 
 #[cfg(test)]
@@ -335,6 +351,31 @@ mod tests {
         assert_eq!(check_stuck(&stamp, &[lost]), Err(Refusal::NonFinite));
         let nowhere = MissionRecord { goal_m: [0.0, f64::NAN], ..MissionRecord::default() };
         assert_eq!(check_mission(&stamp, &[nowhere]), Err(Refusal::NonFinite));
+    }
+
+    #[test]
+    fn missions_and_orders_that_cannot_be_are_refused() {
+        let (stamp, whole) = (Stamp::default(), MissionRecord::default());
+        assert_eq!(check_mission(&stamp, &[whole]), Ok(()));
+        let path = MissionRecord { path_speed_mps: 1.0, n_corners: 2, ..whole };
+        assert_eq!(check_mission(&stamp, &[path]), Ok(()));
+        for broken in [
+            MissionRecord { state: 5, ..whole },
+            MissionRecord { n_corners: 33, ..path },
+            MissionRecord { n_corners: 1, ..path },
+            MissionRecord { path_speed_mps: -1.0, ..path },
+            MissionRecord { alpha: 1.1, ..whole },
+            MissionRecord { tolerance_m: -0.1, ..whole },
+        ] {
+            assert_eq!(check_mission(&stamp, &[broken]), Err(Refusal::Malformed), "{broken:?}");
+        }
+        let mut lost = path;
+        lost.corner_y_m[31] = f64::NAN;
+        assert_eq!(check_mission(&stamp, &[lost]), Err(Refusal::NonFinite));
+        let order = OrderHeader::default();
+        assert_eq!(check_order(&order, &[[0.0, 1.0]]), Ok(()));
+        assert_eq!(check_order(&order, &[[0.0, f64::INFINITY]]), Err(Refusal::NonFinite));
+        assert_eq!(check_order(&OrderHeader { alpha: f64::NAN, ..order }, &[]), Err(Refusal::NonFinite));
     }
 
     #[test]

@@ -10,6 +10,7 @@ use crate::clock::{self, Cycle, SECOND_NS};
 use crate::message::{
     CommandRecord, MissionRecord, OdometryRecord, PointRecord, ScanHeader, Stamp, StatusRecord,
 };
+use crate::mission::REACHED;
 use crate::status::{Health, Meter, Role};
 use crate::watchdog::Watchdog;
 
@@ -26,14 +27,27 @@ pub struct PlantSetup<'a> {
     pub vehicle: &'a Vehicle,
     /// Sensors and rules; the rates are those of `periods`.
     pub episode: EpisodeConfig,
+    /// Whether it ends where the mission does.
+    pub ending: Ending,
     /// Decides the sensors' noise.
     pub seed: u64,
-    /// How often it measures and says where to go.
+    /// How often it measures.
     pub periods: Periods,
     /// How old what is followed may be.
     pub ages: AgeLimits,
 }
 
+/// When a drive ends that nothing else ends.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Ending {
+    /// At the last goal of a mission.
+    AtGoal,
+    /// Not at all: after a mission there may be another.
+    Never,
+}
+
+/// Speed below which the vehicle stands [m/s].
+const STANDING_MPS: f64 = 0.05;
 /// Scans are of whole cycles to this, so that periods may be rounded numbers.
 const ROUNDING: f64 = 1e-6;
 
@@ -72,7 +86,6 @@ pub fn run(
     while plant.episode.outcome().is_none() && !is_over() {
         plant.cycle()?;
     }
-    plant.tell_mission()?;
     Ok(plant.report())
 }
 
@@ -82,12 +95,15 @@ struct Plant {
     cycle: Cycle,
     watchdog: Watchdog,
     n_stopped_by_watchdog: u64,
-    mission_ns: u64,
-    told_mission_at_ns: Option<u64>,
+    ending: Ending,
+    /// The mission says to drive.
+    is_driving: bool,
+    /// The mission says that its last goal is reached.
+    has_arrived: bool,
     commands: Inlet<Stamp, CommandRecord>,
     odometry: Outlet<Stamp, OdometryRecord>,
     scans: Outlet<ScanHeader, PointRecord>,
-    missions: Outlet<Stamp, MissionRecord>,
+    missions: Inlet<Stamp, MissionRecord>,
     mapping: Inlet<Stamp, StatusRecord>,
     jumps: Jumps,
     meter: Meter,
@@ -95,14 +111,15 @@ struct Plant {
 
 impl Plant {
     fn new(bus: &Bus, setup: PlantSetup<'_>) -> Result<Self, RuntimeError> {
-        let PlantSetup { task, vehicle, mut episode, seed, periods, ages } = setup;
+        let PlantSetup { mut task, vehicle, mut episode, ending, seed, periods, ages } = setup;
+        // Until the mission says which goal is the last one, none is.
+        task.goal_tolerance_m = 0.0;
         episode.control_hz = 1.0 / periods.odometry_s;
         episode.cycles_per_scan = cycles_per_scan(&periods)?;
         let episode = Episode::new(task, vehicle, episode, seed)?;
         let cycle_ns = clock::nanoseconds(episode.cycle_s());
         let (commands, meter) = (bus.inlet(&COMMAND)?, Meter::new(bus, Role::Plant)?);
-        let (odometry, scans, missions) =
-            (bus.outlet(&ODOMETRY, 1)?, bus.outlet(&SCAN, POINTS_MAX)?, bus.outlet(&MISSION, 1)?);
+        let (odometry, scans) = (bus.outlet(&ODOMETRY, 1)?, bus.outlet(&SCAN, POINTS_MAX)?);
         let began_ns = clock::now_ns();
         Ok(Self {
             episode,
@@ -110,12 +127,13 @@ impl Plant {
             cycle: Cycle::new(began_ns, cycle_ns),
             watchdog: Watchdog::new(vehicle.limits, ages),
             n_stopped_by_watchdog: 0,
-            mission_ns: clock::nanoseconds(periods.mission_s),
-            told_mission_at_ns: None,
+            ending,
+            is_driving: false,
+            has_arrived: false,
             commands,
             odometry,
             scans,
-            missions,
+            missions: bus.inlet(&MISSION)?,
             mapping: bus.inlet(&Role::Mapping.status())?,
             jumps: Jumps::default(),
             meter,
@@ -134,15 +152,12 @@ impl Plant {
         });
         let jumps = &mut self.jumps;
         self.mapping.poll(|stamp, told| told.iter().for_each(|status| jumps.note(stamp, status)));
+        self.follow_mission();
         let decision = self.watchdog.carry_out(clock::now_ns());
         if decision == Decision::Stop(bicycle::StopReason::StaleCommand) {
             self.n_stopped_by_watchdog += 1;
         }
         self.episode.apply(&decision)?;
-        if self.told_mission_at_ns.is_none_or(|at_ns| now_ns.saturating_sub(at_ns) >= self.mission_ns) {
-            self.told_mission_at_ns = Some(now_ns);
-            self.tell_mission()?;
-        }
         self.keep_pace();
         let age_s = self.watchdog.age_ns(now_ns).map_or(-1.0, |age_ns| age_ns as f64 * 1e-9);
         let n_missed = self.cycle.n_missed();
@@ -184,16 +199,27 @@ impl Plant {
         Ok(())
     }
 
-    fn tell_mission(&mut self) -> Result<(), RuntimeError> {
-        let task = self.episode.task();
-        let record = MissionRecord {
-            goal_m: task.goal_m,
-            tolerance_m: task.goal_tolerance_m,
-            time_s: self.episode.time_s(),
-            outcome: self.episode.outcome().map_or(0, |outcome| outcome as u64 + 1),
-        };
-        self.missions.send_one(Stamp::default(), record, clock::now_ns())?;
-        Ok(())
+    /// Whoever is meant to stand is not stuck; the last goal is where the drive ends, whatever the vehicle believes.
+    fn follow_mission(&mut self) {
+        let Self { missions, episode, ending, is_driving, has_arrived, .. } = self;
+        missions.poll(|_, records| {
+            for record in records {
+                *is_driving = record.is_driving();
+                *has_arrived = record.outcome == REACHED && *ending == Ending::AtGoal;
+                let MissionRecord { goal_m, tolerance_m, .. } = *record;
+                match (*is_driving, *ending) {
+                    (true, Ending::AtGoal) => episode.set_goal(goal_m, tolerance_m),
+                    (true, Ending::Never) => episode.set_goal(goal_m, 0.0),
+                    (false, _) => {}
+                }
+            }
+        });
+        if !*is_driving {
+            episode.excuse_standing();
+        }
+        if *has_arrived && episode.motion().velocity_mps[0].abs() < STANDING_MPS {
+            episode.interrupt();
+        }
     }
 
     fn report(&self) -> PlantReport {

@@ -22,7 +22,7 @@ fn priority(role: Role) -> Option<u8> {
     match role {
         Role::Control => Some(50),
         Role::Plant => Some(45),
-        Role::Mapping => Some(40),
+        Role::Mapping | Role::Mission => Some(40),
         Role::Learning | Role::Recorder => None,
     }
 }

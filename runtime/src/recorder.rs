@@ -9,13 +9,13 @@ use bytemuck::NoUninit;
 
 use crate::RuntimeError;
 use crate::channel::{
-    Bus, CHECKPOINT, COMMAND, DECISION, Element, Header, Inlet, MISSION, ODOMETRY, RISK, RISK_PHYSICS, SCAN,
-    STUCK, SURFACE,
+    Bus, CHECKPOINT, COMMAND, DECISION, EMERGENCY_STOP, Element, Header, Inlet, MISSION, ODOMETRY, ORDER,
+    RISK, RISK_PHYSICS, SCAN, STUCK, SURFACE,
 };
 use crate::clock::{self, SECOND_NS};
 use crate::message::{
-    CheckpointHeader, CommandRecord, DecisionRecord, MissionRecord, OdometryRecord, PointRecord, RiskHeader,
-    ScanHeader, Stamp, StuckRecord, SurfaceHeader,
+    CheckpointHeader, CommandRecord, DecisionRecord, MissionRecord, OdometryRecord, OrderHeader, PointRecord,
+    RiskHeader, ScanHeader, Stamp, StuckRecord, SurfaceHeader,
 };
 use crate::setup::RecordedSetup;
 use crate::status::{Health, Meter, Role};
@@ -47,6 +47,10 @@ pub mod topic {
     pub const STUCK: &str = "/channel/stuck";
     /// [`crate::channel::MISSION`].
     pub const MISSION: &str = "/channel/mission";
+    /// [`crate::channel::ORDER`].
+    pub const ORDER: &str = "/channel/order";
+    /// [`crate::channel::EMERGENCY_STOP`].
+    pub const EMERGENCY_STOP: &str = "/channel/emergency_stop";
     /// [`crate::channel::CHECKPOINT`].
     pub const CHECKPOINT: &str = "/channel/checkpoint";
     /// What is needed to repeat the run, as JSON.
@@ -114,6 +118,7 @@ struct Inlets {
     risks: [Inlet<RiskHeader, [f32; 4]>; 2],
     stuck: Inlet<Stamp, StuckRecord>,
     missions: Inlet<Stamp, MissionRecord>,
+    orders: [Inlet<OrderHeader, [f64; 2]>; 2],
     commands: Inlet<Stamp, CommandRecord>,
     decisions: Inlet<Stamp, DecisionRecord>,
     checkpoints: Inlet<CheckpointHeader, u8>,
@@ -128,6 +133,7 @@ impl Recorder {
             risks: [bus.inlet(&RISK)?, bus.inlet(&RISK_PHYSICS)?],
             stuck: bus.inlet(&STUCK)?,
             missions: bus.inlet(&MISSION)?,
+            orders: [bus.inlet(&ORDER)?, bus.inlet(&EMERGENCY_STOP)?],
             commands: bus.inlet(&COMMAND)?,
             decisions: bus.inlet(&DECISION)?,
             checkpoints: bus.inlet(&CHECKPOINT)?,
@@ -176,6 +182,11 @@ impl Recorder {
         inlets.missions.poll(|header, records| {
             keep(&mut result, write(file, topic::MISSION, header, records, MissionRecord::layout));
         });
+        for (inlet, name) in inlets.orders.iter_mut().zip([topic::ORDER, topic::EMERGENCY_STOP]) {
+            inlet.poll(|header, points| {
+                keep(&mut result, write(file, name, header, points, OrderHeader::layout));
+            });
+        }
         inlets.commands.poll(|header, records| {
             keep(&mut result, write(file, topic::COMMAND, header, records, CommandRecord::layout));
             keep(&mut result, views.command(file.recorder(), header, records));
@@ -210,7 +221,7 @@ impl Inlets {
             inlet.poll(|_, _| n += 1);
             n
         }
-        let [learned, physics] = &mut self.risks;
+        let ([learned, physics], [orders, emergency_stops]) = (&mut self.risks, &mut self.orders);
         all(&mut self.odometry)
             + all(&mut self.scans)
             + all(&mut self.surfaces)
@@ -218,6 +229,8 @@ impl Inlets {
             + all(physics)
             + all(&mut self.stuck)
             + all(&mut self.missions)
+            + all(orders)
+            + all(emergency_stops)
             + all(&mut self.commands)
             + all(&mut self.decisions)
             + all(&mut self.checkpoints)

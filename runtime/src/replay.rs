@@ -11,13 +11,12 @@ use std::sync::Arc;
 
 use bicycle::lanes::{Instructions, IsaAbsent};
 use evidential::Checkpoint;
-use navigator::{Belief, Chart, NavigatorError, Pilot};
+use navigator::{Belief, NavigatorError, Pilot};
 use traversability::CvarLevel;
 
 use crate::control;
 use crate::message::{CommandRecord, DecisionRecord, Source};
-use crate::mission::{Mission, NOWHERE, with_reason};
-use crate::payload::risk_views;
+use crate::mission::Heard;
 use crate::setup::{MachineSetup, SetupError};
 use choice::Choice;
 use maps::{Maps, Unmade};
@@ -211,7 +210,7 @@ impl Life<'_> {
             Ok(mission) => mission,
             Err(missing) => {
                 self.lose(missing, report);
-                Mission::default()
+                Heard::default()
             }
         };
         if self.is_lost {
@@ -220,15 +219,12 @@ impl Life<'_> {
         }
         let chart = made.and_then(|made| {
             self.pilot.note_scan(made.header.stamp.valid_at_ns);
-            let (map, time_to_goal) = risk_views(&made.header, &made.payload)?;
-            Some(Chart { map, time_to_goal, odometry_at_ns: made.header.odometry_at_ns })
+            control::chart_of(&made.header, &made.payload)
         });
         let scan_at_ns = made.map_or(0, |made| made.header.stamp.valid_at_ns);
-        let said = mission.destination(record.decided_at_ns, self.mission_age_max_ns);
-        let chart = chart.filter(|_| said.is_ok());
+        let instruction = mission.instruction(record.decided_at_ns, self.mission_age_max_ns);
         self.pilot.use_rollouts(record.n_rollouts as usize);
-        let decided = self.pilot.decide(record.decided_at_ns, chart, &said.unwrap_or(NOWHERE));
-        let decision = with_reason(decided, said);
+        let decision = self.pilot.decide(record.decided_at_ns, chart, &instruction);
         // Learning was told by a message of its own, which was recorded.
         self.pilot.take_stuck();
         let odometry_at_ns = self.pilot.odometry().map_or(0, |odometry| odometry.valid_at_ns);

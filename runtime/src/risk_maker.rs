@@ -2,10 +2,10 @@
 
 use navigator::{Assessor, Jump, NavigatorError, StuckPose};
 use terrain::{Cell, CellRegion, GridMap, SurfaceCell};
-use traversability::RiskMapView;
+use traversability::{CvarLevel, RiskMapView};
 
 use crate::channel::Refusal;
-use crate::message::{Grid, RiskHeader, Source, Stamp, StuckRecord, SurfaceHeader};
+use crate::message::{Grid, MissionRecord, RiskHeader, Source, Stamp, StuckRecord, SurfaceHeader};
 use crate::payload::{self, RiskParts};
 
 /// Makes risk maps of the surfaces that it is shown, and judges only what has changed since the last one.
@@ -37,10 +37,24 @@ impl RiskMaker {
         }
     }
 
-    /// Judges the ground by other networks from now on, the next time as a whole. What driving has proved stays.
-    pub fn judge_by(&mut self, mut assessor: Assessor, checkpoint: u64) {
+    /// Judges the ground by other networks from now on, the next time as a whole. What driving has proved stays, and so
+    /// does the share of outcomes.
+    pub fn judge_by(&mut self, mut assessor: Assessor, checkpoint: u64) -> Result<(), NavigatorError> {
         self.assessor.stuck().iter().for_each(|pose| assessor.note_stuck(*pose));
+        assessor.judge_at(self.assessor.level())?;
         (self.assessor, self.checkpoint, self.mirror) = (assessor, checkpoint, None);
+        Ok(())
+    }
+
+    /// Follows what was said of where to go, and for which share of outcomes to plan.
+    pub fn follow(&mut self, mission: &MissionRecord) -> Result<(), NavigatorError> {
+        self.goal_m = mission.destination_m().or(self.goal_m);
+        mission.level().map_or(Ok(()), |level| self.assessor.judge_at(level))
+    }
+
+    /// Judges for this share of the worst outcomes from now on.
+    pub fn judge_at(&mut self, level: CvarLevel) -> Result<(), NavigatorError> {
+        self.assessor.judge_at(level)
     }
 
     /// The networks that it judges by, as [`RiskHeader::checkpoint`].
@@ -123,6 +137,7 @@ impl RiskMaker {
             odometry_at_ns: self.odometry_at_ns,
             stuck: self.stuck,
             goal_m,
+            alpha: self.assessor.level().get(),
             checkpoint: self.checkpoint,
             content_hash: payload::content_hash(payload),
         })

@@ -59,7 +59,7 @@ pub struct RecordedSetup {
 
 impl RecordedSetup {
     /// The version that this program writes and reads. The first one did not say which it is.
-    pub const FORMAT: u32 = 2;
+    pub const FORMAT: u32 = 3;
 
     /// The version that a recorded setup is of; `None` for what is no setup.
     pub fn format_of(json: &[u8]) -> Option<u32> {

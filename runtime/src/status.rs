@@ -20,11 +20,14 @@ pub enum Role {
     Control,
     /// Everything into a file.
     Recorder,
+    /// Orders to what the vehicle is told to do.
+    Mission,
 }
 
 impl Role {
     /// All of them.
-    pub const ALL: [Self; 5] = [Self::Plant, Self::Mapping, Self::Learning, Self::Control, Self::Recorder];
+    pub const ALL: [Self; 6] =
+        [Self::Plant, Self::Mapping, Self::Learning, Self::Control, Self::Recorder, Self::Mission];
 
     /// Name on the command line.
     pub const fn name(self) -> &'static str {
@@ -34,6 +37,7 @@ impl Role {
             Self::Learning => "learning",
             Self::Control => "control",
             Self::Recorder => "recorder",
+            Self::Mission => "mission",
         }
     }
 
@@ -45,6 +49,7 @@ impl Role {
             Self::Learning => "status_learning",
             Self::Control => "status_control",
             Self::Recorder => "status_recorder",
+            Self::Mission => "status_mission",
         })
     }
 }

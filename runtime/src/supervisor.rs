@@ -59,6 +59,15 @@ pub enum RunEnd {
     },
 }
 
+/// Whether a process begins a run or takes the place of one that has died.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Start {
+    /// It begins.
+    First,
+    /// Another was there before it.
+    Again,
+}
+
 /// A process that is kept alive.
 struct Kept {
     role: Role,
@@ -87,7 +96,7 @@ pub struct Supervisor<'a> {
     decisions: Inlet<Stamp, DecisionRecord>,
     timing: Timing,
     policy: RestartPolicy,
-    command: &'a dyn Fn(Role) -> Command,
+    command: &'a dyn Fn(Role, Start) -> Command,
     unended: Vec<String>,
 }
 
@@ -97,7 +106,7 @@ impl<'a> Supervisor<'a> {
         bus: &Bus,
         roles: &[Role],
         policy: RestartPolicy,
-        command: &'a dyn Fn(Role) -> Command,
+        command: &'a dyn Fn(Role, Start) -> Command,
     ) -> Result<Self, RuntimeError> {
         let kept = |&role: &Role| {
             let status = bus.inlet(&role.status())?;
@@ -157,7 +166,7 @@ impl<'a> Supervisor<'a> {
         &self.unended
     }
 
-    /// What the vehicle's process said last.
+    /// What the mission's process said last.
     pub fn mission(&self) -> Option<&MissionRecord> {
         self.mission.as_ref()
     }
@@ -220,13 +229,14 @@ impl Kept {
         &mut self,
         now_ns: u64,
         policy: &RestartPolicy,
-        command: &dyn Fn(Role) -> Command,
+        command: &dyn Fn(Role, Start) -> Command,
     ) -> Option<RunEnd> {
         let Some(child) = &mut self.child else {
             if now_ns < self.due_at_ns {
                 return None;
             }
-            return match command(self.role).spawn() {
+            let start = if self.deaths_at_ns.is_empty() { Start::First } else { Start::Again };
+            return match command(self.role, start).spawn() {
                 Ok(child) => {
                     self.child = Some(child);
                     None
@@ -312,6 +322,7 @@ impl std::fmt::Display for StatusLine {
             Role::Learning => &["surface"],
             Role::Control => &["odometry", "learned map", "physics map", "mission"],
             Role::Recorder => &[],
+            Role::Mission => &["odometry"],
         };
         write!(formatter, "{:9}", self.role.name())?;
         let Some((age_s, status)) = self.status.filter(|_| self.process.is_some()) else {

@@ -131,6 +131,7 @@ mod tests {
             learned_ns: 0,
             learning_silence_ns: 0,
             mission_ns: 0,
+            order_ns: 0,
         };
         Watchdog::new(limits, ages)
     }

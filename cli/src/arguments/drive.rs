@@ -36,9 +36,15 @@ pub struct DriveArguments {
     #[arg(long, value_name = "X,Y,YAW", allow_hyphen_values = true, help_heading = "World")]
     pub start: Option<StartPose>,
 
-    /// Where to go: x [m], y [m]; left out: a feasible place by the seed
+    /// Where to go: x [m], y [m]; repeatable, in this order; left out: a feasible place by the seed
     #[arg(long, value_name = "X,Y", allow_hyphen_values = true, help_heading = "World")]
-    pub goal: Option<Goal>,
+    pub goal: Vec<Goal>,
+
+    /// How near to a goal counts as there [m] [default: 1 on the rock field, 0.3 in the arena, else 0.3 lengths of the
+    /// vehicle]
+    #[arg(long, value_name = "METRES", value_parser = values::tolerance_m, allow_hyphen_values = true,
+          help_heading = "World")]
+    pub tolerance: Option<f64>,
 
     /// The machine that is simulated: a name or a TOML file [default: pietra_full_size; rc_car in the arena]
     ///
@@ -249,6 +255,8 @@ Examples:
       `surefoot gap`, and drive again with --model.
   surefoot drive --world hills.npz --start 12,-3,1.57 --goal 60,20
       Real elevation; negative coordinates are fine.
+  surefoot drive --goal 30,25 --goal 12,14
+      One goal after the other.
 
 Files written to --out:
   drive.png     terrain with hill shading, risk map, vegetation and obstacles,
@@ -339,7 +347,7 @@ mod tests {
     fn negative_coordinates_need_no_quoting() {
         let drive = parse(&["--start", "-1,-2,-0.5", "--goal", "-3,4", "--oracle-map"]);
         assert_eq!(drive.start, Some(StartPose { x_m: -1.0, y_m: -2.0, yaw_rad: -0.5 }));
-        assert_eq!(drive.goal, Some(Goal { x_m: -3.0, y_m: 4.0 }));
+        assert_eq!(drive.goal, [Goal { x_m: -3.0, y_m: 4.0 }]);
         assert_eq!(drive.map_source(), MapSource::Oracle);
     }
 }

@@ -93,6 +93,16 @@ pub struct UpArguments {
     #[arg(long, value_name = "FILE", help_heading = "Learning")]
     pub validation: Option<std::path::PathBuf>,
 
+    /// Begin without a mission, but for those of --goal, and wait for `surefoot goal`; stay when a mission is over
+    ///
+    /// --time-limit counts all the same.
+    #[arg(long, help_heading = "Run")]
+    pub standby: bool,
+
+    /// Set for a process that takes the place of one that has died.
+    #[arg(long, hide = true)]
+    pub again: bool,
+
     /// Set for the processes that `--role all` starts: end when it does
     #[arg(long, hide = true)]
     pub supervised: bool,
@@ -130,6 +140,8 @@ pub enum UpRole {
     Control,
     /// Everything into a recording
     Recorder,
+    /// Orders to what the vehicle is told to do
+    Mission,
     /// The live view that `--live` serves
     Live,
 }
@@ -153,6 +165,7 @@ impl UpRole {
             Self::Learning => Some(Role::Learning),
             Self::Control => Some(Role::Control),
             Self::Recorder => Some(Role::Recorder),
+            Self::Mission => Some(Role::Mission),
         }
     }
 }
@@ -179,8 +192,8 @@ fn quota_mb(word: &str) -> Result<f64, String> {
 }
 
 pub(super) const LONG_ABOUT: &str = "\
-Drives as `surefoot drive` does, with every part a process of its own: the vehicle, mapping, learning, control and \
-the recorder, linked by channels in shared memory.
+Drives as `surefoot drive` does, with every part a process of its own: the vehicle, mapping, learning, control, \
+the recorder and the mission, linked by channels in shared memory.
 
 Control decides at absolute deadlines on what there is and never waits for a map. When learning dies, physics judges \
 the ground; when nothing young enough is left to drive on, the vehicle stops; when control dies, the vehicle's own \
@@ -195,6 +208,8 @@ Examples:
       One of them, in its own terminal, for the run `north`.
   surefoot up --realtime --rate 50
       As regular as the system permits, 50 decisions a second.
+  surefoot up --standby --time-limit 3600
+      Wait for `surefoot goal`, `pause`, `estop` and the others; see `surefoot goal --help`.
 
 `--role all` leaves drive-000.mcap, drive-001.mcap and so on, summary.json (how the drive
 ended, how often the localisation jumped) and runtime.json: how control kept its times (jitter, lateness, misses, age of

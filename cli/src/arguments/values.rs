@@ -1,5 +1,6 @@
 //! Values with a shape of their own: how a word of the command line becomes one, and what to say if it does not.
 
+use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
@@ -69,6 +70,15 @@ impl FromStr for Goal {
     }
 }
 
+/// A word such as -3,4 with a blank before it, so that it is read as a place and not as an option; any other as it is.
+pub fn place_with_minus(word: OsString) -> OsString {
+    let is_place = |word: &str| {
+        let number = |part: &str| part.trim().parse::<f64>().is_ok();
+        word.starts_with('-') && word.contains(',') && word.split(',').next().is_some_and(number)
+    };
+    if word.to_str().is_some_and(is_place) { [" ".into(), word].into_iter().collect() } else { word }
+}
+
 fn numbers<const N: usize>(word: &str, shape: &str) -> Result<[f64; N], String> {
     let refuse = || format!("expected {N} finite numbers {shape}, found {word:?}");
     let parsed: Vec<f64> = word
@@ -87,6 +97,16 @@ pub(super) fn cvar_level(word: &str) -> Result<f64, String> {
 /// A duration [s].
 pub(super) fn duration_s(word: &str) -> Result<f64, String> {
     number_where(word, "a finite number of seconds above 0", |value| value > 0.0 && value.is_finite())
+}
+
+/// A distance that counts as there [m].
+pub(super) fn tolerance_m(word: &str) -> Result<f64, String> {
+    number_where(word, "a distance above 0 and up to 100 metres", |value| value > 0.0 && value <= 100.0)
+}
+
+/// A speed along a path [m/s].
+pub(super) fn speed_mps(word: &str) -> Result<f64, String> {
+    number_where(word, "a speed above 0 and up to 50 m/s", |value| value > 0.0 && value <= 50.0)
 }
 
 /// A height above the ground [m].
@@ -161,6 +181,16 @@ mod tests {
         for bad in ["", "1,2", "1,2,3,4", "1,2,nan", "1,inf,0", "1;2;3", "1,,3"] {
             let message = bad.parse::<StartPose>().unwrap_err();
             assert!(message.contains("X,Y,YAW") && message.contains(bad), "{message}");
+        }
+    }
+
+    #[test]
+    fn a_place_in_the_south_west_is_no_option() {
+        let read = |word: &str| place_with_minus(word.into()).into_string().unwrap();
+        assert_eq!(read("-3,4").parse(), Ok(Goal { x_m: -3.0, y_m: 4.0 }));
+        assert_eq!(["-3,4", "-.5,-1", "-1,2,-0.5"].map(read), [" -3,4", " -.5,-1", " -1,2,-0.5"]);
+        for other in ["--run", "-h", "-3", "3,-4", "-x,4", ""] {
+            assert_eq!(read(other), other);
         }
     }
 

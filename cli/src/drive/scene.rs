@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use bicycle::lanes::{Instructions, Isa};
 use bicycle::{Model, Vehicle};
 use formats::{ConfigText, ElevationFile, overlay, read_elevation, read_model, read_vehicle};
-use navigator::{Config, GuardConfig};
+use navigator::{Config, GuardConfig, Route};
 use scenarios::{
     ArenaConfig, ArenaError, Pair, PairWish, ROCK_FIELD_DISTANCE_M, RockFieldConfig, Task, WorldLayers,
     check_pair,
@@ -78,6 +78,11 @@ fn isa(arguments: &DriveArguments, configured: Isa) -> Result<Isa, UsageError> {
 
 /// Where to drive, from where, where to.
 pub(crate) fn task(arguments: &DriveArguments, vehicle: &Vehicle) -> Result<Task, UsageError> {
+    let task = task_of_world(arguments, vehicle)?;
+    Ok(Task { goal_tolerance_m: arguments.tolerance.unwrap_or(task.goal_tolerance_m), ..task })
+}
+
+fn task_of_world(arguments: &DriveArguments, vehicle: &Vehicle) -> Result<Task, UsageError> {
     let standard = match &arguments.world {
         WorldSource::Rocks => {
             Task::rock_field(&RockFieldConfig::default(), arguments.seed).map_err(UsageError::from_input)?
@@ -85,15 +90,33 @@ pub(crate) fn task(arguments: &DriveArguments, vehicle: &Vehicle) -> Result<Task
         WorldSource::Arena => arena(arguments)?,
         WorldSource::File(path) => return in_file(arguments, vehicle, path),
     };
-    if arguments.start.is_none() && arguments.goal.is_none() {
+    if arguments.start.is_none() && arguments.goal.is_empty() {
         return Ok(standard);
     }
-    let pair = Pair {
-        start: arguments.start.map_or(standard.start, |start| [start.x_m, start.y_m, start.yaw_rad]),
-        goal_m: arguments.goal.map_or(standard.goal_m, |goal| [goal.x_m, goal.y_m]),
-    };
-    check_pair(&standard.world, vehicle, &pair).map_err(UsageError::from_input)?;
-    Ok(Task { start: pair.start, goal_m: pair.goal_m, ..standard })
+    let start = arguments.start.map_or(standard.start, |start| [start.x_m, start.y_m, start.yaw_rad]);
+    let task = Task { start, goal_m: last_goal_m(arguments).unwrap_or(standard.goal_m), ..standard };
+    check_goals(arguments, vehicle, &task)?;
+    Ok(task)
+}
+
+fn last_goal_m(arguments: &DriveArguments) -> Option<[f64; 2]> {
+    arguments.goal.last().map(|goal| [goal.x_m, goal.y_m])
+}
+
+/// Refuses a start or a goal at which the vehicle cannot stand.
+fn check_goals(arguments: &DriveArguments, vehicle: &Vehicle, task: &Task) -> Result<(), UsageError> {
+    let before = arguments.goal.iter().rev().skip(1).map(|goal| [goal.x_m, goal.y_m]);
+    std::iter::once(task.goal_m).chain(before).try_for_each(|goal_m| {
+        let pair = Pair { start: task.start, goal_m };
+        check_pair(&task.world, vehicle, &pair).map_err(UsageError::from_input)
+    })
+}
+
+/// Where to go: the goals as asked, one after the other, else that of the task.
+pub(crate) fn route(arguments: &DriveArguments, task: &Task) -> Result<Route, UsageError> {
+    let asked: Vec<[f64; 2]> = arguments.goal.iter().map(|goal| [goal.x_m, goal.y_m]).collect();
+    let goals_m = if asked.is_empty() { vec![task.goal_m] } else { asked };
+    Route::goals(goals_m, task.goal_tolerance_m).map_err(UsageError::from_input)
 }
 
 fn arena(arguments: &DriveArguments) -> Result<Task, UsageError> {
@@ -107,11 +130,16 @@ fn in_file(arguments: &DriveArguments, vehicle: &Vehicle, path: &Path) -> Result
     let shortest_m = (0..2).map(|k| bounds.north_east_m[k] - bounds.south_west_m[k]).fold(f64::MAX, f64::min);
     let wish = PairWish {
         start: arguments.start.map(|start| [start.x_m, start.y_m, start.yaw_rad]),
-        goal_m: arguments.goal.map(|goal| [goal.x_m, goal.y_m]),
+        goal_m: last_goal_m(arguments),
         distance_m: ROCK_FIELD_DISTANCE_M.min(0.5 * shortest_m),
     };
     let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
-    Task::in_layers(&name, &layers, vehicle, &wish, arguments.seed).map_err(UsageError::from_input)
+    let task =
+        Task::in_layers(&name, &layers, vehicle, &wish, arguments.seed).map_err(UsageError::from_input)?;
+    if arguments.goal.len() > 1 {
+        check_goals(arguments, vehicle, &task)?;
+    }
+    Ok(task)
 }
 
 /// The file's layers as a world takes them.

@@ -1,22 +1,24 @@
 //! One process of the machine.
 
 use bench::closed_loop::Method;
-use navigator::Belief;
+use navigator::{Belief, Route};
 use runtime::ages::AgeLimits;
 use runtime::channel::{Bus, ChannelError};
 use runtime::control::{self, ControlSetup};
 use runtime::learning::{self, LearningSetup};
 use runtime::mapping::{self, MappingSetup};
+use runtime::mission::{self, Beginning, MissionSetup};
 use runtime::online::Told;
-use runtime::plant::{self, PlantReport, PlantSetup};
+use runtime::plant::{self, Ending, PlantReport, PlantSetup};
 use runtime::realtime;
 use runtime::recorder::{self, RecorderSetup};
 use runtime::setup::{ClockAnchor, MachineSetup, RecordedSetup};
 use runtime::status::Role;
 use rustix::process::{Signal, set_parent_process_death_signal};
-use scenarios::{EpisodeConfig, Outcome};
+use scenarios::{EpisodeConfig, Outcome, Task};
 use serde::Serialize;
 use sha2::{Digest, Sha256};
+use std::ffi::OsString;
 use std::sync::Arc;
 use traversability::CvarLevel;
 
@@ -31,13 +33,46 @@ use crate::{UsageError, WorkFailed, interrupt};
 const STANDING_MAX_S: f64 = 30.0;
 
 /// Reads everything that the processes will, so that bad input is refused before they start.
-pub(super) fn prepare(arguments: &UpArguments) -> Result<(), UsageError> {
+/// Returns the drive.
+pub(super) fn prepare(arguments: &UpArguments) -> Result<Task, UsageError> {
     let machine = machine(arguments)?;
-    scene::task(&arguments.drive, &machine.vehicle)?;
+    let task = scene::task(&arguments.drive, &machine.vehicle)?;
     learn::school(arguments, &machine)?;
     ages(arguments, &machine)?;
     plant::cycles_per_scan(&arguments.periods()).map_err(UsageError::from_input)?;
-    Ok(())
+    Ok(task)
+}
+
+/// The words by which the mission's process knows route and tolerance, without building a world to find them in.
+pub(super) fn words_of_route(arguments: &UpArguments, task: &Task) -> Vec<OsString> {
+    let [x_m, y_m] = task.goal_m;
+    let is_known = arguments.standby || !arguments.drive.goal.is_empty();
+    let goal = [format!("--goal={x_m},{y_m}")].into_iter().filter(|_| !is_known);
+    let tolerance = [format!("--tolerance={}", task.goal_tolerance_m)];
+    let tolerance = tolerance.into_iter().filter(|_| arguments.drive.tolerance.is_none());
+    goal.chain(tolerance).map(OsString::from).collect()
+}
+
+fn run_mission(arguments: &UpArguments, machine: &Machine, ages: AgeLimits) -> anyhow::Result<()> {
+    let drive = &arguments.drive;
+    let goals_m = drive.goal.iter().map(|goal| [goal.x_m, goal.y_m]).collect::<Vec<_>>();
+    let (goals_m, tolerance_m) = match (drive.tolerance, goals_m.is_empty() && !arguments.standby) {
+        (Some(tolerance_m), false) => (goals_m, tolerance_m),
+        (_, is_open) => {
+            let task = scene::task(drive, &machine.vehicle)?;
+            (if is_open { vec![task.goal_m] } else { goals_m }, task.goal_tolerance_m)
+        }
+    };
+    let beginning = match (arguments.again, goals_m.is_empty()) {
+        (true, _) => Beginning::Latched,
+        (false, true) => Beginning::Idle,
+        (false, false) => {
+            Beginning::Driving(Route::goals(goals_m, tolerance_m).map_err(UsageError::from_input)?)
+        }
+    };
+    let setup =
+        MissionSetup { beginning, tolerance_m, model: &machine.model, periods: arguments.periods(), ages };
+    Ok(mission::run(&join(arguments)?, setup, &interrupt::interrupted)?)
 }
 
 /// Joins the processes of the run.
@@ -106,6 +141,7 @@ pub(super) fn run(arguments: &UpArguments, role: Role) -> anyhow::Result<()> {
             let setup = ControlSetup { model, config, seed, period_s, ages };
             control::run(&join(arguments)?, setup, is_over)?;
         }
+        Role::Mission => run_mission(arguments, &machine, ages)?,
         Role::Recorder => {
             let setup = recorder_setup(arguments, machine, ages)?;
             std::fs::create_dir_all(&setup.folder)?;
@@ -207,6 +243,7 @@ fn run_plant(arguments: &UpArguments, machine: &Machine, ages: AgeLimits) -> any
         task,
         vehicle: &machine.vehicle,
         episode,
+        ending: if arguments.standby { Ending::Never } else { Ending::AtGoal },
         seed: arguments.drive.seed,
         periods: arguments.periods(),
         ages,

@@ -89,11 +89,33 @@ impl Drive {
 
     fn decide_on_chart_of(&mut self, odometry_at_ns: u64) -> Decision {
         let (map, time_to_goal) = (self.map.view(), self.field.view());
-        let chart = Chart { map, time_to_goal, odometry_at_ns };
+        let chart = Chart { map, time_to_goal, goal_m: self.goal_m, odometry_at_ns };
         let destination = Destination { goal_m: self.goal_m, tolerance_m: 0.5 };
-        let decision = self.pilot.decide(self.cycle * CYCLE_NS, Some(chart), &destination);
+        let instruction = Instruction::Drive(Target::Goal(destination));
+        let decision = self.pilot.decide(self.cycle * CYCLE_NS, Some(chart), &instruction);
         self.cycle += 1;
         decision
+    }
+
+    /// A vehicle without slip or lag drives where it is told to, for so many cycles.
+    fn follow(&mut self, instruction: &Instruction<'_>, n_cycles: usize) {
+        for _ in 0..n_cycles {
+            self.measure();
+            let chart = Chart {
+                map: self.map.view(),
+                time_to_goal: self.field.view(),
+                goal_m: self.goal_m,
+                odometry_at_ns: u64::MAX,
+            };
+            let decided = self.pilot.decide(self.cycle * CYCLE_NS, Some(chart), instruction);
+            let command = decided.command(Command::default());
+            let (speed_mps, steering_rad) = (f64::from(command.speed_mps), f64::from(command.steering_rad));
+            self.state.x_m += CYCLE_S * speed_mps * self.state.yaw_rad.cos();
+            self.state.y_m += CYCLE_S * speed_mps * self.state.yaw_rad.sin();
+            self.state.yaw_rad += CYCLE_S * speed_mps * steering_rad.tan() / 2.0;
+            (self.state.speed_mps, self.state.steering_rad) = (speed_mps, steering_rad);
+            self.cycle += 1;
+        }
     }
 
     /// Where the controller's plan of the last decision starts.
@@ -191,4 +213,41 @@ fn backing_up_goes_on_after_a_jump_of_the_localisation() {
     assert!(decide(&mut drive, 0), "on the map of before it stands where it stood");
     let new_ns = drive.cycle * CYCLE_NS;
     assert!((0..5).all(|_| decide(&mut drive, new_ns)), "on the map of after it does, too");
+}
+
+/// The straight line to the goal lies 6 m north of the path, and the time to the goal leads there.
+#[test]
+fn a_path_is_followed_and_not_the_time_to_a_goal() {
+    let mut drive = Drive::new();
+    drive.state.y_m = -6.0;
+    drive.goal_m = [15.0, 6.0];
+    let points_m = [[-16.0, -6.0], [16.0, -6.0]];
+    let path = ReferencePath { points_m: &points_m, speed_mps: 1.0, tolerance_m: 0.5 };
+    drive.follow(&Instruction::Drive(Target::Path(path)), 100);
+    assert!((drive.state.y_m + 6.0).abs() < 0.3, "{:?}", drive.state);
+    // It came with twice the path's speed, and has none of its own.
+    assert!((drive.state.speed_mps - 1.0).abs() < 0.2, "{:?}", drive.state);
+    assert!(drive.state.x_m > -5.5, "{:?}", drive.state);
+}
+
+/// The field leads to a goal in the east; the vehicle is told to go to another, behind it to the north-west.
+#[test]
+fn a_field_that_leads_to_another_goal_is_not_followed() {
+    let target = Destination { goal_m: [0.0, 14.0], tolerance_m: 0.5 };
+    let mut drive = Drive::new();
+    (drive.state.x_m, drive.state.speed_mps) = (0.0, 0.0);
+    drive.follow(&Instruction::Drive(Target::Goal(target)), 80);
+    let left_m = (drive.state.x_m - 0.0).hypot(drive.state.y_m - 14.0);
+    assert!(left_m < 8.0, "{:?}", drive.state);
+}
+
+#[test]
+fn what_is_wrong_with_the_measurements_is_said_first_and_a_map_that_is_missing_last() {
+    let mut drive = Drive::new();
+    let lost = Instruction::Stand(Decision::Stop(StopReason::StaleMission));
+    let there = Instruction::Drive(Target::Goal(Destination { goal_m: drive.goal_m, tolerance_m: 1.0 }));
+    assert_eq!(drive.pilot.decide(0, None, &lost), Decision::Stop(StopReason::StaleOdometry));
+    drive.measure();
+    assert_eq!(drive.pilot.decide(1, None, &lost), Decision::Stop(StopReason::StaleMission));
+    assert_eq!(drive.pilot.decide(2, None, &there), Decision::Hold(HoldReason::NoMap));
 }

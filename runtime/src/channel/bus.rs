@@ -6,12 +6,14 @@ use std::os::unix::fs::MetadataExt;
 use std::str::FromStr;
 
 use iceoryx2::config::Config;
-use iceoryx2::node::{Node, NodeBuilder};
+use iceoryx2::node::{Node, NodeBuilder, NodeState};
 use iceoryx2::port::publisher::PublisherCreateError;
 use iceoryx2::port::subscriber::SubscriberCreateError;
 use iceoryx2::prelude::{
-    FileName, LogLevel, Path, PortFactory as _, SemanticString, SignalHandlingMode, ipc, set_log_level,
+    CallbackProgression, FileName, LogLevel, Path, PortFactory as _, SemanticString, SignalHandlingMode, ipc,
+    set_log_level,
 };
+use iceoryx2::service::builder::publish_subscribe::PublishSubscribeOpenError;
 use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
 
 use super::failures::Failures;
@@ -67,6 +69,33 @@ impl RunName {
         "surefoot_"
     }
 
+    /// The runs of this user that have a process which is alive, in the order of their names.
+    ///
+    /// # Errors
+    /// The user's folder is not his alone.
+    pub fn alive() -> Result<Vec<Self>, ChannelError> {
+        set_log_level(LogLevel::Fatal);
+        folder::claim(std::path::Path::new(&folder::root()), folder::user())?;
+        let folders = std::fs::read_dir(folder::root()).into_iter().flatten().flatten();
+        let names = folders.filter_map(|folder| folder.file_name().to_str()?.parse::<Self>().ok());
+        let mut alive: Vec<Self> = names.filter(Self::is_alive).collect();
+        alive.sort_by(|one, other| one.0.cmp(&other.0));
+        Ok(alive)
+    }
+
+    /// Whether it has a process that is alive.
+    fn is_alive(&self) -> bool {
+        let Ok(config) = config(self) else { return false };
+        let mut is_alive = false;
+        // Who cannot be listed cannot be talked to.
+        Node::<ipc::Service>::list(&config, |state| {
+            is_alive |= matches!(state, NodeState::Alive(_));
+            if is_alive { CallbackProgression::Stop } else { CallbackProgression::Continue }
+        })
+        .ok();
+        is_alive
+    }
+
     /// Folder of the files by which its processes find one another, in the one that its user has alone.
     pub fn folder(&self) -> String {
         format!("{}/{}", folder::root(), self.0)
@@ -76,7 +105,16 @@ impl RunName {
 /// The process's way to its channels.
 pub struct Bus {
     node: Node<ipc::Service>,
-    n_third_parties: usize,
+    manner: Manner,
+}
+
+/// What a process is among the others of a run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Manner {
+    /// It makes the channels that are not there yet, with room for so many readers beside the run's own.
+    Member { n_third_parties: usize },
+    /// It takes the channels as they are: whoever opens one first decides what it is like.
+    Visitor,
 }
 
 /// Of how many dead processes what they left behind was cleared away, and of how many it could not be.
@@ -103,6 +141,18 @@ impl Bus {
     /// decides, so all processes of a run are given the same number. A publisher reserves memory for every place: one
     /// more costs each channel of maps 2 x depth + 1 maps.
     pub fn join_with_room(run: &RunName, n_third_parties: usize) -> Result<Self, ChannelError> {
+        Self::begin(run, Manner::Member { n_third_parties })
+    }
+
+    /// Joins a run that is there, for a moment: makes no channel.
+    ///
+    /// # Errors
+    /// Those of [`Bus::join`].
+    pub fn visit(run: &RunName) -> Result<Self, ChannelError> {
+        Self::begin(run, Manner::Visitor)
+    }
+
+    fn begin(run: &RunName, manner: Manner) -> Result<Self, ChannelError> {
         // Failures come back as values; what else it says is for its own developers.
         set_log_level(LogLevel::Fatal);
         let refused = |problem: String| ChannelError::Join { run: run.to_string(), problem };
@@ -110,7 +160,7 @@ impl Bus {
         let config = config(run).map_err(refused)?;
         let builder = NodeBuilder::new().config(&config).signal_handling_mode(SignalHandlingMode::Disabled);
         let node = builder.create::<ipc::Service>().map_err(|error| refused(error.to_string()))?;
-        Ok(Self { node, n_third_parties })
+        Ok(Self { node, manner })
     }
 
     /// The way into a channel, for messages of up to `n_max` elements. There is one at a time, whatever process has it;
@@ -125,7 +175,8 @@ impl Bus {
     ) -> Result<Outlet<H, T>, ChannelError> {
         let service = self.service(channel)?;
         self.await_place(channel.name, &service)?;
-        let n_samples = service.static_config().max_subscribers() * (2 * channel.depth + 1) + 2;
+        let n_samples =
+            service.static_config().max_subscribers() * (2 * channel.depth + 1) + channel.history + 2;
         check_memory((n_samples * n_max * size_of::<T>()) as f64)?;
         let failures = Failures::default();
         let publisher = service
@@ -188,19 +239,26 @@ impl Bus {
     fn service<H: Header, T: Element>(&self, channel: &Channel<H, T>) -> Result<Service<H, T>, ChannelError> {
         let name = channel.name.try_into().map_err(|error| open_error(channel.name, error))?;
         // A reader may hold as many as can wait and one that it goes on using: so a look ends, whatever comes meanwhile.
-        let service = self
+        let builder = self
             .node
             .service_builder(&name)
             .publish_subscribe::<[T]>()
             .user_header::<H>()
             .max_publishers(1)
-            .max_subscribers(channel.n_readers + self.n_third_parties)
             .subscriber_max_buffer_size(channel.depth)
             .subscriber_max_borrowed_samples(channel.depth + 1)
-            .history_size(0)
-            .enable_safe_overflow(true)
-            .open_or_create()
-            .map_err(|error| open_error(channel.name, error))?;
+            .history_size(channel.history)
+            .enable_safe_overflow(true);
+        let service = match self.manner {
+            Manner::Member { n_third_parties } => builder
+                .max_subscribers(channel.n_readers + n_third_parties)
+                .open_or_create()
+                .map_err(|error| open_error(channel.name, error))?,
+            Manner::Visitor => builder.open().map_err(|error| match error {
+                PublishSubscribeOpenError::DoesNotExist => ChannelError::Absent { channel: channel.name },
+                error => open_error(channel.name, error),
+            })?,
+        };
         // Whoever made it may have meant it for several: then its readers need not agree on whom they hear.
         match service.static_config().max_publishers() {
             1 => Ok(service),

@@ -1,6 +1,7 @@
 //! The way into a channel: messages are written where the readers will read them.
 
 use iceoryx2::port::publisher::Publisher;
+use iceoryx2::port::update_connections::UpdateConnections;
 use iceoryx2::prelude::ipc;
 use iceoryx2::sample_mut::SampleMut;
 
@@ -84,6 +85,12 @@ impl<H: Header, T: Element> Outlet<H, T> {
         *loan.0.user_header_mut().stamp_mut() = stamp;
         loan.0.send().map_err(|error| self.failed(error))?;
         Ok(stamp)
+    }
+
+    /// Gives readers that have come since the last message what the channel keeps for them, without a new one.
+    pub fn welcome(&self) {
+        // Whoever cannot be reached is counted by the handler of failures.
+        self.publisher.update_connections().ok();
     }
 
     /// Writes and sends a message of one record.

@@ -7,7 +7,7 @@ use terrain::{GridGeometry, LATTICE_MAX, RangePoint, Scan, TerrainClass};
 use super::{CommandRecord, Grid, OdometryRecord, PointRecord, ScanHeader, Source, Stamp, SurfaceHeader};
 
 /// Reasons to stop; the first has the number 1.
-pub const STOP_REASONS: [StopReason; 11] = [
+pub const STOP_REASONS: [StopReason; 12] = [
     StopReason::StaleOdometry,
     StopReason::StaleScan,
     StopReason::NonFiniteInput,
@@ -19,9 +19,11 @@ pub const STOP_REASONS: [StopReason; 11] = [
     StopReason::InputOutOfRange,
     StopReason::InputOutOfOrder,
     StopReason::InputFromFuture,
+    StopReason::EmergencyStop,
 ];
 /// Reasons to hold; the first has the number 1.
-pub const HOLD_REASONS: [HoldReason; 3] = [HoldReason::NoMap, HoldReason::AtGoal, HoldReason::NoMission];
+pub const HOLD_REASONS: [HoldReason; 5] =
+    [HoldReason::NoMap, HoldReason::AtGoal, HoldReason::NoMission, HoldReason::Paused, HoldReason::Manual];
 
 /// Numbers of [`CommandRecord::decision`].
 const DRIVE: u32 = 1;
@@ -252,7 +254,7 @@ mod tests {
 
     #[test]
     fn numbers_that_are_no_decision_are_none() {
-        for (decision, reason) in [(0, 0), (4, 1), (2, 0), (2, 4), (3, 0), (3, 12), (u32::MAX, u32::MAX)] {
+        for (decision, reason) in [(0, 0), (4, 1), (2, 0), (2, 6), (3, 0), (3, 13), (u32::MAX, u32::MAX)] {
             let record = CommandRecord { decision, reason, ..CommandRecord::default() };
             assert_eq!(record.decision(), None, "{decision} {reason}");
         }

@@ -207,7 +207,7 @@ impl Author<'_> {
             };
             let assessor = Assessor::new(vehicle, &model.limits, config, &belief, self.level)?;
             match &mut self.maker {
-                Some((_, maker)) if !is_new => maker.judge_by(assessor, header.checkpoint),
+                Some((_, maker)) if !is_new => maker.judge_by(assessor, header.checkpoint)?,
                 _ => {
                     let maker = RiskMaker::new(assessor, self.number, header.checkpoint);
                     self.maker = Some((key.epoch_ns, maker));
@@ -216,6 +216,8 @@ impl Author<'_> {
         }
         let Some((_, maker)) = &mut self.maker else { return Ok(Err(Unmade { what: String::new() })) };
         maker.set_goal(header.goal_m);
+        // As it was judged for; a number that is no share makes another map than was recorded.
+        CvarLevel::new(header.alpha).map_or(Ok(()), |level| maker.judge_at(level))?;
         let until = Key::from(header.stuck);
         for (at, (stamp, stuck)) in records.stuck.range(..=until) {
             if self.stuck_at.is_none_or(|done| *at > done) && at.sequence > 0 {

@@ -13,7 +13,7 @@ use crate::message::{
     CheckpointHeader, DecisionRecord, LAYOUT_VERSION, MissionRecord, OdometryRecord, PointRecord, RiskHeader,
     ScanHeader, Source, Stamp, StuckRecord, SurfaceHeader,
 };
-use crate::mission::Mission;
+use crate::mission::Heard;
 use crate::online::hash_of;
 use crate::recorder::topic;
 use crate::setup::RecordedSetup;
@@ -138,8 +138,8 @@ impl Records {
     }
 
     /// What a decision knew of where to go; says which message is missing.
-    pub fn mission(&self, source: Source) -> Result<Mission, String> {
-        let mut mission = Mission::default();
+    pub fn mission(&self, source: Source) -> Result<Heard, String> {
+        let mut mission = Heard::default();
         if source != Source::default() {
             let (stamp, record) =
                 self.missions.get(&source.into()).ok_or_else(|| format!("mission {}", source.sequence))?;

@@ -214,6 +214,16 @@ impl Episode {
         self.referee.interrupt();
     }
 
+    /// From now on the goal is here [m]; `tolerance_m` counts as there, 0 for a place to be passed through.
+    pub fn set_goal(&mut self, goal_m: [f64; 2], tolerance_m: f64) {
+        (self.task.goal_m, self.task.goal_tolerance_m) = (goal_m, tolerance_m);
+    }
+
+    /// The vehicle is meant to stand just now: it is not stuck, and has not stopped for good.
+    pub fn excuse_standing(&mut self) {
+        self.referee.excuse_standing();
+    }
+
     /// How the episode ended, if it has.
     pub fn outcome(&self) -> Option<Outcome> {
         self.referee.outcome()

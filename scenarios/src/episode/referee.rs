@@ -160,6 +160,11 @@ impl Referee {
         self.outcome.get_or_insert(Outcome::Stopped);
     }
 
+    pub(super) fn excuse_standing(&mut self) {
+        self.places.clear();
+        self.stopping_s = 0.0;
+    }
+
     pub(super) fn saw_rolling_over(&mut self) {
         self.outcome = Some(Outcome::RolledOver);
     }

@@ -5,6 +5,7 @@
 mod course;
 mod faults;
 mod goals;
+mod missions;
 mod repeats;
 mod sensors;
 mod skid_steer;

@@ -3,7 +3,10 @@
 use std::sync::LazyLock;
 
 use bicycle::{Command, Decision, Model, Odometry};
-use navigator::{Assessor, Belief, Chart, Config, Destination, NavigatorError, Pilot, Surface, Surveyor};
+use navigator::{
+    Assessor, Belief, Chart, Config, Destination, Instruction, NavigatorError, Pilot, Surface, Surveyor,
+    Target,
+};
 use runtime::mapping::{FUSED, PHYSICS};
 use runtime::message::{
     CommandRecord, DecisionRecord, Grid, LAYOUT_VERSION, OdometryRecord, PointRecord, RiskHeader, ScanHeader,
@@ -58,6 +61,11 @@ pub fn goal() -> Destination {
     Destination { goal_m: [2.0, 1.0], tolerance_m: 0.3 }
 }
 
+/// To drive there.
+pub fn to_goal() -> Instruction<'static> {
+    Instruction::Drive(Target::Goal(goal()))
+}
+
 /// A controller that has seen nothing.
 pub fn pilot() -> Pilot {
     Pilot::new(MACHINE.model.clone(), &MACHINE.config, SEED).unwrap()
@@ -110,8 +118,9 @@ impl Drive {
 
     /// What the controller drives on.
     pub fn chart(&self) -> Chart<'_> {
-        let (map, time_to_goal) = risk_views(&self.risk.0, &self.risk.1).unwrap();
-        Chart { map, time_to_goal, odometry_at_ns: self.risk.0.odometry_at_ns }
+        let header = &self.risk.0;
+        let (map, time_to_goal) = risk_views(header, &self.risk.1).unwrap();
+        Chart { map, time_to_goal, goal_m: header.goal_m, odometry_at_ns: header.odometry_at_ns }
     }
 
     /// A risk map as its maker writes it into a message.
@@ -146,7 +155,7 @@ impl Drive {
                 pilot.note_scan(header.stamp.valid_at_ns);
             }
             pilot.use_rollouts(64);
-            let decision = pilot.decide(at_ns(cycle), has_map.then(|| self.chart()), &goal());
+            let decision = pilot.decide(at_ns(cycle), has_map.then(|| self.chart()), &to_goal());
             let used = Some(header).filter(|_| has_map);
             let record = DecisionRecord {
                 command: CommandRecord {

@@ -80,6 +80,7 @@ targets! {
     command: 8192, 0, 64 * KB, messages::command, messages::read_command;
     decision: 8192, 0, 64 * KB, messages::decision, messages::read_decision;
     mission: 512, 0, 4 * MB, messages::mission, messages::read_mission;
+    order: 4096, 64, 64 * KB, messages::order, messages::read_order;
     stuck: 512, 0, 4 * MB, messages::stuck, messages::read_stuck;
     status: 8192, 0, 64 * KB, messages::status, messages::read_status;
     learned: 4096, 64, 64 * KB, messages::learned, messages::read_learned;

@@ -7,15 +7,16 @@ use bytemuck::{AnyBitPattern, NoUninit};
 use evidential::Checkpoint;
 use formats::DriveTopics;
 use foxglove::Context;
-use navigator::{Chart, Guard, GuardConfig, Surface, Surveyor};
+use navigator::{Chart, Guard, GuardConfig, Instruction, Mission, Order, Route, Said, Surface, Surveyor};
 use rand::RngExt;
 use runtime::ages::{AgeLimits, Periods};
 use runtime::channel::{self, Channel, Element, Header};
 use runtime::layout::Scalar;
 use runtime::message::{
-    CheckpointHeader, CommandRecord, DecisionRecord, Grid, MissionRecord, OdometryRecord, RiskHeader,
-    ScanHeader, StatusRecord, StuckRecord, SurfaceHeader, layouts,
+    CheckpointHeader, CommandRecord, DecisionRecord, Grid, MissionRecord, OdometryRecord, OrderHeader,
+    RiskHeader, ScanHeader, StatusRecord, StuckRecord, SurfaceHeader, layouts,
 };
+use runtime::mission::Heard;
 use runtime::payload::{RiskParts, risk_views, surface_map};
 use runtime::status::Role;
 use runtime::timing::Timing;
@@ -23,7 +24,7 @@ use runtime::watchdog::Watchdog;
 use terrain::Pose;
 
 use crate::harness::{Fate, Reader, Rng};
-use crate::machine::{Drive, MACHINE, at_ns, goal, judge, pilot, stamped};
+use crate::machine::{Drive, MACHINE, at_ns, goal, judge, pilot, stamped, to_goal};
 use crate::mutate::{self, once_in};
 use crate::networks;
 
@@ -150,7 +151,7 @@ pub fn read_odometry() -> Reader {
         }
         guard.check(at_ns(2)).ok();
         let chart = drive.chart();
-        pilot.decide(at_ns(3), Some(Chart { odometry_at_ns: at_ns(1), ..chart }), &goal());
+        pilot.decide(at_ns(3), Some(Chart { odometry_at_ns: at_ns(1), ..chart }), &to_goal());
         let [x_m, y_m, z_m] = odometry.position_m;
         let [roll_rad, pitch_rad, yaw_rad] = odometry.attitude_rad;
         topics.pose(stamp.valid_at_ns, &Pose { x_m, y_m, z_m, roll_rad, pitch_rad, yaw_rad });
@@ -247,7 +248,8 @@ pub fn read_risk() -> Reader {
         for k in 0..3 {
             pilot.admit(&Drive::odometry(k));
             pilot.note_scan(header.stamp.valid_at_ns);
-            let chart = Chart { map, time_to_goal, odometry_at_ns: header.odometry_at_ns };
+            let chart =
+                Chart { map, time_to_goal, goal_m: header.goal_m, odometry_at_ns: header.odometry_at_ns };
             pilot.decide(at_ns(k), Some(chart), &goal());
         }
     })
@@ -310,7 +312,14 @@ pub fn read_decision() -> Reader {
 }
 
 static MISSION: LazyLock<Whole> = LazyLock::new(|| {
-    let mission = MissionRecord { goal_m: goal().goal_m, tolerance_m: 0.5, time_s: 1.0, outcome: 0 };
+    let mission = MissionRecord {
+        goal_m: goal().goal_m,
+        tolerance_m: 0.5,
+        time_s: 1.0,
+        path_speed_mps: 0.5,
+        n_corners: 2,
+        ..MissionRecord::default()
+    };
     Whole::one(mission, "MissionRecord")
 });
 
@@ -320,22 +329,52 @@ pub fn mission(rng: &mut Rng) -> Vec<u8> {
 
 pub fn read_mission() -> Reader {
     let drive = Drive::get();
-    reader(channel::MISSION, move |_, records: &[MissionRecord]| {
-        let MissionRecord { goal_m, tolerance_m, .. } = records[0];
+    reader(channel::MISSION, move |stamp, records: &[MissionRecord]| {
         let mut maker = judge();
-        maker.set_goal(goal_m);
+        maker.set_goal(goal().goal_m);
+        maker.follow(&records[0]).unwrap();
         let (header, cells) = drive.surface();
         maker.update(header, cells).unwrap().unwrap();
         let (header, elements) = Drive::risk_of(&mut maker).unwrap();
         let Some((map, time_to_goal)) = risk_views(&header, &elements) else { return };
-        let mut pilot = pilot();
+        let (mut pilot, mut heard) = (pilot(), Heard::default());
         pilot.admit(&Drive::odometry(1));
-        let destination = navigator::Destination { goal_m, tolerance_m };
-        pilot.decide(
-            at_ns(1),
-            Some(Chart { map, time_to_goal, odometry_at_ns: header.odometry_at_ns }),
-            &destination,
-        );
+        heard.note(stamp, &records[0]);
+        let chart = Chart { map, time_to_goal, goal_m: header.goal_m, odometry_at_ns: header.odometry_at_ns };
+        // To drive and to stand are both told in words.
+        assert!(!records[0].to_string().is_empty());
+        pilot.decide(at_ns(1), Some(chart), &heard.instruction(at_ns(1), u64::MAX));
+    })
+}
+
+static ORDER: LazyLock<Whole> = LazyLock::new(|| {
+    let header = OrderHeader { stamp: stamped(1), kind: 2, tolerance_m: 0.5, speed_mps: 0.5, alpha: 0.5 };
+    Whole::new(
+        (&header, "OrderHeader"),
+        &[[0.0, 0.0], [3.0, 0.0], [3.0, 3.0]],
+        vec![(0, Scalar::F64), (8, Scalar::F64)],
+    )
+});
+
+pub fn order(rng: &mut Rng) -> Vec<u8> {
+    let mut header = bytemuck::pod_read_unaligned::<OrderHeader>(&ORDER.header);
+    header.kind = rng.random_range(0..12);
+    ORDER.under(&header, rng.random_range(0..5)).broken(rng)
+}
+
+/// After a mission that is under way, whatever comes next, the vehicle stops in an emergency.
+pub fn read_order() -> Reader {
+    reader(channel::ORDER, move |header: &OrderHeader, points_m| {
+        let Ok(order) = header.order(points_m) else { return };
+        let mut mission = Mission::new(u64::MAX);
+        let said = |sequence| Said { at_ns: at_ns(1), sender_ns: 1, sequence };
+        let first = Route::goals(vec![goal().goal_m], 0.5).unwrap();
+        mission.order(Order::Drive(first), said(1), at_ns(1)).unwrap();
+        mission.order(order, header.said(), at_ns(2)).ok();
+        mission.advance(&Drive::odometry(1));
+        assert!(!MissionRecord::of(&mission).to_string().is_empty());
+        mission.order(Order::EmergencyStop, said(2), u64::MAX).ok();
+        assert!(!matches!(mission.instruction(), Instruction::Drive(_)));
     })
 }
 

@@ -2,9 +2,9 @@
 
 use bicycle::Model;
 use navigator::{Assessor, Belief};
-use runtime::channel::{Bus, Inlet, ODOMETRY, RISK};
+use runtime::channel::{Bus, Inlet, MISSION, ODOMETRY, RISK};
 use runtime::mapping::{LEARNED, send_risk};
-use runtime::message::{Grid, OdometryRecord, RiskHeader, Stamp, SurfaceHeader};
+use runtime::message::{Grid, MissionRecord, OdometryRecord, RiskHeader, Stamp, SurfaceHeader};
 use runtime::payload::{RiskParts, cell_numbers, risk_views};
 use runtime::risk_maker::RiskMaker;
 use terrain::{GridGeometry, SurfaceCell, TerrainClass};
@@ -162,4 +162,25 @@ fn a_publisher_whose_memory_cannot_be_reached_is_counted_as_a_failure() {
     outlet.send_one(Stamp::default(), OdometryRecord::default(), 1).unwrap();
     inlet.poll(|_, _| panic!("nobody can have heard that"));
     assert!(inlet.counts().failed > 0, "{:?}", inlet.counts());
+}
+
+/// A recorder that is started on the way: what was said last counts for it as for all others, long before it is said
+/// again.
+#[test]
+fn who_comes_late_is_given_the_last_mission_and_no_older_one() {
+    let run = Run::new();
+    let (here, there) = (Bus::join(&run.name).unwrap(), Bus::join(&run.name).unwrap());
+    let mut outlet = here.outlet(&MISSION, 1).unwrap();
+    for number in 1..=3 {
+        let mission = MissionRecord { number, ..MissionRecord::default() };
+        outlet.send_one(Stamp::default(), mission, number).unwrap();
+    }
+    let mut late = there.inlet(&MISSION).unwrap();
+    outlet.welcome();
+    let mut heard = Vec::new();
+    late.poll(|stamp, missions| heard.push((stamp.sequence, missions[0].number)));
+    assert_eq!(heard, [(3, 3)]);
+    outlet.send_one(Stamp::default(), MissionRecord::default(), 4).unwrap();
+    late.poll(|stamp, missions| heard.push((stamp.sequence, missions[0].number)));
+    assert_eq!((heard, late.counts().lost), (vec![(3, 3), (4, 0)], 0), "and then as everybody");
 }

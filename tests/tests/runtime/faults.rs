@@ -16,7 +16,14 @@ const PLANNERS: [Role; 3] = [Role::Mapping, Role::Learning, Role::Control];
 fn every_process_may_fail_and_the_vehicle_is_safe() {
     let mut run = Run::new();
     // In no sensible order: each finds the others.
-    run.start_all(&[Role::Control, Role::Recorder, Role::Mapping, Role::Plant, Role::Learning]);
+    run.start_all(&[
+        Role::Control,
+        Role::Recorder,
+        Role::Mapping,
+        Role::Mission,
+        Role::Plant,
+        Role::Learning,
+    ]);
     let mut witness = Witness::new(&run);
     let mut table = Vec::new();
     witness.until_driving("all processes up");
@@ -79,7 +86,7 @@ fn drive_on_when_learning_is_killed(run: &mut Run, witness: &mut Witness) -> [(&
 #[test]
 fn maps_that_come_late_are_replaced_by_physics_and_then_by_a_stop() {
     let mut run = Run::new();
-    run.start(Role::Plant);
+    run.start_all(&[Role::Plant, Role::Mission]);
     run.start_all(&PLANNERS);
     let mut witness = Witness::new(&run);
     witness.until_driving("all processes up");
@@ -103,7 +110,7 @@ fn maps_that_come_late_are_replaced_by_physics_and_then_by_a_stop() {
 #[test]
 fn a_second_control_never_takes_the_wheel() {
     let mut run = Run::new();
-    run.start(Role::Plant);
+    run.start_all(&[Role::Plant, Role::Mission]);
     run.start_all(&PLANNERS);
     let mut witness = Witness::new(&run);
     witness.until_driving("all processes up");
@@ -124,13 +131,13 @@ fn everything_killed_at_once_begins_again_without_cleaning_and_leaves_nothing_be
     let mut run = Run::new();
     let mut counts = Vec::new();
     for _ in 0..4 {
-        run.start(Role::Plant);
+        run.start_all(&[Role::Plant, Role::Mission]);
         run.start_all(&PLANNERS);
         {
             let mut witness = Witness::new(&run);
             witness.until("a decision", |witness| witness.decision.is_some());
         }
-        for role in [Role::Plant, Role::Mapping, Role::Learning, Role::Control] {
+        for role in [Role::Plant, Role::Mission, Role::Mapping, Role::Learning, Role::Control] {
             run.kill(role);
         }
         counts.push(run.shared_memory().len());

@@ -6,13 +6,14 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::{Duration, Instant};
 
 use bicycle::{Model, Vehicle};
-use navigator::{Belief, Config};
+use navigator::{Belief, Config, Route};
 use runtime::ages::{AgeLimits, Periods};
 use runtime::channel::{Bus, RunName};
 use runtime::control::{self, ControlSetup};
 use runtime::learning::{self, LearningSetup};
 use runtime::mapping::{self, MappingSetup};
-use runtime::plant::{self, PlantSetup};
+use runtime::mission::{self, Beginning, MissionSetup};
+use runtime::plant::{self, Ending, PlantSetup};
 use runtime::recorder::{self, RecorderSetup};
 use runtime::setup::{ClockAnchor, MachineSetup, RecordedSetup};
 use runtime::status::Role;
@@ -257,6 +258,18 @@ fn be(role: Role, run: &RunName, folder: &Path, is_over: &dyn Fn() -> bool) {
             let setup = ControlSetup { model, config, seed: SEED, period_s: 0.1, ages: ages() };
             control::run(&bus, setup, is_over).unwrap();
         }
+        Role::Mission => {
+            let task = task();
+            let route = Route::goals(vec![task.goal_m], task.goal_tolerance_m).unwrap();
+            let setup = MissionSetup {
+                beginning: Beginning::Driving(route),
+                tolerance_m: task.goal_tolerance_m,
+                model: &model,
+                periods: Periods::default(),
+                ages: ages(),
+            };
+            mission::run(&bus, setup, is_over).unwrap();
+        }
         Role::Recorder => {
             let setup = RecorderSetup {
                 folder: folder.to_owned(),
@@ -313,6 +326,7 @@ pub fn plant_setup(vehicle: &Vehicle) -> PlantSetup<'_> {
         task: task(),
         vehicle,
         episode: episode_config(vehicle),
+        ending: Ending::AtGoal,
         seed: SEED,
         periods: Periods::default(),
         ages: ages(),

@@ -100,7 +100,7 @@ fn all_roles_the_live_view_and_two_third_parties_have_room() {
     let mut run = Run::new();
     let mut guests = [ThirdParty::join(&run).unwrap(), ThirdParty::join(&run).unwrap()];
     let bus = Bus::join(&run.name).unwrap();
-    let never = |_| std::process::Command::new("false");
+    let never = |_, _| std::process::Command::new("false");
     let _supervisor = Supervisor::new(&bus, &Role::ALL, RestartPolicy::default(), &never).unwrap();
     // Learning with --learn reads these, too.
     let _school = (bus.inlet(&ODOMETRY).unwrap(), bus.inlet(&COMMAND).unwrap());

@@ -12,7 +12,7 @@ use runtime::status::Role;
 use crate::fixture::{RecorderLimits, Run, eventually};
 use crate::witness::Witness;
 
-const OTHERS: [Role; 4] = [Role::Plant, Role::Mapping, Role::Learning, Role::Control];
+const OTHERS: [Role; 5] = [Role::Plant, Role::Mapping, Role::Learning, Role::Control, Role::Mission];
 
 fn read(files: &[PathBuf]) -> Records {
     replay::read(files).unwrap()

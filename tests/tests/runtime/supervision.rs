@@ -6,7 +6,7 @@ use std::process::Command;
 use runtime::channel::Bus;
 use runtime::clock::now_ns;
 use runtime::status::Role;
-use runtime::supervisor::{RestartPolicy, RunEnd, Supervisor};
+use runtime::supervisor::{RestartPolicy, RunEnd, Start, Supervisor};
 
 use crate::fixture::Run;
 
@@ -23,7 +23,10 @@ fn supervise(roles: &[Role], script: &str) -> (RunEnd, Vec<(Role, u64)>) {
     let run = Run::new();
     let bus = Bus::join(&run.name).unwrap();
     let (starts, began_ns) = (RefCell::new(Vec::new()), now_ns());
-    let command = |role: Role| {
+    let command = |role: Role, start: Start| {
+        // Whoever takes the place of one that has died is told so, and nobody else.
+        let is_again = starts.borrow().iter().any(|(started, _)| *started == role);
+        assert_eq!(start == Start::Again, is_again);
         starts.borrow_mut().push((role, (now_ns() - began_ns) / 1_000_000));
         let mut command = Command::new("sh");
         command.args(["-c", script, role.name()]);
