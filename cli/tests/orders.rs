@@ -147,7 +147,8 @@ fn a_run_that_waits_is_sent_about_stopped_and_sent_again() {
     run.takes(&["cancel"], "mission cancelled");
     run.takes(&["goal", "1.6,2.6"], "driving to (1.6, 2.6) m");
     // It arrives, and waits for the next.
-    run.until(&["pause"], "there is no mission under way");
+    run.until(&["alpha", "0.3"], "goal reached");
+    run.refuses(&["pause"], "there is no mission under way");
     assert_eq!(run.up.try_wait().unwrap(), None, "it stays");
     assert_eq!(run.end(), Some(0));
 }
