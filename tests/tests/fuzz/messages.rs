@@ -250,7 +250,7 @@ pub fn read_risk() -> Reader {
             pilot.note_scan(header.stamp.valid_at_ns);
             let chart =
                 Chart { map, time_to_goal, goal_m: header.goal_m, odometry_at_ns: header.odometry_at_ns };
-            pilot.decide(at_ns(k), Some(chart), &goal());
+            pilot.decide(at_ns(k), Some(chart), &to_goal());
         }
     })
 }
