@@ -55,7 +55,7 @@ impl Config {
     /// Settings that fit a vehicle, see [`Config::for_geometry`], and how far its body leans.
     pub fn for_vehicle(vehicle: &Vehicle) -> Self {
         let fitting = Self::for_geometry(&vehicle.geometry, vehicle.limits.speed_max_mps);
-        Self { prior: PriorConfig { lean: vehicle.lean(), ..fitting.prior.clone() }, ..fitting }
+        Self { prior: PriorConfig { lean: vehicle.lean(), ..fitting.prior }, ..fitting }
     }
 
     /// Settings that fit a vehicle's lengths and its fastest speed: a window of at most 128 cells a side that holds twice
