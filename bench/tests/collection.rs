@@ -78,12 +78,6 @@ fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len() as f64
 }
 
-fn median(values: &[f64]) -> f64 {
-    let mut sorted = values.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    sorted[sorted.len() / 2]
-}
-
 fn deviation(values: &[f64]) -> f64 {
     let mean_of = mean(values);
     mean(&values.iter().map(|value| (value - mean_of).powi(2)).collect::<Vec<_>>()).sqrt()
@@ -94,15 +88,18 @@ fn labels_agree_with_the_statics_of_the_plant_and_their_scatter_is_the_plants_ow
     let usual = request(2, 10);
     let perfect = Request { odometry: OdometryConfig::PERFECT, ..usual.clone() };
     let [measured, exact] = [usual, perfect].map(|request| residuals(&run(&request), 0.04));
-    // Middle and deviation at most: traction 1 and 2 %, scattering by what rocks do to a vehicle at 2 m/s; angles 0.1
-    // and 0.7 degrees. Labels of traction end at 1, which takes 0.4 of a deviation off the mean of what scatters around
-    // 0.99 and nothing off the median; angles are told by their mean.
+    // The truth drives straight on, these drives weave by sines of 0.33 to 1 of the lock of 0.524 rad, 0.066 rad2 in the
+    // mean square d2. The front wheels go 1 / cos d as far as the rear axle, and the speed controller holds the mean of
+    // all: the rear axle falls behind by d2 / 4 = 0.0165.
+    let weaving = -0.0165;
+    // Beside that, mean and deviation at most: traction 1 and 2 %, scattering by what rocks do to a vehicle at 2 m/s;
+    // angles 0.1 and 0.7 degrees.
     let most = [[0.01, 0.05], [0.025, 0.12], [0.002, 0.012], [0.002, 0.012]];
     for k in 0..4 {
-        let middle = if k < 2 { median(&measured[k]) } else { mean(&measured[k]) };
-        let deviation = deviation(&measured[k]);
+        let expected = if k < 2 { weaving } else { 0.0 };
+        let (off, deviation) = (mean(&measured[k]) - expected, deviation(&measured[k]));
         assert!(measured[k].len() > 300, "{k}: {}", measured[k].len());
-        assert!(middle.abs() < most[k][0] && deviation < most[k][1], "{k}: {middle} {deviation}");
+        assert!(off.abs() < most[k][0] && deviation < most[k][1], "{k}: {off} {deviation}");
     }
     // Odometry that knows everything scatters little less.
     for k in 0..2 {
