@@ -41,6 +41,7 @@
 //! | ask physics about ground | `cargo run -p physics_prior --example judge_a_ramp` |
 //! | ask the networks about ground | `cargo run -p evidential --example learned_weight` |
 //! | drive the controller over a constant risk map | `cargo run -p mppi --example drive_constant_map` |
+//! | give the controller costs of your own | `cargo run -p mppi --example own_costs` |
 //! | drive the planner on your map, without sensors | `cargo run -p navigator --example own_surface` |
 //! | simulate your world | `cargo run -p scenarios --example own_world` |
 //! | drive everything in your world | `cargo run -p bench --example drive_own_world` |
