@@ -103,7 +103,12 @@ fn the_designed_manoeuvre_driven_on_the_plant_leaves_the_true_name() {
     real.push(drive(folder, "m.csv", "m", &wrong));
     let settled = diagnose(folder, &real, &[]);
     assert_eq!(settled.credible_set, ["steer_lag"], "{:?}", settled.effects);
-    assert_eq!(settled.verdict, Verdict::Effects);
+    // The designed drive slides the tyres more than any drive that calibrated the simulator: a rest may stay unknown.
+    assert!(
+        matches!(settled.verdict, Verdict::Effects | Verdict::EffectsAndUnknown),
+        "{:?}",
+        settled.verdict
+    );
     let lag = settled.effects[0].parameters["time_constant_s"];
     assert!((lag.value - 0.35).abs() < 0.1, "{lag:?}");
 }
