@@ -7,7 +7,7 @@
 //! bit for bit, for any number of threads. The vehicle's model is a type, [`bicycle::Model`] unless another is given;
 //! costs of one's own plug in as [`StepCost`] and [`RolloutCost`]; settings may change between decisions, see
 //! [`Controller::set_config`]. [`CostToGo`] finds the least time to the goal over the same map.
-//! `examples/drive_constant_map.rs` drives a whole way.
+//! `examples/drive_constant_map.rs` drives a whole way, `examples/own_costs.rs` with costs of its own.
 //!
 //! ```
 //! use bicycle::{Decision, Limits, Model, State};
