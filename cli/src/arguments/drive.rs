@@ -274,7 +274,7 @@ Outcomes:
   goal            the goal was reached
   rolled_over     the vehicle lies on its side
   attitude_limit  roll or pitch went beyond the vehicle's limit
-  stuck           it moved less than 0.1 m in 5 s
+  stuck           it moved less than 0.1 m in 5 s, stops left out
   out_of_bounds   it left the world
   timeout         --time-limit passed
   stopped         the controller stopped for good, all of --commands were carried out,

@@ -279,8 +279,8 @@ impl Envelope {
         gather(&std::mem::take(place), contacts);
     }
 
-    /// Force of a straight piece of ground, from back to front, on a disc: the integral of (r - rho) times the direction to the hub over the part
-    /// inside.
+    /// Force of a straight piece of ground, from back to front, on a disc: the integral of (r - rho) times the direction
+    /// to the hub over the part inside.
     #[inline]
     fn segment(&self, start: Vector2<f64>, end: Vector2<f64>) -> Option<Piece> {
         let r = self.radius_m;
