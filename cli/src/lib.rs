@@ -24,7 +24,9 @@
 //!
 //! - [`scenarios`]: the truth that all of it is tested against: worlds, a plant of rigid bodies and tyres, sensors,
 //!   episodes.
-//! - [`runtime`]: the chain as processes over shared memory, with watchdog, recorder and replay.
+//! - [`bus`]: the contract with a vehicle: messages in shared memory, channels, ages, watchdog.
+//! - [`runtime`]: the chain as processes over these channels, with recorder and replay.
+//! - [`simulator`]: the simulated vehicle as one driver of that contract.
 //! - [`sim_to_real`]: which effect separates recorded drives of a robot from those of its simulator.
 //! - [`formats`]: every file that is read or written.
 //! - [`bench`](::bench): timings, the published tables, and plant and planner in a closed loop.
@@ -45,7 +47,7 @@
 //! | drive the planner on your map, without sensors | `cargo run -p navigator --example own_surface` |
 //! | simulate your world | `cargo run -p scenarios --example own_world` |
 //! | drive everything in your world | `cargo run -p bench --example drive_own_world` |
-//! | send and read messages of a run | `cargo run -p runtime --example publish_and_read` |
+//! | send and read messages of a run | `cargo run -p bus --example publish_and_read` |
 //! | find out why simulator and robot disagree | `cargo run -p sim_to_real --example diagnose_a_delay` |
 //!
 //! Those who come to read code begin with [`navigator::Navigator`], then [`traversability::RiskMapView`], then

@@ -1,7 +1,7 @@
 //! The words to a run that is under way: one order each, and what becomes of it.
 
+use bus::channel::{Bus, RunName};
 use navigator::{Order, Route};
-use runtime::channel::{Bus, RunName};
 use runtime::operator;
 use traversability::CvarLevel;
 

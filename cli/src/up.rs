@@ -8,9 +8,9 @@ use std::ffi::OsString;
 use std::path::Path;
 use std::process::Command;
 
+use bus::channel::ChannelError;
+use bus::status::Role;
 use runtime::RuntimeError;
-use runtime::channel::ChannelError;
-use runtime::status::Role;
 use runtime::supervisor::{RestartPolicy, RunEnd, RunReport, Start, Supervisor};
 
 use crate::arguments::{MapSource, Method, Pace, UpArguments, UpRole};

@@ -6,7 +6,7 @@
 use std::process::{Child, Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
-use runtime::channel::{Bus, RunName};
+use bus::channel::{Bus, RunName};
 use rustix::process::{Pid, Signal, kill_process};
 
 fn surefoot(words: &[&str]) -> Command {

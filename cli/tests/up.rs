@@ -9,8 +9,9 @@ use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 
+use bus::ages::Periods;
 use formats::DriveRecorder;
-use runtime::ages::{AgeLimits, Periods};
+use runtime::ages::{self, AskedAges};
 use runtime::setup::{ClockAnchor, MachineSetup, RecordedSetup};
 use serde_json::Value;
 
@@ -111,7 +112,7 @@ fn files_that_are_none_are_refused_with_what_was_expected() {
 fn record_setup(path: &Path, change: impl FnOnce(&mut serde_json::Map<String, Value>)) {
     let vehicle = formats::read_vehicle("rc_car").unwrap();
     let config = navigator::Config::for_vehicle(&vehicle);
-    let ages = AgeLimits::new(&Periods::default(), &config.guard, None).unwrap();
+    let ages = ages::limits(&Periods::default(), &config.guard, &AskedAges::default()).unwrap();
     let machine = MachineSetup { model: bicycle::Model::of(&vehicle), vehicle, config };
     let [vehicle_toml, model_toml, config_toml] = machine.texts().unwrap();
     let setup = RecordedSetup {

@@ -1,6 +1,6 @@
 """Surefoot's channels for Python: the same records in the same shared memory, through PyPI `iceoryx2==0.10.0`.
 
-What a channel keeps, and how many may use it, must be what `runtime/src/channel.rs` says; the first process to open a
+What a channel keeps, and how many may use it, must be what `bus/src/channel.rs` says; the first process to open a
 channel decides.
 """
 

@@ -1,4 +1,4 @@
-"""The last word before the actuators, as runtime/src/watchdog.rs has it: a command counts for as long as what it was
+"""The last word before the actuators, as bus/src/watchdog.rs has it: a command counts for as long as what it was
 decided on, however late it comes, and then the vehicle stops.
 """
 

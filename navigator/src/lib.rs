@@ -9,7 +9,6 @@
 //! [`Config::for_vehicle`] fits all settings to a machine, a [`Belief`] says how the ground is judged, a [`Guard`] what
 //! may enter. `examples/own_surface.rs` drives the three on a map of one's own.
 
-mod applied;
 mod assessor;
 mod author;
 mod config;
@@ -24,7 +23,6 @@ mod route;
 mod surveyor;
 mod track;
 
-pub use applied::{Applied, AppliedBy};
 pub use assessor::Assessor;
 pub use config::{Config, RiskMapConfig};
 pub use guard::{Admitted, Guard, GuardConfig};

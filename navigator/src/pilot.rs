@@ -2,11 +2,13 @@
 
 use std::collections::BTreeMap;
 
-use bicycle::{Decision, HoldReason, Model, MotionCommand, MotionState, Odometry, SensorModel, StopReason};
+use bicycle::{
+    Applied, AppliedBy, Decision, HoldReason, Model, MotionCommand, MotionState, Odometry, SensorModel,
+    StopReason,
+};
 use mppi::{Controller, CostToGoView, Driven, Input, Objective, ReferencePath, Terminal};
 use traversability::RiskMapView;
 
-use crate::applied::{Applied, AppliedBy};
 use crate::frame::Frame;
 use crate::guard::{Admitted, Guard};
 use crate::risk::StuckPose;

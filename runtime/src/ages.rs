@@ -1,31 +1,10 @@
-//! How often the parts of a run speak, and every limit on age and silence that follows from it.
-//!
-//! All processes of a run are given the same [`Periods`]; nothing else in this crate knows how long is too long.
+//! Every limit on age and silence that follows from how often the parts of a run speak.
 
+use std::cmp::Ordering;
+
+use bus::ages::{AgeLimits, Periods};
+use bus::clock;
 use navigator::GuardConfig;
-use serde::{Deserialize, Serialize};
-
-use crate::clock;
-
-/// Time between two messages, part by part.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Periods {
-    /// Between two decisions [s].
-    pub control_s: f64,
-    /// Between two odometry messages [s].
-    pub odometry_s: f64,
-    /// Between two scans, and so between two maps [s].
-    pub scan_s: f64,
-    /// Between two repetitions of the mission [s].
-    pub mission_s: f64,
-}
-
-impl Default for Periods {
-    fn default() -> Self {
-        Self { control_s: 0.1, odometry_s: 0.02, scan_s: 0.2, mission_s: 1.0 }
-    }
-}
 
 /// What a message takes on its way, and a process to wake up on a machine that is busy [s].
 const DELAY_S: f64 = 0.08;
@@ -36,49 +15,43 @@ const LEARNING_SILENCE_S: f64 = 0.4;
 /// Whoever says something expects it to happen now, not after a pause that nobody knows of [s].
 const ORDER_S: f64 = 1.0;
 
-impl Periods {
-    /// What a guard lets pass at these periods: two odometry messages may be lost and four scans, and a map may have been
-    /// made of the scan before the last and be driven on for two periods of control. A scan waits until the odometry after
-    /// it must have come, and where it has not, is placed by the one before it.
-    pub fn guard(&self) -> GuardConfig {
-        let usual = GuardConfig::default();
-        let scan_age_max_s = (5.0 * self.scan_s).max(2.0 * (self.scan_s + self.control_s));
-        GuardConfig {
-            odometry_age_max_s: usual.odometry_age_max_s.max(3.0 * self.odometry_s),
-            frozen_max_s: usual.frozen_max_s.max(5.0 * self.odometry_s),
-            scan_age_max_s: usual.scan_age_max_s.max(scan_age_max_s),
-            odometry_wait_max_s: usual.odometry_wait_max_s.max(self.odometry_s + DELAY_S),
-            extrapolation_max_s: usual.extrapolation_max_s.max(self.odometry_s),
-            ..usual
-        }
-    }
-
-    /// Age up to which the vehicle follows a command: one more of control's deadlines may be missed [s].
-    fn command_s(&self) -> f64 {
-        COMMAND_S.max(self.odometry_s + 2.0 * self.control_s + DELAY_S)
-    }
-
-    fn learning_silence_s(&self) -> f64 {
-        LEARNING_SILENCE_S.max(2.0 * self.scan_s)
+/// What a guard lets pass at these periods: two odometry messages may be lost and four scans, and a map may have been
+/// made of the scan before the last and be driven on for two periods of control. A scan waits until the odometry after
+/// it must have come, and where it has not, is placed by the one before it.
+pub fn guard(periods: &Periods) -> GuardConfig {
+    let usual = GuardConfig::default();
+    let Periods { control_s, odometry_s, scan_s, .. } = *periods;
+    let scan_age_max_s = (5.0 * scan_s).max(2.0 * (scan_s + control_s));
+    GuardConfig {
+        odometry_age_max_s: usual.odometry_age_max_s.max(3.0 * odometry_s),
+        frozen_max_s: usual.frozen_max_s.max(5.0 * odometry_s),
+        scan_age_max_s: usual.scan_age_max_s.max(scan_age_max_s),
+        odometry_wait_max_s: usual.odometry_wait_max_s.max(odometry_s + DELAY_S),
+        extrapolation_max_s: usual.extrapolation_max_s.max(odometry_s),
+        ..usual
     }
 }
 
-/// How old what is driven on may be [ns]. Every age counts from when something was true, not from when it was sent.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct AgeLimits {
+/// Ages that take the place of those that follow from the periods [s].
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct AskedAges {
     /// Odometry of a command that the vehicle follows.
-    pub command_ns: u64,
-    /// Scan of a command that the vehicle follows.
-    pub scan_ns: u64,
+    pub command_s: Option<f64>,
     /// Scan of a learned map from which on physics' younger map is preferred.
-    pub learned_ns: u64,
+    pub learned_s: Option<f64>,
     /// Silence of learning after which physics speaks.
-    pub learning_silence_ns: u64,
+    pub learning_silence_s: Option<f64>,
     /// Mission that has not been repeated.
-    pub mission_ns: u64,
+    pub mission_s: Option<f64>,
     /// Order of somebody who directs the vehicle.
-    pub order_ns: u64,
+    pub order_s: Option<f64>,
+}
+
+impl AskedAges {
+    /// Only a command's.
+    pub fn of_command(command_s: Option<f64>) -> Self {
+        Self { command_s, ..Self::default() }
+    }
 }
 
 /// Settings that cannot be together.
@@ -95,43 +68,51 @@ pub struct AgeLimitError {
     pub found_s: f64,
 }
 
-impl AgeLimits {
-    /// The limits that follow from periods, with the guard that control has. `command_age_max_s` takes the place of the
-    /// age that follows for commands.
-    ///
-    /// # Errors
-    /// A limit that what is regular would exceed, with both numbers.
-    pub fn new(
-        periods: &Periods,
-        guard: &GuardConfig,
-        command_age_max_s: Option<f64>,
-    ) -> Result<Self, AgeLimitError> {
-        let Periods { control_s, odometry_s, scan_s, mission_s } = *periods;
-        let command_s = command_age_max_s.unwrap_or_else(|| periods.command_s());
-        let silence_s = periods.learning_silence_s();
-        let require = |setting, found_s: f64, least_s: f64, because: String| match found_s > least_s {
-            true => Ok(()),
-            false => Err(AgeLimitError { setting, least_s, because, found_s }),
-        };
-        let odometry = || format!("odometry every {odometry_s} s");
-        require("guard.odometry_age_max_s", guard.odometry_age_max_s, 2.0 * odometry_s, odometry())?;
-        require("guard.frozen_max_s", guard.frozen_max_s, 2.0 * odometry_s, odometry())?;
-        require("guard.odometry_wait_max_s", guard.odometry_wait_max_s, odometry_s, odometry())?;
-        let scans = || format!("scans every {scan_s} s and decisions every {control_s} s");
-        // Physics speaks after the silence of learning, of the next scan, and must have been heard by then.
-        let least_s = (silence_s + scan_s).max(scan_s + control_s);
-        require("guard.scan_age_max_s", guard.scan_age_max_s, least_s, scans())?;
-        let commands = format!("decisions every {control_s} s and {}", odometry());
-        require("--command-age", command_s, odometry_s + control_s, commands)?;
-        Ok(Self {
-            command_ns: clock::nanoseconds(command_s),
-            scan_ns: clock::nanoseconds(guard.scan_age_max_s),
-            learned_ns: clock::nanoseconds(LEARNED_S.max(3.0 * scan_s)),
-            learning_silence_ns: clock::nanoseconds(silence_s),
-            mission_ns: clock::nanoseconds(2.5 * mission_s),
-            order_ns: clock::nanoseconds(ORDER_S),
-        })
+/// The limits that follow from periods, with the guard that control has and the ages that are asked for.
+///
+/// # Errors
+/// A limit that what is regular would exceed, with both numbers.
+pub fn limits(periods: &Periods, guard: &GuardConfig, asked: &AskedAges) -> Result<AgeLimits, AgeLimitError> {
+    let Periods { control_s, odometry_s, scan_s, mission_s } = *periods;
+    // One more of control's deadlines may be missed.
+    let command_s = asked.command_s.unwrap_or(COMMAND_S.max(odometry_s + 2.0 * control_s + DELAY_S));
+    let silence_s = asked.learning_silence_s.unwrap_or(LEARNING_SILENCE_S.max(2.0 * scan_s));
+    let learned_s = asked.learned_s.unwrap_or(LEARNED_S.max(3.0 * scan_s));
+    let mission_age_s = asked.mission_s.unwrap_or(2.5 * mission_s);
+    let order_s = asked.order_s.unwrap_or(ORDER_S);
+    let odometry = format!("odometry every {odometry_s} s");
+    let scans = format!("scans every {scan_s} s");
+    let maps = format!("{scans} and decisions every {control_s} s");
+    let commands = format!("decisions every {control_s} s and {odometry}");
+    let missions = format!("missions every {mission_s} s");
+    // Physics speaks after the silence of learning, of the next scan, and must have been heard by then.
+    let heard_s = (silence_s + scan_s).max(scan_s + control_s);
+    let checks = [
+        ("guard.odometry_age_max_s", guard.odometry_age_max_s, 2.0 * odometry_s, &odometry),
+        ("guard.frozen_max_s", guard.frozen_max_s, 2.0 * odometry_s, &odometry),
+        ("guard.odometry_wait_max_s", guard.odometry_wait_max_s, odometry_s, &odometry),
+        ("guard.scan_age_max_s", guard.scan_age_max_s, heard_s, &maps),
+        ("command age", command_s, odometry_s + control_s, &commands),
+        ("learned age", learned_s, scan_s + control_s, &maps),
+        ("learning silence", silence_s, scan_s, &scans),
+        ("mission age", mission_age_s, mission_s, &missions),
+        ("order age", order_s, DELAY_S, &"messages on their way".to_owned()),
+    ];
+    // What is no number is above nothing.
+    let refused = checks
+        .into_iter()
+        .find(|(_, found_s, least_s, _)| found_s.partial_cmp(least_s) != Some(Ordering::Greater));
+    if let Some((setting, found_s, least_s, because)) = refused {
+        return Err(AgeLimitError { setting, least_s, because: because.clone(), found_s });
     }
+    Ok(AgeLimits {
+        command_ns: clock::nanoseconds(command_s),
+        scan_ns: clock::nanoseconds(guard.scan_age_max_s),
+        learned_ns: clock::nanoseconds(learned_s),
+        learning_silence_ns: clock::nanoseconds(silence_s),
+        mission_ns: clock::nanoseconds(mission_age_s),
+        order_ns: clock::nanoseconds(order_s),
+    })
 }
 
 #[cfg(test)]
@@ -141,13 +122,13 @@ mod tests {
     use navigator::{Config, Surface, Surveyor, Whereabouts};
 
     fn limits(periods: &Periods, command_age_max_s: Option<f64>) -> Result<AgeLimits, AgeLimitError> {
-        AgeLimits::new(periods, &periods.guard(), command_age_max_s)
+        super::limits(periods, &guard(periods), &AskedAges::of_command(command_age_max_s))
     }
 
     #[test]
     fn limits_of_the_usual_periods_are_those_of_the_documentation() {
         let periods = Periods::default();
-        assert_eq!(periods.guard(), GuardConfig::default());
+        assert_eq!(guard(&periods), GuardConfig::default());
         let ms = |ms: u64| 1_000_000 * ms;
         let expected = AgeLimits {
             command_ns: ms(300),
@@ -168,7 +149,7 @@ mod tests {
                 for scan_s in [0.05, 0.2, 0.5, 1.0] {
                     let periods = Periods { control_s, odometry_s, scan_s, mission_s: 1.0 };
                     let found = limits(&periods, None).unwrap();
-                    let guard = periods.guard();
+                    let guard = guard(&periods);
                     let holds = |limit_ns: u64, regular_s: f64| {
                         assert!(limit_ns as f64 * 1e-9 > regular_s, "{periods:?} {found:?} {regular_s}");
                     };
@@ -193,7 +174,7 @@ mod tests {
     /// lost, by the one before.
     #[test]
     fn scans_are_placed_at_low_rates() {
-        let guard = Periods { odometry_s: 0.2, scan_s: 0.4, ..Periods::default() }.guard();
+        let guard = guard(&Periods { odometry_s: 0.2, scan_s: 0.4, ..Periods::default() });
         let vehicle = formats::read_vehicle("rc_car").unwrap();
         let elevation = Config::for_vehicle(&vehicle).elevation;
         let mut surveyor = Surveyor::new(&vehicle, elevation, guard, Surface::Sensed).unwrap();
@@ -228,16 +209,17 @@ mod tests {
         let told = limits(&slow, Some(0.3)).unwrap_err().to_string();
         assert_eq!(
             told,
-            "--command-age: expected more than 1.020 s with decisions every 1 s and odometry every 0.02 s, found 0.3 s"
+            "command age: expected more than 1.020 s with decisions every 1 s and odometry every 0.02 s, found 0.3 s"
         );
         let rare = Periods { scan_s: 0.5, ..Periods::default() };
-        let told = AgeLimits::new(&rare, &GuardConfig::default(), None).unwrap_err().to_string();
+        let told =
+            super::limits(&rare, &GuardConfig::default(), &AskedAges::default()).unwrap_err().to_string();
         assert_eq!(
             told,
             "guard.scan_age_max_s: expected more than 1.500 s with scans every 0.5 s and decisions every 0.1 s, found 1 s"
         );
         let seldom = Periods { odometry_s: 0.2, ..Periods::default() };
-        let told = AgeLimits::new(&seldom, &GuardConfig::default(), None).unwrap_err();
+        let told = super::limits(&seldom, &GuardConfig::default(), &AskedAges::default()).unwrap_err();
         assert_eq!((told.setting, told.least_s), ("guard.odometry_age_max_s", 0.4));
         assert!(limits(&Periods::default(), Some(f64::NAN)).is_err());
     }

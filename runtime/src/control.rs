@@ -1,22 +1,23 @@
 //! The controller as a process: a decision at every deadline, on what there is, and never a wait for the map.
 
 use bicycle::{Decision, Model};
+use mppi::CostToGoView;
 use navigator::{Chart, Config, Destination, Instruction, Pilot};
 
 use crate::RuntimeError;
-use crate::ages::AgeLimits;
 use crate::budget::Budget;
-use crate::channel::{
+use crate::choice::is_learned;
+use crate::mission::Heard;
+use bus::ages::AgeLimits;
+use bus::channel::{
     Bus, COMMAND, DECISION, Inlet, MISSION, Message, ODOMETRY, Outlet, RISK, RISK_PHYSICS, STUCK,
 };
-use crate::choice::is_learned;
-use crate::clock::{self, Cycle};
-use crate::message::{
+use bus::clock::{self, Cycle};
+use bus::message::{
     CommandRecord, DecisionRecord, MissionRecord, OdometryRecord, RiskHeader, Source, Stamp, StuckRecord,
 };
-use crate::mission::Heard;
-use crate::payload::risk_views;
-use crate::status::{Health, Meter, Role};
+use bus::payload::risk_views;
+use bus::status::{Health, Meter, Role};
 
 /// Share of the period that a decision may take; the rest is for what else the processor does.
 const BUDGET_SHARE: f64 = 0.5;
@@ -142,8 +143,9 @@ impl Inputs {
 }
 
 /// A risk map's message as the pilot reads it: control and its replay.
-pub(crate) fn chart_of<'a>(header: &RiskHeader, payload: &'a [[f32; 4]]) -> Option<Chart<'a>> {
-    let (map, time_to_goal) = risk_views(header, payload)?;
+pub fn chart_of<'a>(header: &RiskHeader, payload: &'a [[f32; 4]]) -> Option<Chart<'a>> {
+    let (map, seconds) = risk_views(header, payload)?;
+    let time_to_goal = CostToGoView { geometry: map.geometry, seconds };
     Some(Chart { map, time_to_goal, goal_m: header.goal_m, odometry_at_ns: header.odometry_at_ns })
 }
 

@@ -1,6 +1,6 @@
 //! Why a process ends before it was told to.
 
-use crate::channel::ChannelError;
+use bus::channel::ChannelError;
 
 /// Why a process cannot begin or go on. Every message is one line.
 #[derive(Debug, thiserror::Error)]
@@ -11,26 +11,12 @@ pub enum RuntimeError {
     /// The pipeline.
     #[error(transparent)]
     Navigator(#[from] navigator::NavigatorError),
-    /// The simulated vehicle.
-    #[error(transparent)]
-    Episode(#[from] scenarios::EpisodeError),
     /// Learning while driving.
     #[error(transparent)]
     Online(#[from] crate::online::OnlineError),
     /// Periods and limits on ages that contradict each other.
     #[error(transparent)]
     Ages(#[from] crate::ages::AgeLimitError),
-    /// The simulated vehicle cannot speak so often.
-    #[error(
-        "periods: expected a whole number of odometry messages between two scans, found odometry every {odometry_s} s \
-         and scans every {scan_s} s"
-    )]
-    Periods {
-        /// Between two odometry messages [s].
-        odometry_s: f64,
-        /// Between two scans [s].
-        scan_s: f64,
-    },
     /// The live view.
     #[error("live view: expected to serve on {address}, found: {problem}")]
     Live {

@@ -4,7 +4,7 @@ use bicycle::{Odometry, StopReason};
 use navigator::{Jump, Surveyor};
 use xxhash_rust::xxh3::Xxh3;
 
-use crate::message::{OdometryRecord, Source, Stamp, SurfaceHeader};
+use bus::message::{OdometryRecord, Source, Stamp, SurfaceHeader};
 
 /// What was taken in since the last map.
 #[derive(Default)]
@@ -52,6 +52,16 @@ impl Intake {
         self.n = 0;
         self.hash.reset();
     }
+}
+
+/// The jump of the localisation that a map tells of.
+pub(crate) fn jump_of(header: &SurfaceHeader) -> Jump {
+    Jump { step_m: header.jump_m, yaw_rad: header.jump_yaw_rad }
+}
+
+/// All jumps so far together, as a map tells of them.
+pub(crate) fn shift_of(header: &SurfaceHeader) -> Jump {
+    Jump { step_m: header.shift_m, yaw_rad: header.shift_yaw_rad }
 }
 
 /// [`SurfaceHeader::odometry_hash`] of these.

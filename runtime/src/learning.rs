@@ -5,13 +5,13 @@ use navigator::{Assessor, Belief, Config};
 use traversability::CvarLevel;
 
 use crate::RuntimeError;
-use crate::channel::{Bus, Inlet, MISSION, Outlet, RISK, STUCK, SURFACE};
-use crate::clock;
 use crate::mapping::{LEARNED, risk_elements, send_risk};
-use crate::message::{MissionRecord, RiskHeader, Stamp, StuckRecord, SurfaceHeader};
 use crate::online::{Judge, School, SchoolSetup, Told};
 use crate::risk_maker::RiskMaker;
-use crate::status::{Health, Meter, Role};
+use bus::channel::{Bus, Inlet, MISSION, Outlet, RISK, STUCK, SURFACE};
+use bus::clock;
+use bus::message::{MissionRecord, RiskHeader, Stamp, StuckRecord, SurfaceHeader};
+use bus::status::{Health, Meter, Role};
 
 /// Time between two looks at the channels [ns].
 const POLL_NS: u64 = 2_000_000;

@@ -8,17 +8,19 @@ mod way;
 use bicycle::Decision;
 use formats::DriveTopics;
 use foxglove::{Context, WebSocketServer, WebSocketServerHandle};
+use navigator::Chart;
 use serde::Serialize;
 use terrain::Pose;
 
 use crate::RuntimeError;
-use crate::channel::{Bus, COMMAND, Inlet, MISSION, ODOMETRY, RISK, RISK_PHYSICS, SURFACE};
-use crate::clock::{self, SECOND_NS};
-use crate::message::{
+use crate::control::chart_of;
+use bus::channel::{Bus, COMMAND, Inlet, MISSION, ODOMETRY, RISK, RISK_PHYSICS, SURFACE};
+use bus::clock::{self, SECOND_NS};
+use bus::message::{
     CommandRecord, MissionRecord, OdometryRecord, RiskHeader, Stamp, StatusRecord, SurfaceHeader,
 };
-use crate::payload;
-use crate::status::Role;
+use bus::payload;
+use bus::status::Role;
 
 /// Port that Foxglove looks for.
 pub const PORT: u16 = 8765;
@@ -173,7 +175,7 @@ impl Seen {
 
     /// The risk of the present heading, and the way of least time over that map.
     fn risk(&mut self, topics: &DriveTopics, header: &RiskHeader, elements: &[[f32; 4]]) {
-        let Some((map, time_to_goal)) = payload::risk_views(header, elements) else { return };
+        let Some(Chart { map, time_to_goal, .. }) = chart_of(header, elements) else { return };
         let Some(odometry) = self.odometry else { return };
         if is_due(&mut self.risk_at_ns, header.stamp.published_at_ns, MAP_NS) {
             topics.risk(header.stamp.valid_at_ns, &map, odometry.attitude_rad[2]);

@@ -8,17 +8,17 @@ use terrain::Scan;
 use traversability::CvarLevel;
 
 use crate::RuntimeError;
-use crate::ages::AgeLimits;
-use crate::channel::{Bus, Inlet, MISSION, ODOMETRY, Outlet, RISK, RISK_PHYSICS, SCAN, STUCK, SURFACE};
-use crate::clock;
 use crate::intake::Intake;
-use crate::message::{
+use crate::risk_maker::RiskMaker;
+use bus::ages::AgeLimits;
+use bus::channel::{Bus, Inlet, MISSION, ODOMETRY, Outlet, RISK, RISK_PHYSICS, SCAN, STUCK, SURFACE};
+use bus::clock;
+use bus::message::{
     Grid, MissionRecord, OdometryRecord, PointRecord, RiskHeader, ScanHeader, Source, Stamp, StuckRecord,
     SurfaceHeader,
 };
-use crate::payload::{self, RiskParts};
-use crate::risk_maker::RiskMaker;
-use crate::status::{Health, Meter, Role};
+use bus::payload::{self, RiskParts};
+use bus::status::{Health, Meter, Role};
 
 /// Number of [`SurfaceHeader::event`]: a scan was fused.
 pub const FUSED: u64 = 1;

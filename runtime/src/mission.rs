@@ -2,20 +2,20 @@
 
 mod heard;
 mod record;
-mod told;
 
 use bicycle::{Model, SensorModel};
 use navigator::{Mission, Order, OrderRefusal, Route, Said};
 
 use crate::RuntimeError;
-use crate::ages::{AgeLimits, Periods};
-use crate::channel::{Bus, EMERGENCY_STOP, Inlet, MISSION, ODOMETRY, ORDER, Outlet};
-use crate::clock;
-use crate::message::{MissionRecord, OdometryRecord, OrderHeader, Source, Stamp};
-use crate::status::{Health, Meter, Role};
+use bus::ages::{AgeLimits, Periods};
+use bus::channel::{Bus, EMERGENCY_STOP, Inlet, MISSION, ODOMETRY, ORDER, Outlet};
+use bus::clock;
+use bus::message::{MissionRecord, OdometryRecord, OrderHeader, Source, Stamp};
+use bus::status::{Health, Meter, Role};
 pub use heard::Heard;
+pub(crate) use record::taken_by;
 use record::verdict_of;
-pub(crate) use record::{REACHED, taken_by};
+pub use record::{header_of, order_of, record_of, said_by};
 
 /// Time between two looks at the channels [ns].
 const POLL_NS: u64 = 5_000_000;
@@ -120,8 +120,8 @@ impl Leader {
         }
         for (header, points_m) in waiting {
             let tolerance_m = if header.tolerance_m == 0.0 { self.tolerance_m } else { header.tolerance_m };
-            let order = OrderHeader { tolerance_m, ..header }.order(&points_m);
-            let taken = self.take(order, header.said());
+            let order = order_of(&OrderHeader { tolerance_m, ..header }, &points_m);
+            let taken = self.take(order, said_by(&header));
             self.judged = (header.stamp.source(), verdict_of(taken));
             self.tell()?;
         }
@@ -157,12 +157,8 @@ impl Leader {
     fn tell(&mut self) -> Result<(), RuntimeError> {
         let now_ns = clock::now_ns();
         let (order, verdict) = self.judged;
-        let record = MissionRecord {
-            time_s: self.stopwatch.time_s(),
-            order,
-            verdict,
-            ..MissionRecord::of(&self.mission)
-        };
+        let record =
+            MissionRecord { time_s: self.stopwatch.time_s(), order, verdict, ..record_of(&self.mission) };
         self.outlet.send_one(Stamp::default(), record, now_ns)?;
         self.told_at_ns = Some(now_ns);
         Ok(())

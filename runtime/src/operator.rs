@@ -2,10 +2,10 @@
 
 use navigator::{Order, OrderRefusal};
 
-use crate::channel::{Bus, ChannelError, EMERGENCY_STOP, MISSION, ORDER};
-use crate::clock::{self, SECOND_NS};
-use crate::message::{MissionRecord, OrderHeader};
-use crate::mission::taken_by;
+use crate::mission::{header_of, taken_by};
+use bus::channel::{Bus, ChannelError, EMERGENCY_STOP, MISSION, ORDER};
+use bus::clock::{self, SECOND_NS};
+use bus::message::MissionRecord;
 
 /// How long an answer is waited for [ns].
 const PATIENCE_NS: u64 = 2 * SECOND_NS;
@@ -38,7 +38,7 @@ pub enum OperatorError {
 /// It was refused, or nobody answered in time.
 pub fn tell(bus: &Bus, order: &Order) -> Result<MissionRecord, OperatorError> {
     let channel = if *order == Order::EmergencyStop { &EMERGENCY_STOP } else { &ORDER };
-    let (header, points_m) = OrderHeader::of(order);
+    let (header, points_m) = header_of(order);
     let mut missions = bus.inlet(&MISSION)?;
     let mut outlet = bus.outlet(channel, points_m.len().max(1))?;
     let mut loan = outlet.write(points_m.len(), |place| points_m[place])?;

@@ -7,7 +7,7 @@ use thread_priority::{
     set_thread_priority_and_policy, thread_native_id,
 };
 
-use crate::status::Role;
+use bus::status::Role;
 
 /// Settles this thread, and those that it will start, as a role needs it; says what was done and what was not permitted.
 ///

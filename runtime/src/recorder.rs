@@ -8,17 +8,17 @@ use std::path::PathBuf;
 use bytemuck::NoUninit;
 
 use crate::RuntimeError;
-use crate::channel::{
+use crate::setup::RecordedSetup;
+use bus::channel::{
     Bus, CHECKPOINT, COMMAND, DECISION, EMERGENCY_STOP, Element, Header, Inlet, MISSION, ODOMETRY, ORDER,
     RISK, RISK_PHYSICS, SCAN, STUCK, SURFACE,
 };
-use crate::clock::{self, SECOND_NS};
-use crate::message::{
+use bus::clock::{self, SECOND_NS};
+use bus::message::{
     CheckpointHeader, CommandRecord, DecisionRecord, MissionRecord, OdometryRecord, OrderHeader, PointRecord,
     RiskHeader, ScanHeader, Stamp, StuckRecord, SurfaceHeader,
 };
-use crate::setup::RecordedSetup;
-use crate::status::{Health, Meter, Role};
+use bus::status::{Health, Meter, Role};
 use file::RotatingFile;
 use views::Views;
 
@@ -29,29 +29,29 @@ const POLL_NS: u64 = SECOND_NS / 200;
 pub mod topic {
     /// What all of them begin with.
     pub const CHANNELS: &str = "/channel/";
-    /// [`crate::channel::ODOMETRY`].
+    /// [`bus::channel::ODOMETRY`].
     pub const ODOMETRY: &str = "/channel/odometry";
-    /// [`crate::channel::SCAN`].
+    /// [`bus::channel::SCAN`].
     pub const SCAN: &str = "/channel/scan";
-    /// Headers of [`crate::channel::SURFACE`].
+    /// Headers of [`bus::channel::SURFACE`].
     pub const SURFACE: &str = "/channel/surface";
-    /// Headers of [`crate::channel::RISK`].
+    /// Headers of [`bus::channel::RISK`].
     pub const RISK: &str = "/channel/risk";
-    /// Headers of [`crate::channel::RISK_PHYSICS`].
+    /// Headers of [`bus::channel::RISK_PHYSICS`].
     pub const RISK_PHYSICS: &str = "/channel/risk_physics";
-    /// [`crate::channel::COMMAND`].
+    /// [`bus::channel::COMMAND`].
     pub const COMMAND: &str = "/channel/command";
-    /// [`crate::channel::DECISION`].
+    /// [`bus::channel::DECISION`].
     pub const DECISION: &str = "/channel/decision";
-    /// [`crate::channel::STUCK`].
+    /// [`bus::channel::STUCK`].
     pub const STUCK: &str = "/channel/stuck";
-    /// [`crate::channel::MISSION`].
+    /// [`bus::channel::MISSION`].
     pub const MISSION: &str = "/channel/mission";
-    /// [`crate::channel::ORDER`].
+    /// [`bus::channel::ORDER`].
     pub const ORDER: &str = "/channel/order";
-    /// [`crate::channel::EMERGENCY_STOP`].
+    /// [`bus::channel::EMERGENCY_STOP`].
     pub const EMERGENCY_STOP: &str = "/channel/emergency_stop";
-    /// [`crate::channel::CHECKPOINT`].
+    /// [`bus::channel::CHECKPOINT`].
     pub const CHECKPOINT: &str = "/channel/checkpoint";
     /// What is needed to repeat the run, as JSON.
     pub const SETUP: &str = "/setup";
@@ -243,10 +243,10 @@ fn write<H: Header, T: NoUninit>(
     topic: &'static str,
     header: &H,
     payload: &[T],
-    layout: fn() -> crate::layout::RecordLayout,
+    layout: fn() -> bus::layout::RecordLayout,
 ) -> Result<(), formats::RecordError> {
     let mut bytes = bytemuck::bytes_of(header).to_vec();
     bytes.extend_from_slice(bytemuck::cast_slice(payload));
-    let told = || crate::layout::c_header(&[layout()], crate::message::LAYOUT_VERSION);
+    let told = || bus::layout::c_header(&[layout()], bus::message::LAYOUT_VERSION);
     file.recorder().raw(topic, told, header.stamp().published_at_ns, &bytes)
 }

@@ -15,9 +15,9 @@ use navigator::{Belief, NavigatorError, Pilot};
 use traversability::CvarLevel;
 
 use crate::control;
-use crate::message::{CommandRecord, DecisionRecord, Source};
 use crate::mission::Heard;
 use crate::setup::{MachineSetup, SetupError};
+use bus::message::{CommandRecord, DecisionRecord, Source};
 use choice::Choice;
 use maps::{Maps, Unmade};
 pub use records::{Key, ReadError, Records, recorded_decision, recorded_stamp};

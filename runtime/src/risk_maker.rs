@@ -1,12 +1,13 @@
 //! A surface message becomes a risk map's: the work of learning, of mapping while learning is silent, and of replay.
 
+use crate::intake::shift_of;
 use navigator::{Assessor, Jump, NavigatorError, StuckPose};
 use terrain::{Cell, CellRegion, GridMap, SurfaceCell};
 use traversability::{CvarLevel, RiskMapView};
 
-use crate::channel::Refusal;
-use crate::message::{Grid, MissionRecord, RiskHeader, Source, Stamp, StuckRecord, SurfaceHeader};
-use crate::payload::{self, RiskParts};
+use bus::channel::Refusal;
+use bus::message::{Grid, MissionRecord, RiskHeader, Source, Stamp, StuckRecord, SurfaceHeader};
+use bus::payload::{self, RiskParts};
 
 /// Makes risk maps of the surfaces that it is shown, and judges only what has changed since the last one.
 pub struct RiskMaker {
@@ -146,7 +147,7 @@ impl RiskMaker {
     /// Stuck poses move along with what was mapped. A mapping that began anew has forgotten both.
     fn follow_shift(&mut self, header: &SurfaceHeader) {
         let (epoch_ns, last) = self.shift;
-        let now = header.shift();
+        let now = shift_of(header);
         if epoch_ns == header.stamp.epoch_ns && now != last {
             self.assessor.follow_jump(&last.inverse().then(&now));
         }

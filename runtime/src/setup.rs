@@ -4,8 +4,8 @@ use bicycle::{Model, Vehicle};
 use navigator::Config;
 use serde::{Deserialize, Serialize};
 
-use crate::ages::AgeLimits;
-use crate::clock;
+use bus::ages::AgeLimits;
+use bus::clock;
 
 /// The same moment on two clocks, which places a recording in time. Both as text, because not every reader of JSON knows
 /// numbers so large.
@@ -126,7 +126,8 @@ impl MachineSetup {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ages::Periods;
+    use crate::ages::{self, AskedAges};
+    use bus::ages::Periods;
 
     #[test]
     fn settings_survive_the_recording_to_the_last_bit() {
@@ -149,7 +150,7 @@ mod tests {
             checkpoint_sha256: String::new(),
             alpha: 0.6,
             seed: u64::MAX.to_string(),
-            ages: AgeLimits::new(&Periods::default(), &machine_guard, None).unwrap(),
+            ages: ages::limits(&Periods::default(), &machine_guard, &AskedAges::default()).unwrap(),
             revision: String::new(),
         };
         assert_eq!(MachineSetup::read(&setup), Ok(machine));

@@ -7,12 +7,12 @@ use rustix::process::{Pid, Signal, kill_process};
 use serde::Serialize;
 
 use crate::RuntimeError;
-use crate::channel::{Bus, DECISION, Inlet, MISSION};
-use crate::clock::{self, SECOND_NS};
-use crate::message::{DecisionRecord, MissionRecord, Stamp, StatusRecord};
-use crate::status::Role;
 use crate::timing::{ControlTiming, Timing};
 use crate::usage::{ProcessUsage, Usage};
+use bus::channel::{Bus, DECISION, Inlet, MISSION};
+use bus::clock::{self, SECOND_NS};
+use bus::message::{DecisionRecord, MissionRecord, Stamp, StatusRecord};
+use bus::status::Role;
 
 /// How soon and how often what died is started again.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use bicycle::{Decision, HoldReason, StopReason};
 use serde::Serialize;
 
-use crate::message::{DecisionRecord, Stamp};
+use bus::message::{DecisionRecord, Stamp};
 
 /// How a time was distributed [ms].
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -182,7 +182,7 @@ fn milliseconds(duration_ns: u64) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::message::CommandRecord;
+    use bus::message::CommandRecord;
 
     #[test]
     fn percentiles_are_samples_by_their_rank() {

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use crate::clock;
+use bus::clock;
 
 /// Ticks of a second in /proc, on every architecture that Linux has today.
 const TICKS_HZ: f64 = 100.0;

@@ -1,7 +1,7 @@
 //! `surefoot goal`, `path`, `pause` and the other words to a run that is under way.
 
+use bus::channel::RunName;
 use clap::Args;
-use runtime::channel::RunName;
 
 use super::values::{self, Goal};
 

@@ -2,10 +2,10 @@
 
 use std::net::SocketAddr;
 
+use bus::ages::Periods;
+use bus::channel::{RunName, THIRD_PARTIES};
+use bus::status::Role;
 use clap::{Args, ValueEnum};
-use runtime::ages::Periods;
-use runtime::channel::{RunName, THIRD_PARTIES};
-use runtime::status::Role;
 
 use super::DriveArguments;
 use super::values;

@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use bus::message::Stamp;
 use formats::open_recording;
-use runtime::message::Stamp;
 use runtime::timing::Timing;
 use runtime::{recorder, replay};
 use serde_json::{Value, json};

@@ -1,23 +1,24 @@
 //! One process of the machine.
 
 use bench::closed_loop::Method;
+use bus::ages::AgeLimits;
+use bus::channel::{Bus, ChannelError};
+use bus::status::Role;
 use navigator::{Belief, Route};
-use runtime::ages::AgeLimits;
-use runtime::channel::{Bus, ChannelError};
+use runtime::ages::{self as age_limits, AskedAges};
 use runtime::control::{self, ControlSetup};
 use runtime::learning::{self, LearningSetup};
 use runtime::mapping::{self, MappingSetup};
 use runtime::mission::{self, Beginning, MissionSetup};
 use runtime::online::Told;
-use runtime::plant::{self, Ending, PlantReport, PlantSetup};
 use runtime::realtime;
 use runtime::recorder::{self, RecorderSetup};
 use runtime::setup::{ClockAnchor, MachineSetup, RecordedSetup};
-use runtime::status::Role;
 use rustix::process::{Signal, set_parent_process_death_signal};
 use scenarios::{EpisodeConfig, Outcome, Task};
 use serde::Serialize;
 use sha2::{Digest, Sha256};
+use simulator::{Ending, PlantReport, PlantSetup};
 use std::ffi::OsString;
 use std::sync::Arc;
 use traversability::CvarLevel;
@@ -39,7 +40,7 @@ pub(super) fn prepare(arguments: &UpArguments) -> Result<Task, UsageError> {
     let task = scene::task(&arguments.drive, &machine.vehicle)?;
     learn::school(arguments, &machine)?;
     ages(arguments, &machine)?;
-    plant::cycles_per_scan(&arguments.periods()).map_err(UsageError::from_input)?;
+    simulator::cycles_per_scan(&arguments.periods()).map_err(UsageError::from_input)?;
     Ok(task)
 }
 
@@ -82,12 +83,16 @@ pub(super) fn join(arguments: &UpArguments) -> Result<Bus, ChannelError> {
 
 /// The machine, with a guard that fits the periods of the run.
 fn machine(arguments: &UpArguments) -> Result<Machine, UsageError> {
-    scene::machine(&arguments.drive, arguments.periods().guard())
+    scene::machine(&arguments.drive, age_limits::guard(&arguments.periods()))
 }
 
 fn ages(arguments: &UpArguments, machine: &Machine) -> Result<AgeLimits, UsageError> {
-    AgeLimits::new(&arguments.periods(), &machine.config.guard, arguments.command_age)
-        .map_err(UsageError::from_input)
+    age_limits::limits(
+        &arguments.periods(),
+        &machine.config.guard,
+        &AskedAges::of_command(arguments.command_age),
+    )
+    .map_err(UsageError::from_input)
 }
 
 pub(super) fn run(arguments: &UpArguments, role: Role) -> anyhow::Result<()> {
@@ -248,7 +253,7 @@ fn run_plant(arguments: &UpArguments, machine: &Machine, ages: AgeLimits) -> any
         periods: arguments.periods(),
         ages,
     };
-    let report = plant::run(&join(arguments)?, setup, &interrupt::interrupted)?;
+    let report = simulator::run(&join(arguments)?, setup, &interrupt::interrupted)?;
     let PlantReport { outcome, time_s, path_length_m, distance_to_goal_m, .. } = report;
     let summary = LiveSummary {
         outcome,

@@ -4,8 +4,8 @@ use bicycle::{Decision, HoldReason, StopReason};
 use mppi::ReferencePath;
 use navigator::{CORNERS_MAX, Destination, Instruction, Target};
 
-use super::record::{DRIVE, EMERGENCY_STOP, MANUAL, PAUSED, UNDER_WAY};
-use crate::message::{MissionRecord, Source, Stamp};
+use bus::message::mission::{DRIVE, EMERGENCY_STOP, MANUAL, PAUSED, UNDER_WAY};
+use bus::message::{MissionRecord, Source, Stamp};
 
 /// The mission that was heard last.
 #[derive(Clone, Debug)]
@@ -78,6 +78,7 @@ fn stop(reason: StopReason) -> Instruction<'static> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use bus::message::mission::NONE;
 
     const AGE_MAX_NS: u64 = 2500;
 
@@ -114,7 +115,7 @@ mod tests {
             (PAUSED, hold(HoldReason::Paused), stop(StopReason::StaleMission)),
             (MANUAL, hold(HoldReason::Manual), stop(StopReason::StaleMission)),
             (EMERGENCY_STOP, stop(StopReason::EmergencyStop), stop(StopReason::EmergencyStop)),
-            (super::super::record::NONE, hold(HoldReason::NoMission), hold(HoldReason::NoMission)),
+            (NONE, hold(HoldReason::NoMission), hold(HoldReason::NoMission)),
         ] {
             said(&mut heard, 1000, MissionRecord { state, ..under_way() });
             assert_eq!(heard.instruction(1000, AGE_MAX_NS), fresh, "state {state}");

@@ -3,19 +3,8 @@
 use navigator::{Mission, Order, OrderRefusal, Route, Said, Stage, Target};
 use traversability::CvarLevel;
 
-use crate::message::{MissionRecord, OrderHeader};
-
-/// Numbers of [`MissionRecord::state`].
-pub(crate) const DRIVE: u64 = 0;
-pub(crate) const NONE: u64 = 1;
-pub(crate) const PAUSED: u64 = 2;
-pub(crate) const MANUAL: u64 = 3;
-pub(crate) const EMERGENCY_STOP: u64 = 4;
-
-/// Numbers of [`MissionRecord::outcome`].
-pub(crate) const UNDER_WAY: u64 = 0;
-pub(crate) const REACHED: u64 = 1;
-pub(crate) const CANCELLED: u64 = 10;
+use bus::message::mission::{CANCELLED, DRIVE, EMERGENCY_STOP, MANUAL, NONE, PAUSED, REACHED, UNDER_WAY};
+use bus::message::{MissionRecord, OrderHeader};
 
 /// Numbers of [`OrderHeader::kind`].
 const GOALS: u64 = 1;
@@ -31,54 +20,37 @@ const TOLERATE: u64 = 9;
 /// Of orders that lead nowhere.
 const NO_POINTS: &[[f64; 2]] = &[];
 
-impl MissionRecord {
-    /// What a mission is at. Its time, and what became of orders, are left out.
-    pub fn of(mission: &Mission) -> Self {
-        let (leg, n_legs) = mission.progress();
-        let record = Self {
-            outcome: match mission.stage() {
-                Stage::Idle | Stage::Driving | Stage::Paused => UNDER_WAY,
-                Stage::Reached => REACHED,
-                Stage::Cancelled => CANCELLED,
-            },
-            state: state_of(mission),
-            number: mission.number(),
-            leg: leg as u64,
-            n_legs: n_legs as u64,
-            alpha: mission.level().map_or(0.0, CvarLevel::get),
-            n_refused: mission.refused().values().sum(),
-            ..Self::default()
-        };
-        mission.target().map_or(record, |target| record.with_target(&target))
-    }
+/// What a mission is at. Its time, and what became of orders, are left out.
+pub fn record_of(mission: &Mission) -> MissionRecord {
+    let (leg, n_legs) = mission.progress();
+    let record = MissionRecord {
+        outcome: match mission.stage() {
+            Stage::Idle | Stage::Driving | Stage::Paused => UNDER_WAY,
+            Stage::Reached => REACHED,
+            Stage::Cancelled => CANCELLED,
+        },
+        state: state_of(mission),
+        number: mission.number(),
+        leg: leg as u64,
+        n_legs: n_legs as u64,
+        alpha: mission.level().map_or(0.0, CvarLevel::get),
+        n_refused: mission.refused().values().sum(),
+        ..MissionRecord::default()
+    };
+    mission.target().map_or(record, |target| with_target(record, &target))
+}
 
-    /// Where it leads, if it leads anywhere.
-    pub fn destination_m(&self) -> Option<[f64; 2]> {
-        (self.n_legs > 0 || self.state == DRIVE).then_some(self.goal_m)
-    }
-
-    /// The share of worst outcomes to plan for, if anybody has said so.
-    pub fn level(&self) -> Option<CvarLevel> {
-        CvarLevel::new(self.alpha).ok()
-    }
-
-    /// Whether the vehicle is to drive.
-    pub fn is_driving(&self) -> bool {
-        self.state == DRIVE && self.outcome == UNDER_WAY
-    }
-
-    fn with_target(mut self, target: &Target<'_>) -> Self {
-        let end = target.end();
-        (self.goal_m, self.tolerance_m) = (end.goal_m, end.tolerance_m);
-        if let Target::Path(path) = target {
-            self.path_speed_mps = path.speed_mps;
-            self.n_corners = path.points_m.len() as u64;
-            for (place, [x_m, y_m]) in path.points_m.iter().enumerate() {
-                (self.corner_x_m[place], self.corner_y_m[place]) = (*x_m, *y_m);
-            }
+fn with_target(mut record: MissionRecord, target: &Target<'_>) -> MissionRecord {
+    let end = target.end();
+    (record.goal_m, record.tolerance_m) = (end.goal_m, end.tolerance_m);
+    if let Target::Path(path) = target {
+        record.path_speed_mps = path.speed_mps;
+        record.n_corners = path.points_m.len() as u64;
+        for (place, [x_m, y_m]) in path.points_m.iter().enumerate() {
+            (record.corner_x_m[place], record.corner_y_m[place]) = (*x_m, *y_m);
         }
-        self
     }
+    record
 }
 
 fn state_of(mission: &Mission) -> u64 {
@@ -91,54 +63,52 @@ fn state_of(mission: &Mission) -> u64 {
     }
 }
 
-impl OrderHeader {
-    /// An order as its message: header, without stamp, and points.
-    pub fn of(order: &Order) -> (Self, &[[f64; 2]]) {
-        let kind = |kind| (Self { kind, ..Self::default() }, NO_POINTS);
-        match order {
-            Order::Drive(route) => {
-                let speed_mps = route.path_speed_mps();
-                let header = Self {
-                    kind: if speed_mps.is_some() { PATH } else { GOALS },
-                    tolerance_m: route.tolerance_m(),
-                    speed_mps: speed_mps.unwrap_or(0.0),
-                    ..Self::default()
-                };
-                (header, route.points_m())
-            }
-            Order::Pause => kind(PAUSE),
-            Order::Resume => kind(RESUME),
-            Order::Cancel => kind(CANCEL),
-            Order::TakeOver => kind(TAKE_OVER),
-            Order::EmergencyStop => kind(STOP),
-            Order::Reset => kind(RESET),
-            Order::Tolerate(level) => (Self { alpha: level.get(), ..kind(TOLERATE).0 }, NO_POINTS),
+/// An order as its message: header, without stamp, and points.
+pub fn header_of(order: &Order) -> (OrderHeader, &[[f64; 2]]) {
+    let kind = |kind| (OrderHeader { kind, ..OrderHeader::default() }, NO_POINTS);
+    match order {
+        Order::Drive(route) => {
+            let speed_mps = route.path_speed_mps();
+            let header = OrderHeader {
+                kind: if speed_mps.is_some() { PATH } else { GOALS },
+                tolerance_m: route.tolerance_m(),
+                speed_mps: speed_mps.unwrap_or(0.0),
+                ..OrderHeader::default()
+            };
+            (header, route.points_m())
         }
+        Order::Pause => kind(PAUSE),
+        Order::Resume => kind(RESUME),
+        Order::Cancel => kind(CANCEL),
+        Order::TakeOver => kind(TAKE_OVER),
+        Order::EmergencyStop => kind(STOP),
+        Order::Reset => kind(RESET),
+        Order::Tolerate(level) => (OrderHeader { alpha: level.get(), ..kind(TOLERATE).0 }, NO_POINTS),
     }
+}
 
-    /// The order that a message tells of.
-    pub fn order(&self, points_m: &[[f64; 2]]) -> Result<Order, OrderRefusal> {
-        let malformed = |_| OrderRefusal::Malformed;
-        let Self { tolerance_m, speed_mps, .. } = *self;
-        Ok(match self.kind {
-            GOALS => Order::Drive(Route::goals(points_m.to_vec(), tolerance_m).map_err(malformed)?),
-            PATH => Order::Drive(Route::path(points_m.to_vec(), speed_mps, tolerance_m).map_err(malformed)?),
-            PAUSE => Order::Pause,
-            RESUME => Order::Resume,
-            CANCEL => Order::Cancel,
-            TAKE_OVER => Order::TakeOver,
-            STOP => Order::EmergencyStop,
-            RESET => Order::Reset,
-            TOLERATE => Order::Tolerate(CvarLevel::new(self.alpha).map_err(|_| OrderRefusal::Malformed)?),
-            _ => return Err(OrderRefusal::Malformed),
-        })
-    }
+/// The order that a message tells of.
+pub fn order_of(header: &OrderHeader, points_m: &[[f64; 2]]) -> Result<Order, OrderRefusal> {
+    let malformed = |_| OrderRefusal::Malformed;
+    let OrderHeader { tolerance_m, speed_mps, .. } = *header;
+    Ok(match header.kind {
+        GOALS => Order::Drive(Route::goals(points_m.to_vec(), tolerance_m).map_err(malformed)?),
+        PATH => Order::Drive(Route::path(points_m.to_vec(), speed_mps, tolerance_m).map_err(malformed)?),
+        PAUSE => Order::Pause,
+        RESUME => Order::Resume,
+        CANCEL => Order::Cancel,
+        TAKE_OVER => Order::TakeOver,
+        STOP => Order::EmergencyStop,
+        RESET => Order::Reset,
+        TOLERATE => Order::Tolerate(CvarLevel::new(header.alpha).map_err(|_| OrderRefusal::Malformed)?),
+        _ => return Err(OrderRefusal::Malformed),
+    })
+}
 
-    /// Who said it, and when.
-    pub fn said(&self) -> Said {
-        let stamp = &self.stamp;
-        Said { at_ns: stamp.valid_at_ns, sender_ns: stamp.epoch_ns, sequence: stamp.sequence }
-    }
+/// Who said it, and when.
+pub fn said_by(header: &OrderHeader) -> Said {
+    let stamp = &header.stamp;
+    Said { at_ns: stamp.valid_at_ns, sender_ns: stamp.epoch_ns, sequence: stamp.sequence }
 }
 
 /// What became of an order, as [`MissionRecord::verdict`].
@@ -180,17 +150,17 @@ mod tests {
     #[test]
     fn every_order_survives_the_way_and_numbers_that_are_none_are_refused() {
         for order in orders() {
-            let (header, points_m) = OrderHeader::of(&order);
-            assert_eq!(header.order(points_m), Ok(order));
+            let (header, points_m) = header_of(&order);
+            assert_eq!(order_of(&header, points_m), Ok(order));
         }
         for kind in [0, 10, u64::MAX] {
             let header = OrderHeader { kind, ..OrderHeader::default() };
-            assert_eq!(header.order(&[]), Err(OrderRefusal::Malformed), "{kind}");
+            assert_eq!(order_of(&header, &[]), Err(OrderRefusal::Malformed), "{kind}");
         }
         let nowhere = OrderHeader { kind: GOALS, tolerance_m: 1.0, ..OrderHeader::default() };
-        assert_eq!(nowhere.order(&[]), Err(OrderRefusal::Malformed));
+        assert_eq!(order_of(&nowhere, &[]), Err(OrderRefusal::Malformed));
         let reckless = OrderHeader { kind: TOLERATE, alpha: 0.0, ..OrderHeader::default() };
-        assert_eq!(reckless.order(&[]), Err(OrderRefusal::Malformed));
+        assert_eq!(order_of(&reckless, &[]), Err(OrderRefusal::Malformed));
     }
 
     #[test]

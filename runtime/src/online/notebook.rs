@@ -6,7 +6,7 @@ use bicycle::{Decision, DriveRow, Odometry};
 use navigator::Jump;
 use terrain::{GridMap, SurfaceCell};
 
-use crate::message::drive_row;
+use bus::message::drive_row;
 
 /// Length of a stretch [s]: short enough for the ground behind the vehicle to be on the map still.
 const STRETCH_S: f64 = 6.0;

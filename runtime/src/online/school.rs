@@ -1,5 +1,6 @@
 //! The part of the learning process that listens to the drive and hears from the thread that learns.
 
+use crate::intake::shift_of;
 use std::sync::Arc;
 
 use bicycle::SensorModel;
@@ -10,10 +11,10 @@ use super::background::{Background, Judge, News};
 use super::learner::{Learner, LearnerSetup, Round};
 use super::notebook::Notebook;
 use crate::RuntimeError;
-use crate::channel::{Bus, CHECKPOINT, COMMAND, Inlet, ODOMETRY, Outlet};
-use crate::clock::{self, SECOND_NS};
-use crate::message::{CheckpointHeader, CommandRecord, OdometryRecord, Stamp, SurfaceHeader};
-use crate::payload;
+use bus::channel::{Bus, CHECKPOINT, COMMAND, Inlet, ODOMETRY, Outlet};
+use bus::clock::{self, SECOND_NS};
+use bus::message::{CheckpointHeader, CommandRecord, OdometryRecord, Stamp, SurfaceHeader};
+use bus::payload;
 
 /// Time between two tellings of the networks in use, so that a recorder that came late has them too [ns].
 const REPEAT_NS: u64 = 5 * SECOND_NS;
@@ -92,14 +93,14 @@ impl School {
 
     /// Looks at a map of the ground that was judged: when enough has been noted, it is handed on with that map.
     pub fn note_surface(&mut self, header: &SurfaceHeader, payload: &[[f32; 8]]) {
-        let shift = Some((header.stamp.epoch_ns, header.shift()));
+        let shift = Some((header.stamp.epoch_ns, shift_of(header)));
         if std::mem::replace(&mut self.shift, shift) != shift {
             self.notebook.break_off();
         }
         if self.notebook.is_full()
             && let Some(surface) = payload::surface_map(header, payload)
         {
-            self.background.offer(self.notebook.take(surface, header.shift()));
+            self.background.offer(self.notebook.take(surface, shift_of(header)));
         }
     }
 

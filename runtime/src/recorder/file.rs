@@ -8,8 +8,8 @@ use formats::{DriveRecorder, RecordError};
 
 use super::RecorderSetup;
 use crate::RuntimeError;
-use crate::clock::{self, SECOND_NS};
 use crate::setup::ClockAnchor;
+use bus::clock::{self, SECOND_NS};
 
 /// Longest stretch that a crash of the recorder may cost, less what flushing itself takes [ns].
 const FLUSH_NS: u64 = SECOND_NS * 4 / 10;

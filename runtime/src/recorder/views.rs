@@ -4,11 +4,11 @@ use bicycle::{Column, Decision, DriveRow};
 use formats::{DriveRecorder, RecordError};
 use terrain::Pose;
 
-use crate::clock::SECOND_NS;
-use crate::message::{
+use bus::clock::SECOND_NS;
+use bus::message::{
     CommandRecord, OdometryRecord, PointRecord, RiskHeader, ScanHeader, Stamp, SurfaceHeader, drive_row,
 };
-use crate::payload;
+use bus::payload;
 
 /// Time between two maps, and between two scans, that are shown [ns].
 const MAP_NS: u64 = SECOND_NS;

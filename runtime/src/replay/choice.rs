@@ -5,9 +5,9 @@ use std::ops::Bound;
 
 use super::records::Key;
 use crate::choice::is_learned;
-use crate::clock::SECOND_NS;
 use crate::mapping::{LEARNED, PHYSICS};
-use crate::message::{DecisionRecord, RiskHeader, Source};
+use bus::clock::SECOND_NS;
+use bus::message::{DecisionRecord, RiskHeader, Source};
 
 /// How long a map may be on its way: its sender may be interrupted between stamping and handing it over [ns].
 const ON_THE_WAY_NS: u64 = SECOND_NS / 4;
@@ -102,7 +102,7 @@ fn told(key: Option<Key>) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::message::Stamp;
+    use bus::message::Stamp;
 
     const MILLISECOND_NS: u64 = 1_000_000;
     const BEGAN_NS: u64 = 10 * SECOND_NS;

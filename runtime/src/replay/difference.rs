@@ -1,6 +1,6 @@
 //! Where two tellings of the same localisation differ.
 
-use crate::message::SurfaceHeader;
+use bus::message::SurfaceHeader;
 
 /// A field, its bits, and how it is told.
 type Field = (&'static str, Vec<u64>, String);

@@ -11,10 +11,10 @@ use super::records::{Key, Records};
 use super::survey::{Localisation, Survey};
 use super::{Knowledge, ReplayError};
 use crate::mapping::{LEARNED, PHYSICS};
-use crate::message::{DecisionRecord, RiskHeader, SurfaceHeader};
-use crate::payload::{cell_numbers, content_hash};
 use crate::risk_maker::RiskMaker;
 use crate::setup::MachineSetup;
+use bus::message::{DecisionRecord, RiskHeader, SurfaceHeader};
+use bus::payload::{cell_numbers, content_hash};
 
 /// Risk maps of an author that are kept: control uses the newest, or the one before.
 const KEPT: usize = 4;

@@ -8,15 +8,15 @@ use std::sync::Arc;
 use bytemuck::AnyBitPattern;
 use evidential::Checkpoint;
 
-use crate::channel::Header;
-use crate::message::{
-    CheckpointHeader, DecisionRecord, LAYOUT_VERSION, MissionRecord, OdometryRecord, PointRecord, RiskHeader,
-    ScanHeader, Source, Stamp, StuckRecord, SurfaceHeader,
-};
 use crate::mission::Heard;
 use crate::online::hash_of;
 use crate::recorder::topic;
 use crate::setup::RecordedSetup;
+use bus::channel::Header;
+use bus::message::{
+    CheckpointHeader, DecisionRecord, LAYOUT_VERSION, MissionRecord, OdometryRecord, PointRecord, RiskHeader,
+    ScanHeader, Source, Stamp, StuckRecord, SurfaceHeader,
+};
 
 /// A message, by its publisher's life and its number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -272,7 +272,8 @@ fn split<H: Header, T: AnyBitPattern>(bytes: &[u8]) -> Option<(H, Vec<T>)> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ages::{AgeLimits, Periods};
+    use crate::ages::{self, AskedAges};
+    use bus::ages::Periods;
     use navigator::GuardConfig;
 
     fn message(stamp: &Stamp, record: &OdometryRecord) -> Vec<u8> {
@@ -318,7 +319,7 @@ mod tests {
             vehicle_toml: String::new(),
             model_toml: String::new(),
             config_toml: String::new(),
-            ages: AgeLimits::new(&Periods::default(), &GuardConfig::default(), None).unwrap(),
+            ages: ages::limits(&Periods::default(), &GuardConfig::default(), &AskedAges::default()).unwrap(),
             method: "physics".to_owned(),
             checkpoint_sha256: String::new(),
             alpha: 0.6,

@@ -1,6 +1,7 @@
 //! One life of mapping, made again: the recorded odometry is shown to a surveyor in its order, and the jumps and places
 //! that come of it are held against those that the maps tell of.
 
+use crate::intake::jump_of;
 use std::ops::Bound;
 
 use bicycle::{Odometry, SensorModel};
@@ -10,8 +11,8 @@ use super::difference;
 use super::records::{Key, Records};
 use crate::intake::{Intake, hash_of};
 use crate::mapping::JUMPED;
-use crate::message::{OdometryRecord, Stamp, SurfaceHeader};
 use crate::setup::MachineSetup;
+use bus::message::{OdometryRecord, Stamp, SurfaceHeader};
 
 /// What became of the localisation that maps of the ground tell of.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -96,7 +97,7 @@ impl Survey {
             let place = known_jump.zip(last).map(|(jump, (stamp, record))| {
                 (record.odometry(stamp.valid_at_ns), jump.unwrap_or(Jump::NONE))
             });
-            let (there, jump) = place.unwrap_or((told, header.jump()));
+            let (there, jump) = place.unwrap_or((told, jump_of(header)));
             self.surveyor.follow_jump(&there, &jump)?;
             self.judge(header, place.ok_or(None), found);
             return Ok(Ok(()));

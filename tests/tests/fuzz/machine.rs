@@ -3,16 +3,17 @@
 use std::sync::LazyLock;
 
 use bicycle::{Command, Decision, Model, Odometry};
+use bus::message::{
+    CommandRecord, DecisionRecord, Grid, LAYOUT_VERSION, OdometryRecord, PointRecord, RiskHeader, ScanHeader,
+    Source, Stamp, SurfaceHeader,
+};
+use bus::payload::{cell_numbers, content_hash};
 use navigator::{
     Assessor, Belief, Chart, Config, Destination, Instruction, NavigatorError, Pilot, Surface, Surveyor,
     Target,
 };
+use runtime::control::chart_of;
 use runtime::mapping::{FUSED, PHYSICS};
-use runtime::message::{
-    CommandRecord, DecisionRecord, Grid, LAYOUT_VERSION, OdometryRecord, PointRecord, RiskHeader, ScanHeader,
-    Source, Stamp, SurfaceHeader,
-};
-use runtime::payload::{cell_numbers, content_hash, risk_views};
 use runtime::risk_maker::RiskMaker;
 use runtime::setup::MachineSetup;
 use terrain::{RangePoint, Scan, TerrainClass};
@@ -118,9 +119,7 @@ impl Drive {
 
     /// What the controller drives on.
     pub fn chart(&self) -> Chart<'_> {
-        let header = &self.risk.0;
-        let (map, time_to_goal) = risk_views(header, &self.risk.1).unwrap();
-        Chart { map, time_to_goal, goal_m: header.goal_m, odometry_at_ns: header.odometry_at_ns }
+        chart_of(&self.risk.0, &self.risk.1).unwrap()
     }
 
     /// A risk map as its maker writes it into a message.

@@ -3,24 +3,26 @@
 
 use std::sync::LazyLock;
 
+use bus::ages::Periods;
+use bus::channel::{self, Channel, Element, Header};
+use bus::layout::Scalar;
+use bus::message::{
+    CheckpointHeader, CommandRecord, DecisionRecord, Grid, MissionRecord, OdometryRecord, OrderHeader,
+    RiskHeader, ScanHeader, StatusRecord, StuckRecord, SurfaceHeader, layouts,
+};
+use bus::payload::{RiskParts, surface_map};
+use bus::status::Role;
+use bus::watchdog::Watchdog;
 use bytemuck::{AnyBitPattern, NoUninit};
 use evidential::Checkpoint;
 use formats::DriveTopics;
 use foxglove::Context;
 use navigator::{Chart, Guard, GuardConfig, Instruction, Mission, Order, Route, Said, Surface, Surveyor};
 use rand::RngExt;
-use runtime::ages::{AgeLimits, Periods};
-use runtime::channel::{self, Channel, Element, Header};
-use runtime::layout::Scalar;
-use runtime::message::{
-    CheckpointHeader, CommandRecord, DecisionRecord, Grid, MissionRecord, OdometryRecord, OrderHeader,
-    RiskHeader, ScanHeader, StatusRecord, StuckRecord, SurfaceHeader, layouts,
-};
-use runtime::mission::Heard;
-use runtime::payload::{RiskParts, risk_views, surface_map};
-use runtime::status::Role;
+use runtime::ages::{self, AskedAges};
+use runtime::control::chart_of;
+use runtime::mission::{Heard, order_of, record_of, said_by};
 use runtime::timing::Timing;
-use runtime::watchdog::Watchdog;
 use terrain::Pose;
 
 use crate::harness::{Fate, Reader, Rng};
@@ -242,14 +244,12 @@ pub fn risk(rng: &mut Rng) -> Vec<u8> {
 pub fn read_risk() -> Reader {
     let topics = DriveTopics::new(&Context::new());
     reader(channel::RISK, move |header: &RiskHeader, elements| {
-        let (map, time_to_goal) = risk_views(header, elements).unwrap();
-        topics.risk(header.stamp.valid_at_ns, &map, 0.5);
+        let chart = chart_of(header, elements).unwrap();
+        topics.risk(header.stamp.valid_at_ns, &chart.map, 0.5);
         let mut pilot = pilot();
         for k in 0..3 {
             pilot.admit(&Drive::odometry(k));
             pilot.note_scan(header.stamp.valid_at_ns);
-            let chart =
-                Chart { map, time_to_goal, goal_m: header.goal_m, odometry_at_ns: header.odometry_at_ns };
             pilot.decide(at_ns(k), Some(chart), &to_goal());
         }
     })
@@ -273,7 +273,7 @@ pub fn command(rng: &mut Rng) -> Vec<u8> {
 
 pub fn read_command() -> Reader {
     let limits = MACHINE.vehicle.limits;
-    let ages = AgeLimits::new(&Periods::default(), &GuardConfig::default(), None).unwrap();
+    let ages = ages::limits(&Periods::default(), &GuardConfig::default(), &AskedAges::default()).unwrap();
     reader(channel::COMMAND, move |stamp, records: &[CommandRecord]| {
         let decision = records[0].decision().unwrap();
         let mut watchdog = Watchdog::new(limits, ages);
@@ -336,11 +336,10 @@ pub fn read_mission() -> Reader {
         let (header, cells) = drive.surface();
         maker.update(header, cells).unwrap().unwrap();
         let (header, elements) = Drive::risk_of(&mut maker).unwrap();
-        let Some((map, time_to_goal)) = risk_views(&header, &elements) else { return };
+        let Some(chart) = chart_of(&header, &elements) else { return };
         let (mut pilot, mut heard) = (pilot(), Heard::default());
         pilot.admit(&Drive::odometry(1));
         heard.note(stamp, &records[0]);
-        let chart = Chart { map, time_to_goal, goal_m: header.goal_m, odometry_at_ns: header.odometry_at_ns };
         // To drive and to stand are both told in words.
         assert!(!records[0].to_string().is_empty());
         pilot.decide(at_ns(1), Some(chart), &heard.instruction(at_ns(1), u64::MAX));
@@ -365,14 +364,14 @@ pub fn order(rng: &mut Rng) -> Vec<u8> {
 /// After a mission that is under way, whatever comes next, the vehicle stops in an emergency.
 pub fn read_order() -> Reader {
     reader(channel::ORDER, move |header: &OrderHeader, points_m| {
-        let Ok(order) = header.order(points_m) else { return };
+        let Ok(order) = order_of(header, points_m) else { return };
         let mut mission = Mission::new(u64::MAX);
         let said = |sequence| Said { at_ns: at_ns(1), sender_ns: 1, sequence };
         let first = Route::goals(vec![goal().goal_m], 0.5).unwrap();
         mission.order(Order::Drive(first), said(1), at_ns(1)).unwrap();
-        mission.order(order, header.said(), at_ns(2)).ok();
+        mission.order(order, said_by(header), at_ns(2)).ok();
         mission.advance(&Drive::odometry(1));
-        assert!(!MissionRecord::of(&mission).to_string().is_empty());
+        assert!(!record_of(&mission).to_string().is_empty());
         mission.order(Order::EmergencyStop, said(2), u64::MAX).ok();
         assert!(!matches!(mission.instruction(), Instruction::Drive(_)));
     })

@@ -1,7 +1,7 @@
 //! Ways to break a document: values that nobody expects where values stand, and whatever transmission does to bytes.
 
+use bus::layout::Scalar;
 use rand::RngExt;
-use runtime::layout::Scalar;
 
 use crate::harness::Rng;
 

@@ -4,9 +4,9 @@ use std::sync::LazyLock;
 
 use bicycle::Geometry;
 use bicycle::lanes::Instructions;
+use bus::layout::Scalar;
 use evidential::{Architecture, Checkpoint, Dataset, Example, Method, Predictor, Tensor, shipped};
 use rand::RngExt;
-use runtime::layout::Scalar;
 use sha2::{Digest, Sha256};
 use traversability::N_BINS;
 

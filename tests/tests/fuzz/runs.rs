@@ -3,12 +3,13 @@
 use std::path::PathBuf;
 use std::sync::LazyLock;
 
+use bus::ages::Periods;
+use bus::layout::Scalar;
+use bus::message::{CheckpointHeader, MissionRecord, OdometryRecord, StuckRecord};
 use formats::ConfigText;
 use navigator::{Assessor, Belief, Pilot, RiskMapConfig, Surface, Surveyor};
 use rand::RngExt;
-use runtime::ages::{AgeLimits, Periods};
-use runtime::layout::Scalar;
-use runtime::message::{CheckpointHeader, MissionRecord, OdometryRecord, StuckRecord};
+use runtime::ages::{self, AskedAges};
 use runtime::recorder::topic;
 use runtime::replay::{self, Knowledge};
 use runtime::setup::{ClockAnchor, RecordedSetup};
@@ -27,7 +28,7 @@ fn setup() -> RecordedSetup {
     RecordedSetup {
         format: RecordedSetup::FORMAT,
         clock: ClockAnchor { monotonic_ns: "1".to_owned(), utc_ns: "2".to_owned() },
-        ages: AgeLimits::new(&Periods::default(), &MACHINE.config.guard, None).unwrap(),
+        ages: ages::limits(&Periods::default(), &MACHINE.config.guard, &AskedAges::default()).unwrap(),
         vehicle_name: MACHINE.vehicle.name.clone(),
         vehicle_toml,
         model_toml,

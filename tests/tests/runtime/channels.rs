@@ -1,11 +1,11 @@
 //! What a channel promises, within one process: no copy, gaps counted, one publisher.
 
 use bicycle::Model;
+use bus::channel::{Bus, Inlet, MISSION, ODOMETRY, RISK};
+use bus::message::{Grid, MissionRecord, OdometryRecord, RiskHeader, Stamp, SurfaceHeader};
+use bus::payload::{RiskParts, cell_numbers, risk_views};
 use navigator::{Assessor, Belief};
-use runtime::channel::{Bus, Inlet, MISSION, ODOMETRY, RISK};
 use runtime::mapping::{LEARNED, send_risk};
-use runtime::message::{Grid, MissionRecord, OdometryRecord, RiskHeader, Stamp, SurfaceHeader};
-use runtime::payload::{RiskParts, cell_numbers, risk_views};
 use runtime::risk_maker::RiskMaker;
 use terrain::{GridGeometry, SurfaceCell, TerrainClass};
 use traversability::{CvarLevel, Risk, RiskMap};
@@ -74,12 +74,12 @@ fn a_risk_map_is_sent_and_read_without_memory_of_its_own() {
         allocation_counter::measure(|| {
             send_risk(&mut maker, outlet, 1).unwrap();
             let message = inlet.newest().unwrap();
-            let (map, time_to_goal) = risk_views(message.header(), message.payload()).unwrap();
+            let (map, seconds) = risk_views(message.header(), message.payload()).unwrap();
             let place = message.payload().as_ptr_range();
             assert!(
                 place.contains(&map.risks.as_ptr().cast()) && place.contains(&map.ground.as_ptr().cast())
             );
-            assert!(place.contains(&time_to_goal.seconds.as_ptr().cast()));
+            assert!(place.contains(&seconds.as_ptr().cast()));
             n_bytes = size_of_val(message.payload());
         })
     });

@@ -4,14 +4,15 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 
+use bicycle::{Applied, AppliedBy};
 use bicycle::{Command, Decision, Odometry};
-use navigator::{Applied, AppliedBy, Jump};
-use runtime::channel::{Bus, COMMAND, Inlet, MISSION, ODOMETRY, Outlet, RunName, SCAN};
-use runtime::clock::{nanoseconds, now_ns, sleep_until};
-use runtime::message::{CommandRecord, MissionRecord, OdometryRecord, PointRecord, ScanHeader, Stamp};
-use runtime::plant::POINTS_MAX;
-use runtime::watchdog::Watchdog;
+use bus::channel::{Bus, COMMAND, Inlet, MISSION, ODOMETRY, Outlet, RunName, SCAN};
+use bus::clock::{nanoseconds, now_ns, sleep_until};
+use bus::message::{CommandRecord, MissionRecord, OdometryRecord, PointRecord, ScanHeader, Stamp};
+use bus::watchdog::Watchdog;
+use navigator::Jump;
 use scenarios::Episode;
+use simulator::POINTS_MAX;
 use terrain::Scan;
 
 use crate::fixture::{ages, episode_config, machine, task};

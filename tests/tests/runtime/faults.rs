@@ -1,10 +1,10 @@
 //! Processes that are killed, stopped and joined by others from outside, and what becomes of the drive.
 
 use bicycle::{Decision, StopReason};
-use runtime::channel::{Bus, COMMAND, ChannelError};
-use runtime::message::DecisionRecord;
+use bus::channel::{Bus, COMMAND, ChannelError};
+use bus::message::DecisionRecord;
+use bus::status::Role;
 use runtime::replay::{self, Knowledge};
-use runtime::status::Role;
 use rustix::process::Signal;
 
 use crate::fixture::Run;

@@ -6,19 +6,20 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::{Duration, Instant};
 
 use bicycle::{Model, Vehicle};
+use bus::ages::{AgeLimits, Periods};
+use bus::channel::{Bus, RunName};
+use bus::status::Role;
 use navigator::{Belief, Config, Route};
-use runtime::ages::{AgeLimits, Periods};
-use runtime::channel::{Bus, RunName};
+use runtime::ages::{self, AskedAges};
 use runtime::control::{self, ControlSetup};
 use runtime::learning::{self, LearningSetup};
 use runtime::mapping::{self, MappingSetup};
 use runtime::mission::{self, Beginning, MissionSetup};
-use runtime::plant::{self, Ending, PlantSetup};
 use runtime::recorder::{self, RecorderSetup};
 use runtime::setup::{ClockAnchor, MachineSetup, RecordedSetup};
-use runtime::status::Role;
 use rustix::process::{Pid, Signal, kill_process, set_parent_process_death_signal};
 use scenarios::{EpisodeConfig, RockFieldConfig, Task};
+use simulator::{self, Ending, PlantSetup};
 use traversability::CvarLevel;
 
 const ROLE: &str = "SUREFOOT_TEST_ROLE";
@@ -61,7 +62,7 @@ pub fn machine() -> (Vehicle, Config) {
 
 /// Limits on ages as they are with the usual periods.
 pub fn ages() -> AgeLimits {
-    AgeLimits::new(&Periods::default(), &machine().1.guard, None).unwrap()
+    ages::limits(&Periods::default(), &machine().1.guard, &AskedAges::default()).unwrap()
 }
 
 /// When a recorder under test begins a new file or ends, and how large its disk is.
@@ -243,7 +244,7 @@ fn be(role: Role, run: &RunName, folder: &Path, is_over: &dyn Fn() -> bool) {
     let bus = Bus::join(run).unwrap();
     match role {
         Role::Plant => {
-            plant::run(&bus, plant_setup(&vehicle), is_over).unwrap();
+            simulator::run(&bus, plant_setup(&vehicle), is_over).unwrap();
         }
         Role::Mapping => {
             let setup = MappingSetup { vehicle: &vehicle, config, level, model: &model, ages: ages() };

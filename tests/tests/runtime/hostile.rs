@@ -1,23 +1,21 @@
 //! Publishers that mean harm or are broken: what they send is refused by its reason, and a good one is heard.
 
+use bus::channel::{Bus, COMMAND, Channel, Counts, Inlet, ODOMETRY, RISK, Refusal, RunName, SURFACE};
+use bus::clock::now_ns;
+use bus::message::{CommandRecord, Grid, LAYOUT_VERSION, OdometryRecord, RiskHeader, Stamp, SurfaceHeader};
 use iceoryx2::config::Config;
 use iceoryx2::node::NodeBuilder;
 use iceoryx2::port::publisher::Publisher;
 use iceoryx2::prelude::{FileName, Path, SemanticString, SignalHandlingMode, ipc};
-use runtime::channel::{Bus, COMMAND, Channel, Counts, Inlet, ODOMETRY, RISK, Refusal, RunName, SURFACE};
-use runtime::clock::now_ns;
-use runtime::message::{
-    CommandRecord, Grid, LAYOUT_VERSION, OdometryRecord, RiskHeader, Stamp, SurfaceHeader,
-};
 
 use crate::fixture::Run;
 
 /// A publisher that fills in headers as it likes; it keeps its node alive.
-struct Hostile<H: runtime::channel::Header, T: runtime::channel::Element> {
+struct Hostile<H: bus::channel::Header, T: bus::channel::Element> {
     publisher: Publisher<ipc::Service, [T], H>,
 }
 
-impl<H: runtime::channel::Header, T: runtime::channel::Element> Hostile<H, T> {
+impl<H: bus::channel::Header, T: bus::channel::Element> Hostile<H, T> {
     fn new(run: &RunName, channel: &Channel<H, T>, n_max: usize) -> Self {
         let mut config = Config::default();
         config.global.prefix = FileName::new(run.prefix().as_bytes()).unwrap();
@@ -56,7 +54,7 @@ fn stamp(sequence: u64) -> Stamp {
     }
 }
 
-fn polled<H: runtime::channel::Header, T: runtime::channel::Element>(inlet: &mut Inlet<H, T>) -> Counts {
+fn polled<H: bus::channel::Header, T: bus::channel::Element>(inlet: &mut Inlet<H, T>) -> Counts {
     inlet.poll(|_, _| ());
     *inlet.counts()
 }

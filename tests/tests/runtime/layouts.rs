@@ -4,9 +4,9 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use bicycle::Decision;
-use runtime::layout::{c_header, python_module};
-use runtime::message::{CommandRecord, LAYOUT_VERSION, layouts};
-use runtime::watchdog::Watchdog;
+use bus::layout::{c_header, python_module};
+use bus::message::{CommandRecord, LAYOUT_VERSION, layouts};
+use bus::watchdog::Watchdog;
 
 use crate::fixture::{ages, machine};
 

@@ -2,11 +2,11 @@
 
 use std::sync::LazyLock;
 
+use bus::message::{OdometryRecord, SurfaceHeader};
+use bus::status::Role;
 use navigator::Belief;
 use runtime::mapping::{FUSED, JUMPED};
-use runtime::message::{OdometryRecord, SurfaceHeader};
 use runtime::replay::{self, Key, Knowledge, Records, ReplayReport};
-use runtime::status::Role;
 
 use crate::driver::{Driver, Misbehaviour};
 use crate::fixture::{Run, eventually};

@@ -3,13 +3,12 @@
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use bicycle::{Decision, StopReason};
+use bus::channel::{Bus, ODOMETRY, SURFACE};
+use bus::clock::now_ns;
+use bus::message::{Stamp, StatusRecord, SurfaceHeader};
+use bus::payload::numbers_cell;
 use navigator::{Belief, Jump};
-use runtime::channel::{Bus, ODOMETRY, SURFACE};
-use runtime::clock::now_ns;
 use runtime::mapping::JUMPED;
-use runtime::message::{Stamp, StatusRecord, SurfaceHeader};
-use runtime::payload::numbers_cell;
-use runtime::plant;
 use runtime::replay::{self, Knowledge};
 use rustix::process::Signal;
 use terrain::Cell;
@@ -17,7 +16,7 @@ use terrain::Cell;
 use crate::driver::{Driver, Misbehaviour};
 use crate::fixture::{Run, eventually, machine, plant_setup};
 use crate::witness::Witness;
-use runtime::status::Role;
+use bus::status::Role;
 
 const PLANNERS: [Role; 3] = [Role::Mapping, Role::Learning, Role::Control];
 
@@ -69,7 +68,7 @@ fn measurements_that_cannot_be_trusted_stop_the_vehicle_until_they_can() {
     });
 }
 
-fn command_of(record: &runtime::message::DecisionRecord) -> Option<Decision> {
+fn command_of(record: &bus::message::DecisionRecord) -> Option<Decision> {
     record.command.decision()
 }
 
@@ -130,7 +129,7 @@ fn a_localisation_that_jumps_moves_the_map_and_not_the_vehicle() {
         [Role::Mapping, Role::Learning].into_iter().for_each(|role| run.signal(role, Signal::STOP));
         offset_m = offset_m.map(|m| -m);
         // Farther than the map reaches: where the vehicle is said to be now, the old map holds nothing.
-        let at_ns = runtime::clock::now_ns();
+        let at_ns = bus::clock::now_ns();
         driver.behave(Misbehaviour {
             offset_m: offset_m.map(|m| 3.0 * m),
             turn_rad,
@@ -143,7 +142,7 @@ fn a_localisation_that_jumps_moves_the_map_and_not_the_vehicle() {
         [Role::Mapping, Role::Learning].into_iter().for_each(|role| run.signal(role, Signal::CONT));
         let lost = Some(Decision::Stop(StopReason::OutsideMap));
         assert!(witness.decided.iter().all(|record| command_of(record) != lost), "the map stayed behind");
-        let on_old = |record: &&runtime::message::DecisionRecord| {
+        let on_old = |record: &&bus::message::DecisionRecord| {
             record.decided_at_ns > at_ns + 100_000_000 && record.command.scan_at_ns < at_ns
         };
         let drives = |record| matches!(command_of(record), Some(Decision::Drive(_)));
@@ -164,7 +163,7 @@ fn the_vehicle_knows_of_the_jumps_that_mapping_made_out() {
         let vehicle = scope.spawn(|| {
             let (vehicle, _) = machine();
             let is_over = || is_over.load(Ordering::Relaxed);
-            plant::run(&Bus::join(&run.name).unwrap(), plant_setup(&vehicle), &is_over)
+            simulator::run(&Bus::join(&run.name).unwrap(), plant_setup(&vehicle), &is_over)
         });
         let mut drive = |n_cycles: u64| {
             let mut n_heard = 0;

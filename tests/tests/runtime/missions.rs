@@ -3,12 +3,12 @@
 use std::collections::BTreeMap;
 
 use bicycle::{Decision, HoldReason, StopReason};
+use bus::channel::{Bus, MISSION, RISK};
+use bus::message::DecisionRecord;
+use bus::status::Role;
 use navigator::{Belief, Order, OrderRefusal, Route};
-use runtime::channel::{Bus, MISSION, RISK};
-use runtime::message::DecisionRecord;
 use runtime::operator::{self, OperatorError};
 use runtime::replay::{self, Knowledge};
-use runtime::status::Role;
 
 use crate::driver::{Driver, Misbehaviour, MissionFate};
 use crate::fixture::{ALPHA, Run, ages, eventually, task};

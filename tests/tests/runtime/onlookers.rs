@@ -6,14 +6,14 @@ use std::sync::atomic::{AtomicBool, AtomicU16, Ordering};
 use std::time::Duration;
 
 use bicycle::Decision;
-use runtime::channel::{
+use bus::channel::{
     Bus, CHECKPOINT, COMMAND, ChannelError, DECISION, Inlet, MISSION, ODOMETRY, RISK, RISK_PHYSICS, SCAN,
     STUCK, SURFACE,
 };
-use runtime::clock;
+use bus::clock;
+use bus::message::{DecisionRecord, OdometryRecord, Stamp};
+use bus::status::Role;
 use runtime::live;
-use runtime::message::{DecisionRecord, OdometryRecord, Stamp};
-use runtime::status::Role;
 use runtime::supervisor::{RestartPolicy, Supervisor};
 
 use crate::fixture::{Run, eventually};

@@ -3,11 +3,11 @@
 use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime};
 
+use bus::channel::Bus;
+use bus::message::Source;
+use bus::status::Role;
 use navigator::Belief;
-use runtime::channel::Bus;
-use runtime::message::Source;
 use runtime::replay::{self, Knowledge, Records, ReplayReport};
-use runtime::status::Role;
 
 use crate::fixture::{RecorderLimits, Run, eventually};
 use crate::witness::Witness;

@@ -8,14 +8,11 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use bicycle::Decision;
-use mppi::CostToGoView;
-use runtime::channel::{Bus, Channel, DECISION, Inlet, MISSION, ODOMETRY, Outlet, RISK, Refusal};
-use runtime::clock::now_ns;
-use runtime::message::{
-    CommandRecord, DecisionRecord, Grid, MissionRecord, OdometryRecord, RiskHeader, Stamp,
-};
-use runtime::payload::{RiskParts, risk_views};
-use runtime::status::Role;
+use bus::channel::{Bus, Channel, DECISION, Inlet, MISSION, ODOMETRY, Outlet, RISK, Refusal};
+use bus::clock::now_ns;
+use bus::message::{CommandRecord, DecisionRecord, Grid, MissionRecord, OdometryRecord, RiskHeader, Stamp};
+use bus::payload::{RiskParts, risk_views};
+use bus::status::Role;
 use terrain::GridGeometry;
 use traversability::{Risk, RiskMap};
 
@@ -335,8 +332,8 @@ fn what_is_written_after_sending_is_read() {
     let memory = Memory::of(&run).unwrap();
     let at = memory.messages[0][1] + size_of::<RiskHeader>() as u64;
     memory.write(at, &vec![0xff; 16 * parts().n_elements()]);
-    let read = |message: &runtime::channel::Message<RiskHeader, [f32; 4]>| -> [bool; 2] {
-        let (map, CostToGoView { seconds, .. }) = risk_views(message.header(), message.payload()).unwrap();
+    let read = |message: &bus::channel::Message<RiskHeader, [f32; 4]>| -> [bool; 2] {
+        let (map, seconds) = risk_views(message.header(), message.payload()).unwrap();
         [map.risks[0].roll_rad.is_nan(), seconds[seconds.len() - 1].is_nan()]
     };
     assert_eq!(read(&message), [true, true]);

@@ -3,9 +3,9 @@
 use std::cell::RefCell;
 use std::process::Command;
 
-use runtime::channel::Bus;
-use runtime::clock::now_ns;
-use runtime::status::Role;
+use bus::channel::Bus;
+use bus::clock::now_ns;
+use bus::status::Role;
 use runtime::supervisor::{RestartPolicy, RunEnd, Start, Supervisor};
 
 use crate::fixture::Run;

@@ -5,9 +5,9 @@ use std::collections::BTreeMap;
 use std::time::Instant;
 
 use bicycle::{Decision, StopReason};
-use runtime::channel::{Bus, DECISION, Inlet, ODOMETRY, RISK_PHYSICS};
-use runtime::message::{DecisionRecord, OdometryRecord, RiskHeader, Source, Stamp};
-use runtime::status::Role;
+use bus::channel::{Bus, DECISION, Inlet, ODOMETRY, RISK_PHYSICS};
+use bus::message::{DecisionRecord, OdometryRecord, RiskHeader, Source, Stamp};
+use bus::status::Role;
 use rustix::process::Signal;
 
 use crate::fixture::{Run, ages, eventually, machine};

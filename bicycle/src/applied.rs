@@ -1,6 +1,6 @@
 //! What a vehicle's actuators are told in the end, which may be something else than was decided.
 
-use bicycle::Command;
+use crate::Command;
 
 /// What the actuators were told last.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,23 +1,47 @@
-//! The simulated vehicle as a process: it measures, carries out the last command, and stops when commands end.
+//! The simulated vehicle as a process: it measures, carries out the last command, and stops when commands end. A part of
+//! [Surefoot](../cli/index.html).
+//!
+//! It is a driver like that of any vehicle: what it knows of the processes that command it is in [`bus`].
 
 use bicycle::{Decision, Vehicle};
 use scenarios::{Episode, EpisodeConfig, Observation, Outcome, Task};
 
-use crate::RuntimeError;
-use crate::ages::{AgeLimits, Periods};
-use crate::channel::{Bus, COMMAND, Inlet, MISSION, ODOMETRY, Outlet, SCAN};
-use crate::clock::{self, Cycle, SECOND_NS};
-use crate::message::{
+use bus::ages::{AgeLimits, Periods};
+use bus::channel::{Bus, COMMAND, Inlet, MISSION, ODOMETRY, Outlet, SCAN};
+use bus::clock::{self, Cycle, SECOND_NS};
+use bus::message::mission::REACHED;
+use bus::message::{
     CommandRecord, MissionRecord, OdometryRecord, PointRecord, ScanHeader, Stamp, StatusRecord,
 };
-use crate::mission::REACHED;
-use crate::status::{Health, Meter, Role};
-use crate::watchdog::Watchdog;
+use bus::status::{Health, Meter, Role};
+use bus::watchdog::Watchdog;
 
 /// Returns of a sweep at the most.
 pub const POINTS_MAX: usize = 1 << 16;
 /// The world does not wait: a plant that is late catches up, from no further back than this [ns].
 const BEHIND_MAX_NS: u64 = SECOND_NS / 4;
+
+/// Why the simulated vehicle cannot begin or go on. Every message is one line.
+#[derive(Debug, thiserror::Error)]
+pub enum SimulatorError {
+    /// The channels.
+    #[error(transparent)]
+    Channel(#[from] bus::channel::ChannelError),
+    /// The vehicle or its world.
+    #[error(transparent)]
+    Episode(#[from] scenarios::EpisodeError),
+    /// It cannot speak so often.
+    #[error(
+        "periods: expected a whole number of odometry messages between two scans, found odometry every {odometry_s} s \
+         and scans every {scan_s} s"
+    )]
+    Periods {
+        /// Between two odometry messages [s].
+        odometry_s: f64,
+        /// Between two scans [s].
+        scan_s: f64,
+    },
+}
 
 /// What is simulated.
 pub struct PlantSetup<'a> {
@@ -52,11 +76,11 @@ const STANDING_MPS: f64 = 0.05;
 const ROUNDING: f64 = 1e-6;
 
 /// Odometry messages from one scan to the next, if that is a whole number.
-pub fn cycles_per_scan(periods: &Periods) -> Result<u64, RuntimeError> {
+pub fn cycles_per_scan(periods: &Periods) -> Result<u64, SimulatorError> {
     let Periods { odometry_s, scan_s, .. } = *periods;
     let n = scan_s / odometry_s;
     let is_whole = n >= 1.0 - ROUNDING && (n - n.round()).abs() < ROUNDING * n;
-    is_whole.then_some(n.round() as u64).ok_or(RuntimeError::Periods { odometry_s, scan_s })
+    is_whole.then_some(n.round() as u64).ok_or(SimulatorError::Periods { odometry_s, scan_s })
 }
 
 /// How a drive ended, and what the watchdog saw.
@@ -81,7 +105,7 @@ pub fn run(
     bus: &Bus,
     setup: PlantSetup<'_>,
     is_over: &dyn Fn() -> bool,
-) -> Result<PlantReport, RuntimeError> {
+) -> Result<PlantReport, SimulatorError> {
     let mut plant = Plant::new(bus, setup)?;
     while plant.episode.outcome().is_none() && !is_over() {
         plant.cycle()?;
@@ -110,7 +134,7 @@ struct Plant {
 }
 
 impl Plant {
-    fn new(bus: &Bus, setup: PlantSetup<'_>) -> Result<Self, RuntimeError> {
+    fn new(bus: &Bus, setup: PlantSetup<'_>) -> Result<Self, SimulatorError> {
         let PlantSetup { mut task, vehicle, mut episode, ending, seed, periods, ages } = setup;
         // Until the mission says which goal is the last one, none is.
         task.goal_tolerance_m = 0.0;
@@ -141,7 +165,7 @@ impl Plant {
     }
 
     /// Measures at the cycle's time, then drives on to the next.
-    fn cycle(&mut self) -> Result<(), RuntimeError> {
+    fn cycle(&mut self) -> Result<(), SimulatorError> {
         let due_ns = self.cycle.deadline_ns();
         let now_ns = clock::sleep_until(due_ns);
         self.meter.count(now_ns - due_ns);
@@ -186,7 +210,7 @@ impl Plant {
         self.began_ns + clock::nanoseconds(self.episode.time_s())
     }
 
-    fn measure(&mut self) -> Result<(), RuntimeError> {
+    fn measure(&mut self) -> Result<(), SimulatorError> {
         let at_ns = self.at_ns();
         let Observation { odometry, scan, .. } = self.episode.observe();
         let record = OdometryRecord::from(odometry).with_applied(self.watchdog.applied());

@@ -1,8 +1,7 @@
 //! The last word before the actuators: a command counts for as long as what it was decided on, and then the vehicle
 //! stops.
 
-use bicycle::{Command, Decision, HoldReason, Limits, StopReason};
-use navigator::{Applied, AppliedBy};
+use bicycle::{Applied, AppliedBy, Command, Decision, HoldReason, Limits, StopReason};
 
 use crate::ages::AgeLimits;
 use crate::message::CommandRecord;

@@ -1,10 +1,9 @@
 //! Between the messages and what the pipeline is made of.
 
-use bicycle::{Column, Command, Decision, DriveRow, HoldReason, Odometry, StopReason};
-use navigator::{Applied, AppliedBy, Jump};
+use bicycle::{Applied, AppliedBy, Column, Command, Decision, DriveRow, HoldReason, Odometry, StopReason};
 use terrain::{GridGeometry, LATTICE_MAX, RangePoint, Scan, TerrainClass};
 
-use super::{CommandRecord, Grid, OdometryRecord, PointRecord, ScanHeader, Source, Stamp, SurfaceHeader};
+use super::{CommandRecord, Grid, OdometryRecord, PointRecord, ScanHeader, Source, Stamp};
 
 /// Reasons to stop; the first has the number 1.
 pub const STOP_REASONS: [StopReason; 12] = [
@@ -65,7 +64,7 @@ impl Grid {
 }
 
 /// A row of a drive log: odometry, and the command of its time [m/s], [rad].
-pub(crate) fn drive_row(time_s: f64, odometry: &Odometry, [speed_mps, steering_rad]: [f64; 2]) -> DriveRow {
+pub fn drive_row(time_s: f64, odometry: &Odometry, [speed_mps, steering_rad]: [f64; 2]) -> DriveRow {
     let [x, y, z] = odometry.position_m;
     let [roll, pitch, yaw] = odometry.attitude_rad;
     let [vx, vy] = odometry.velocity_mps;
@@ -179,18 +178,6 @@ impl ScanHeader {
             origin_m: self.origin_m,
             points: points.iter().filter_map(PointRecord::point).collect(),
         }
-    }
-}
-
-impl SurfaceHeader {
-    /// The jump of the localisation that it tells of.
-    pub fn jump(&self) -> Jump {
-        Jump { step_m: self.jump_m, yaw_rad: self.jump_yaw_rad }
-    }
-
-    /// All jumps so far together.
-    pub fn shift(&self) -> Jump {
-        Jump { step_m: self.shift_m, yaw_rad: self.shift_yaw_rad }
     }
 }
 

@@ -1,12 +1,12 @@
 //! What payloads hold, how maps lie in them, and what makes a message malformed.
 
 use bicycle::Odometry;
-use mppi::CostToGoView;
 use terrain::{DistantPosition, GridGeometry, GridMap, Knowledge, SurfaceCell, TerrainClass};
 use traversability::{Ground, Risk, RiskMapView};
 use xxhash_rust::xxh3::xxh3_64;
 
 use crate::channel::{FUTURE_NS, Refusal};
+use crate::message::mission::EMERGENCY_STOP;
 use crate::message::{
     CheckpointHeader, CommandRecord, MissionRecord, OdometryRecord, OrderHeader, PointRecord, RiskHeader,
     ScanHeader, Stamp, StuckRecord, SurfaceHeader,
@@ -14,8 +14,6 @@ use crate::message::{
 
 /// Yaw bins beyond which nobody believes a map.
 const YAWS_MAX: u64 = 1024;
-/// Largest number of [`MissionRecord::state`].
-const MISSION_STATES_MAX: u64 = 4;
 /// Bytes of an element of a risk map.
 const QUAD: usize = size_of::<[f32; 4]>();
 
@@ -90,11 +88,8 @@ impl RiskParts {
     }
 }
 
-/// A risk map as the controller reads it, where its message lies.
-pub fn risk_views<'a>(
-    header: &RiskHeader,
-    payload: &'a [[f32; 4]],
-) -> Option<(RiskMapView<'a>, CostToGoView<'a>)> {
+/// A risk map as the controller reads it, where its message lies, and least times to the goal [s], shape [row, col].
+pub fn risk_views<'a>(header: &RiskHeader, payload: &'a [[f32; 4]]) -> Option<(RiskMapView<'a>, &'a [f32])> {
     let geometry = header.grid.geometry()?;
     let n_yaws = (1..=YAWS_MAX).contains(&header.n_yaws).then_some(header.n_yaws as usize)?;
     // Times are interpolated between cells: one row or column has nothing to interpolate between.
@@ -104,7 +99,7 @@ pub fn risk_views<'a>(
         return None;
     }
     let map = RiskMapView::new(geometry, n_yaws, parts.risks(payload), parts.ground(payload)).ok()?;
-    Some((map, CostToGoView { geometry, seconds: parts.seconds(payload) }))
+    Some((map, parts.seconds(payload)))
 }
 
 /// Hash of a payload, as headers carry it.
@@ -197,7 +192,7 @@ pub(crate) fn check_surface(header: &SurfaceHeader, payload: &[[f32; 8]]) -> Res
 }
 
 pub(crate) fn check_risk(header: &RiskHeader, payload: &[[f32; 4]]) -> Result<(), Refusal> {
-    let (map, time_to_goal) = risk_views(header, payload).ok_or(Refusal::Malformed)?;
+    let (map, seconds_to_goal) = risk_views(header, payload).ok_or(Refusal::Malformed)?;
     require(matches!(header.author, 1 | 2), Refusal::Malformed)?;
     // A finite number times zero is zero; of anything else the sum is no number. One pass, without a branch.
     let of_risks = map.risks.iter().fold(0.0, |sum: f32, risk| {
@@ -205,7 +200,7 @@ pub(crate) fn check_risk(header: &RiskHeader, payload: &[[f32; 4]]) -> Result<()
     });
     let of_ground =
         map.ground.iter().fold(0.0, |sum: f32, ground| sum + 0.0 * (ground.gradient[0] + ground.gradient[1]));
-    let of_times = time_to_goal.seconds.iter().fold(0.0, |sum: f32, seconds| sum + 0.0 * seconds);
+    let of_times = seconds_to_goal.iter().fold(0.0, |sum: f32, seconds| sum + 0.0 * seconds);
     require(of_risks + of_ground + of_times == 0.0, Refusal::NonFinite)?;
     let known = |ground: &Ground| usize::from(ground.class) < TerrainClass::COUNT;
     require(map.ground.iter().all(known), Refusal::Malformed)
@@ -243,7 +238,7 @@ pub(crate) fn check_mission(_: &Stamp, payload: &[MissionRecord]) -> Result<(), 
     require(numbers.clone().all(|value| value.is_finite()), Refusal::NonFinite)?;
     let is_path = *path_speed_mps == 0.0 || (*path_speed_mps > 0.0 && mission.n_corners >= 2);
     let is_plan = (0.0..=1.0).contains(alpha) && *tolerance_m >= 0.0;
-    require(is_path && is_plan && mission.state <= MISSION_STATES_MAX, Refusal::Malformed)
+    require(is_path && is_plan && mission.state <= EMERGENCY_STOP, Refusal::Malformed)
 }
 
 /// What an order says is judged by whoever takes it, and answered.
@@ -285,9 +280,9 @@ mod tests {
         let (map, header, mut payload) = told();
         let parts = RiskParts::new(map.geometry(), 3);
         parts.seconds_mut(&mut payload)[14] = 7.0;
-        let (view, time_to_goal) = risk_views(&header, &payload).unwrap();
+        let (view, seconds) = risk_views(&header, &payload).unwrap();
         assert_eq!((view.risks, view.ground), (map.view().risks, map.view().ground));
-        assert_eq!((time_to_goal.seconds.len(), time_to_goal.seconds[14]), (15, 7.0));
+        assert_eq!((seconds.len(), seconds[14]), (15, 7.0));
         assert_eq!(view.risks.as_ptr().cast(), payload.as_ptr(), "no copy");
         assert_eq!(check_risk(&header, &payload), Ok(()));
     }

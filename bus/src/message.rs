@@ -1,12 +1,12 @@
 //! What the processes tell one another: records of plain numbers, the same in every process and language.
 
 mod convert;
+pub mod mission;
 
 use iceoryx2::prelude::ZeroCopySend;
 
 use crate::layout::{RecordLayout, record};
-pub(crate) use convert::drive_row;
-pub use convert::{HOLD_REASONS, STOP_REASONS};
+pub use convert::{HOLD_REASONS, STOP_REASONS, drive_row};
 
 /// Version of everything in this file; messages of another are refused.
 pub const LAYOUT_VERSION: u32 = 5;

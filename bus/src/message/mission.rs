@@ -1,9 +1,55 @@
-//! A mission in words.
+//! The numbers by which missions and orders are told, and a mission in words.
 
 use std::fmt::{Display, Formatter, Result};
 
-use super::record::{CANCELLED, DRIVE, EMERGENCY_STOP, MANUAL, NONE, PAUSED, REACHED, UNDER_WAY};
-use crate::message::MissionRecord;
+use traversability::CvarLevel;
+
+use super::MissionRecord;
+
+/// Number of [`MissionRecord::state`]: drive.
+pub const DRIVE: u64 = 0;
+/// Number of [`MissionRecord::state`]: there is no mission.
+pub const NONE: u64 = 1;
+/// Number of [`MissionRecord::state`]: it waits.
+pub const PAUSED: u64 = 2;
+/// Number of [`MissionRecord::state`]: an operator has the wheel.
+pub const MANUAL: u64 = 3;
+/// Number of [`MissionRecord::state`]: an emergency stop is latched. The largest of them.
+pub const EMERGENCY_STOP: u64 = 4;
+
+/// Number of [`MissionRecord::outcome`]: it is under way.
+pub const UNDER_WAY: u64 = 0;
+/// Number of [`MissionRecord::outcome`]: its last goal is reached.
+pub const REACHED: u64 = 1;
+/// Number of [`MissionRecord::outcome`]: somebody ended it.
+pub const CANCELLED: u64 = 10;
+
+impl MissionRecord {
+    /// Where it leads, if it leads anywhere.
+    pub fn destination_m(&self) -> Option<[f64; 2]> {
+        (self.n_legs > 0 || self.state == DRIVE).then_some(self.goal_m)
+    }
+
+    /// The share of worst outcomes to plan for, if anybody has said so.
+    pub fn level(&self) -> Option<CvarLevel> {
+        CvarLevel::new(self.alpha).ok()
+    }
+
+    /// Whether the vehicle is to drive.
+    pub fn is_driving(&self) -> bool {
+        self.state == DRIVE && self.outcome == UNDER_WAY
+    }
+
+    fn way(&self) -> String {
+        let [x_m, y_m] = self.goal_m;
+        let (place, n) = (self.leg + 1, self.n_legs);
+        match (self.path_speed_mps > 0.0, n) {
+            (true, _) => format!("along a path, corner {place} of {n}"),
+            (false, 0 | 1) => format!("to ({x_m:.1}, {y_m:.1}) m"),
+            (false, _) => format!("to ({x_m:.1}, {y_m:.1}) m, goal {place} of {n}"),
+        }
+    }
+}
 
 impl Display for MissionRecord {
     fn fmt(&self, formatter: &mut Formatter<'_>) -> Result {
@@ -16,18 +62,6 @@ impl Display for MissionRecord {
             (_, CANCELLED) => formatter.write_str("mission cancelled"),
             (NONE, UNDER_WAY) => formatter.write_str("no mission"),
             _ => formatter.write_str("mission over"),
-        }
-    }
-}
-
-impl MissionRecord {
-    fn way(&self) -> String {
-        let [x_m, y_m] = self.goal_m;
-        let (place, n) = (self.leg + 1, self.n_legs);
-        match (self.path_speed_mps > 0.0, n) {
-            (true, _) => format!("along a path, corner {place} of {n}"),
-            (false, 0 | 1) => format!("to ({x_m:.1}, {y_m:.1}) m"),
-            (false, _) => format!("to ({x_m:.1}, {y_m:.1}) m, goal {place} of {n}"),
         }
     }
 }

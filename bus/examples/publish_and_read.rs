@@ -1,13 +1,13 @@
 //! Both ends of a channel: whoever runs the vehicle tells over shared memory where it is, and another process reads that
 //! in place. What cannot be is refused and counted. Here both ends are one process.
 //!
-//! `cargo run -p runtime --example publish_and_read`
+//! `cargo run -p bus --example publish_and_read`
 
 use std::error::Error;
 
-use runtime::channel::{Bus, ODOMETRY, RunName};
-use runtime::clock;
-use runtime::message::{OdometryRecord, Stamp};
+use bus::channel::{Bus, ODOMETRY, RunName};
+use bus::clock;
+use bus::message::{OdometryRecord, Stamp};
 
 fn main() -> Result<(), Box<dyn Error>> {
     // Processes of one run find one another by its name.
