@@ -10,8 +10,8 @@ use std::fmt::Debug;
 use iceoryx2::prelude::ZeroCopySend;
 
 use crate::message::{
-    CheckpointHeader, CommandRecord, DecisionRecord, MissionRecord, OdometryRecord, OrderHeader, PointRecord,
-    RiskHeader, ScanHeader, Stamp, StatusRecord, StuckRecord, SurfaceHeader,
+    CheckpointHeader, CommandRecord, DecisionRecord, ImuRecord, MissionRecord, OdometryRecord, OrderHeader,
+    PointRecord, RiskHeader, ScanHeader, Stamp, StatusRecord, StuckRecord, SurfaceHeader,
 };
 use crate::payload;
 pub use bus::{Bus, Cleared, RunName, RunNameError};
@@ -74,6 +74,10 @@ pub const THIRD_PARTIES: usize = 2;
 /// Where the vehicle is: whoever runs the vehicle.
 pub const ODOMETRY: Channel<Stamp, OdometryRecord> =
     Channel { name: "odometry", depth: 32, history: 0, n_readers: 6, check: payload::check_odometry };
+/// What the inertial measurement unit feels, as many samples as have come since the last message: whoever runs the
+/// vehicle.
+pub const IMU: Channel<Stamp, ImuRecord> =
+    Channel { name: "imu", depth: 32, history: 0, n_readers: 2, check: payload::check_imu };
 /// What the range sensor sees: whoever runs the vehicle.
 pub const SCAN: Channel<ScanHeader, PointRecord> =
     Channel { name: "scan", depth: 2, history: 0, n_readers: 2, check: payload::check_scan };

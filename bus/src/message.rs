@@ -9,7 +9,7 @@ use crate::layout::{RecordLayout, record};
 pub use convert::{HOLD_REASONS, STOP_REASONS, drive_row};
 
 /// Version of everything in this file; messages of another are refused.
-pub const LAYOUT_VERSION: u32 = 5;
+pub const LAYOUT_VERSION: u32 = 6;
 
 record! {
     /// First field of every header: whose message it is, and of when.
@@ -80,21 +80,33 @@ record! {
 }
 
 record! {
+    /// One sample of the inertial measurement unit, in the body frame.
+    ImuRecord = "surefoot.Imu" {
+        /// When it was measured, monotonic [ns].
+        valid_at_ns: u64,
+        /// Specific force [m/s2]; (0, 0, +9.81) at rest on level ground.
+        acceleration_mps2: [f32; 3],
+        /// Angular rate [rad/s].
+        angular_rate_radps: [f32; 3],
+    }
+}
+
+record! {
     /// Header of a sweep of the range sensor; the payload is one PointRecord per return.
     ScanHeader = "surefoot.ScanHeader" {
         /// Whose and of when.
         stamp: Stamp,
-        /// Where the rays start, in the body frame [m].
+        /// Where the rays start, in the frame of the points [m].
         origin_m: [f32; 3],
-        /// Zero.
-        reserved: u32,
+        /// Whose frame the points are of: 0 = the vehicle's body, else the sensor of this number, from 1.
+        sensor: u32,
     }
 }
 
 record! {
     /// One return of the range sensor.
     PointRecord = "surefoot.Point" {
-        /// Place in the body frame [m].
+        /// Place in the frame that the header names [m].
         position_m: [f32; 3],
         /// What it is: 0 open, 1 loose, 2 vegetation, 3 obstacle.
         class_number: u32,
@@ -338,6 +350,7 @@ pub fn layouts() -> Vec<RecordLayout> {
         Source::layout(),
         Grid::layout(),
         OdometryRecord::layout(),
+        ImuRecord::layout(),
         ScanHeader::layout(),
         PointRecord::layout(),
         SurfaceHeader::layout(),

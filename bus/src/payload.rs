@@ -8,8 +8,8 @@ use xxhash_rust::xxh3::xxh3_64;
 use crate::channel::{FUTURE_NS, Refusal};
 use crate::message::mission::EMERGENCY_STOP;
 use crate::message::{
-    CheckpointHeader, CommandRecord, MissionRecord, OdometryRecord, OrderHeader, PointRecord, RiskHeader,
-    ScanHeader, Stamp, StuckRecord, SurfaceHeader,
+    CheckpointHeader, CommandRecord, ImuRecord, MissionRecord, OdometryRecord, OrderHeader, PointRecord,
+    RiskHeader, ScanHeader, Stamp, StuckRecord, SurfaceHeader,
 };
 
 /// Yaw bins beyond which nobody believes a map.
@@ -175,6 +175,21 @@ pub(crate) fn check_odometry(stamp: &Stamp, payload: &[OdometryRecord]) -> Resul
     require(record.applied_by <= 1, Refusal::Malformed)
 }
 
+/// Samples come in their order, each of its own time and none of after the message: what is lost is a gap that its
+/// reader sees.
+pub(crate) fn check_imu(stamp: &Stamp, samples: &[ImuRecord]) -> Result<(), Refusal> {
+    let last = samples.last().ok_or(Refusal::Malformed)?;
+    require(samples.is_sorted_by(|one, next| one.valid_at_ns < next.valid_at_ns), Refusal::Malformed)?;
+    let latest_ns = stamp.published_at_ns.saturating_add(FUTURE_NS);
+    require(last.valid_at_ns <= latest_ns, Refusal::FromFuture)?;
+    let numbers = |sample: &ImuRecord| {
+        let [ax, ay, az] = sample.acceleration_mps2;
+        let [wx, wy, wz] = sample.angular_rate_radps;
+        [ax, ay, az, wx, wy, wz].iter().all(|value| value.is_finite())
+    };
+    require(samples.iter().all(numbers), Refusal::NonFinite)
+}
+
 /// Some points may be no numbers, as sensors give them; the map drops these.
 pub(crate) fn check_scan(header: &ScanHeader, _: &[PointRecord]) -> Result<(), Refusal> {
     require(header.origin_m.iter().all(|value| value.is_finite()), Refusal::NonFinite)
@@ -273,6 +288,22 @@ mod tests {
         let header =
             RiskHeader { grid: Grid::from(&geometry), n_yaws: 3, author: 1, ..RiskHeader::default() };
         (map, header, payload)
+    }
+
+    #[test]
+    fn inertial_samples_come_in_order_and_are_numbers() {
+        let stamp = Stamp { published_at_ns: 1_000_000_000, ..Stamp::default() };
+        let at = |valid_at_ns| ImuRecord {
+            valid_at_ns,
+            acceleration_mps2: [0.0, 0.0, 9.81],
+            ..ImuRecord::default()
+        };
+        assert_eq!(check_imu(&stamp, &[at(5), at(9)]), Ok(()));
+        assert_eq!(check_imu(&stamp, &[]), Err(Refusal::Malformed));
+        assert_eq!(check_imu(&stamp, &[at(9), at(9)]), Err(Refusal::Malformed), "the same time twice");
+        assert_eq!(check_imu(&stamp, &[at(1_000_000_000 + FUTURE_NS + 1)]), Err(Refusal::FromFuture));
+        let broken = ImuRecord { angular_rate_radps: [0.0, f32::NAN, 0.0], ..at(10) };
+        assert_eq!(check_imu(&stamp, &[at(5), broken]), Err(Refusal::NonFinite));
     }
 
     #[test]

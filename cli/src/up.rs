@@ -2,6 +2,7 @@
 
 mod learn;
 mod live;
+mod robot;
 mod roles;
 
 use std::ffi::OsString;
@@ -9,6 +10,7 @@ use std::path::Path;
 use std::process::Command;
 
 use bus::channel::ChannelError;
+use bus::message::mission::REACHED;
 use bus::status::Role;
 use runtime::RuntimeError;
 use runtime::supervisor::{RestartPolicy, RunEnd, RunReport, Start, Supervisor};
@@ -18,6 +20,7 @@ use crate::{UsageError, WorkFailed, failure, interrupt};
 
 pub(crate) fn run(arguments: &UpArguments) -> anyhow::Result<()> {
     refuse_what_has_no_meaning(arguments)?;
+    let arguments = &robot::described(arguments)?;
     interrupt::catch_interrupts()?;
     match arguments.role.role() {
         Some(role) => {
@@ -113,9 +116,8 @@ fn refused(error: anyhow::Error) -> anyhow::Error {
 
 fn supervise(arguments: &UpArguments) -> anyhow::Result<()> {
     // What cannot be is said once, before six processes say it.
-    let task = roles::prepare(arguments)?;
-    let words_of_route = roles::words_of_route(arguments, &task);
-    drop(task);
+    let words_of_route = roles::prepare(arguments)?;
+    let roles = robot::roles(arguments)?;
     let program = std::env::current_exe()?;
     let words = own_words(std::env::args_os().skip(1));
     let command = |role: Role, start: Start| {
@@ -129,7 +131,10 @@ fn supervise(arguments: &UpArguments) -> anyhow::Result<()> {
     };
     let _live = arguments.live.map(|_| live::Viewer::start(&program, &words)).transpose()?;
     let bus = roles::join(arguments)?;
-    let mut supervisor = Supervisor::new(&bus, &Role::ALL, RestartPolicy::default(), &command)?;
+    let mut supervisor = Supervisor::new(&bus, &roles, RestartPolicy::default(), &command)?;
+    if arguments.described.is_some() && !arguments.standby {
+        supervisor = supervisor.until_the_mission_is_over();
+    }
     let end = supervisor.run(&interrupt::interrupted, &mut |lines, mission| {
         if let Some(mission) = mission {
             println!("{:.1} s, {mission}", mission.time_s);
@@ -143,6 +148,13 @@ fn supervise(arguments: &UpArguments) -> anyhow::Result<()> {
             let time_s = supervisor.mission().map_or(0.0, |mission| mission.time_s);
             println!("goal reached after {time_s:.1} s");
             Ok(())
+        }
+        RunEnd::MissionOver(REACHED) => {
+            println!("goal reached");
+            Ok(())
+        }
+        RunEnd::MissionOver(_) => {
+            Err(WorkFailed("goal not reached: the mission was cancelled".into()).into())
         }
         RunEnd::Plant(_) => Err(WorkFailed("goal not reached; the vehicle's process says why".into()).into()),
         RunEnd::Interrupted if arguments.standby => Ok(()),

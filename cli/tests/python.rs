@@ -65,6 +65,16 @@ fn words_that_name_no_run_are_refused() {
 struct Processes(Vec<Child>);
 
 impl Processes {
+    /// Those that the robot's file beside the driver describes.
+    fn of_robot(run: &str, out: &Path) -> Self {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_surefoot"));
+        let text = std::fs::read_to_string(example("../robot.toml")).unwrap();
+        let file = out.join("robot.toml");
+        std::fs::write(&file, text.replace("run = \"car\"", &format!("run = \"{run}\""))).unwrap();
+        command.args(["up", "--threads", "1", "--robot"]).arg(file).arg("--out").arg(out);
+        Self(vec![command.stdout(Stdio::piped()).spawn().unwrap()])
+    }
+
     fn start(run: &str, out: &Path, roles: &[&str]) -> Self {
         let start = |role: &&str| {
             let mut command = Command::new(env!("CARGO_BIN_EXE_surefoot"));
@@ -111,9 +121,14 @@ fn a_robot_of_somebodys_own_is_driven_to_its_goal_around_the_rock() {
         return;
     }
     let (folder, name) = (tempfile::tempdir().unwrap(), run_name("robot"));
-    let mut processes = Processes::start(&name, folder.path(), &["mapping", "learning", "control"]);
+    let mut processes = Processes::of_robot(&name, folder.path());
     let output = run("drive_robot.py", &["--run", &name]);
-    processes.end();
+    // The robot's mission is over, and so is the run.
+    let ended = processes.0.remove(0).wait_with_output().unwrap();
+    let shown = text(&ended.stdout);
+    assert!(ended.status.success() && shown.contains("goal reached"), "{shown}");
+    assert!(!shown.contains("plant"), "no vehicle is simulated: {shown}");
+    assert!(folder.path().join("drive-000.mcap").exists());
     let told = told_json(&output);
     assert_eq!((output.status.code(), &told["reached"]), (Some(0), &true.into()), "{told}");
     assert!(told["distance_to_goal_m"].as_f64().unwrap() <= 0.3, "{told}");

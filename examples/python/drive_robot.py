@@ -1,18 +1,15 @@
 """A robot's own driver: a simple vehicle on a plain with one rock in the way, driven by Surefoot's processes.
 
     pip install iceoryx2==0.10.0
-    surefoot up --role mapping --run py --vehicle rc_car --method physics &
-    surefoot up --role learning --run py --vehicle rc_car --method physics &
-    surefoot up --role control --run py --vehicle rc_car --method physics &
-    python3 drive_robot.py --run py
+    surefoot up --robot examples/robot.toml &
+    python3 examples/python/drive_robot.py --run car
 
-It tells where it is and what its actuators were told, what a ring of range rays sees and where to go, reads commands and
-risk maps, and stops when what the last command was decided on is too old.
-Prints one line of JSON and ends with 0 when it has come to its goal, else with 1.
+It tells where it is, what its inertial unit feels and what its actuators were told, what a ring of range rays sees from
+where it sits and where to go, reads commands and risk maps, and stops when what the last command was decided on is too
+old. Prints one line of JSON and ends with 0 when it has come to its goal, else with 1.
 """
 
 import argparse
-import ctypes
 import json
 import math
 import sys
@@ -22,11 +19,14 @@ from channels import Bus, Inlet, Outlet, now_ns, run_name
 from watchdog import Watchdog
 
 PERIOD_NS = 20_000_000
+IMU_PERIOD_NS = 5_000_000
+GRAVITY_MPS2 = 9.81
 CYCLES_PER_SCAN = 10
 TIME_LIMIT_S = 60.0
 WHEELBASE_M = 0.25
 WHEEL_RADIUS_M = 0.05
-SENSOR_M = (0.12, 0.0, 0.35)
+SENSOR_M = (0.12, 0.0, 0.35)  # The first sensor of examples/robot.toml.
+SENSOR = 1
 GOAL_M, TOLERANCE_M = (5.0, 0.0), 0.3
 ROCK_M, ROCK_RADIUS_M, ROCK_HEIGHT_M = (2.5, 0.1), 0.35, 0.5
 OPEN, OBSTACLE = 0, 3
@@ -38,10 +38,11 @@ class Robot:
 
     def __init__(self) -> None:
         self.x_m = self.y_m = self.yaw_rad = self.speed_mps = self.steering_rad = 0.0
-        self.yaw_rate_radps = 0.0
+        self.yaw_rate_radps = self.acceleration_mps2 = 0.0
 
     def advance(self, speed_mps: float, steering_rad: float, step_s: float) -> None:
         share = step_s / 0.2
+        self.acceleration_mps2 = (speed_mps - self.speed_mps) / 0.2
         self.speed_mps += share * (speed_mps - self.speed_mps)
         self.steering_rad += share * (steering_rad - self.steering_rad)
         self.yaw_rate_radps = self.speed_mps * math.tan(self.steering_rad) / WHEELBASE_M
@@ -60,8 +61,19 @@ class Robot:
             **applied,
         )
 
+    def imu(self, until_ns: int):
+        """The samples of the last period: what it felt on a plain, all alike."""
+        n = PERIOD_NS // IMU_PERIOD_NS
+        samples = (layout.ImuRecord * n)()
+        for place, sample in enumerate(samples):
+            sample.valid_at_ns = until_ns - (n - 1 - place) * IMU_PERIOD_NS
+            lateral_mps2 = self.speed_mps * self.yaw_rate_radps
+            sample.acceleration_mps2[:] = (self.acceleration_mps2, lateral_mps2, GRAVITY_MPS2)
+            sample.angular_rate_radps[:] = (0.0, 0.0, self.yaw_rate_radps)
+        return samples
+
     def scan(self):
-        """Returns of 240 x 48 rays, in the body frame."""
+        """Returns of 240 x 48 rays, in the frame of the sensor."""
         points = []
         cos_yaw, sin_yaw = math.cos(self.yaw_rad), math.sin(self.yaw_rad)
         height_m = SENSOR_M[2] + WHEEL_RADIUS_M
@@ -79,9 +91,9 @@ class Robot:
                 if hit_m <= 6.0:
                     points.append(
                         (
-                            SENSOR_M[0] + hit_m * math.cos(angle_rad),
+                            hit_m * math.cos(angle_rad),
                             hit_m * math.sin(angle_rad),
-                            SENSOR_M[2] + slope * hit_m,
+                            slope * hit_m,
                             class_number,
                         )
                     )
@@ -111,6 +123,7 @@ def sleep_until(deadline_ns: int) -> None:
 def drive(run: str) -> dict:
     bus, robot = Bus(run), Robot()
     odometry, scans, missions = Outlet(bus, "odometry"), Outlet(bus, "scan", 1 << 14), Outlet(bus, "mission")
+    imu = Outlet(bus, "imu", PERIOD_NS // IMU_PERIOD_NS)
     commands, risks = Inlet(bus, "command"), Inlet(bus, "risk")
     mission = layout.MissionRecord(goal_m=GOAL_M, tolerance_m=TOLERANCE_M)
     watchdog = Watchdog()
@@ -119,8 +132,9 @@ def drive(run: str) -> dict:
         at_ns = began_ns + cycle * PERIOD_NS
         sleep_until(at_ns)
         odometry.send(at_ns, (layout.OdometryRecord * 1)(robot.odometry(watchdog.applied())))
+        imu.send(at_ns, robot.imu(at_ns))
         if cycle % CYCLES_PER_SCAN == 0:
-            scans.send(at_ns, robot.scan(), origin_m=(ctypes.c_float * 3)(*SENSOR_M))
+            scans.send(at_ns, robot.scan(), sensor=SENSOR)
         if cycle % 50 == 0:
             mission.time_s = cycle * PERIOD_NS * 1e-9
             missions.send(now_ns(), (layout.MissionRecord * 1)(mission))

@@ -28,6 +28,7 @@ mod overlay;
 mod recording;
 mod refusal;
 mod results;
+mod robot;
 mod scan;
 mod skid_steer;
 mod traction_map;
@@ -56,6 +57,10 @@ pub use recording::{
 };
 pub use refusal::ArrayFileError;
 pub use results::{OutputError, config_hash, prepare_out_dir, write_bytes_atomic, write_json_atomic};
+pub use robot::{
+    RobotAges, RobotAreas, RobotFile, RobotGround, RobotMission, RobotRates, RobotSafety, RobotSensor,
+    parse_robot, read_robot,
+};
 pub use scan::{parse_scan_points, read_scan_points};
 pub use skid_steer::{parse_skid_steer_vehicle, read_skid_steer_vehicle};
 pub use traction_map::{TractionMap, TractionPmfs, parse_traction_map, read_traction_map};

@@ -6,12 +6,14 @@ use mppi::{CostToGo, CostToGoView};
 use terrain::{CellRegion, DistantPosition, GridMap, SurfaceCell};
 use traversability::{CvarLevel, Risk, RiskMapView};
 
+use crate::areas::Barrier;
 use crate::risk::{Belief, RiskLayer, StuckPose};
 use crate::{Config, Jump, NavigatorError};
 
 /// Judges the ground and finds the least time over it to the goal.
 pub struct Assessor {
     layer: RiskLayer,
+    barrier: Barrier,
     recipe: Recipe,
     cost_to_go: CostToGo,
 }
@@ -54,6 +56,7 @@ impl Assessor {
         };
         Ok(Self {
             layer: recipe.layer()?,
+            barrier: Barrier::new(config.areas.clone()),
             recipe,
             cost_to_go: CostToGo::new(
                 config.cost_to_go,
@@ -82,7 +85,7 @@ impl Assessor {
         Ok(())
     }
 
-    /// Follows the vehicle and judges anew what changed of the surface.
+    /// Follows the vehicle and judges anew what changed of the surface. Where the vehicle may not be counts as obstacles.
     pub fn update(
         &mut self,
         position_m: [f64; 2],
@@ -90,7 +93,7 @@ impl Assessor {
         changed: &CellRegion,
     ) -> Result<(), NavigatorError> {
         DistantPosition::check(position_m, self.layer.resolution_m())?;
-        Ok(self.layer.update(position_m, surface, changed)?)
+        Ok(self.layer.update(position_m, self.barrier.bar(surface), changed)?)
     }
 
     /// What the ground is judged to be, before [`Assessor::amend`]; `None` until the first update.

@@ -4,9 +4,9 @@ use bicycle::{Geometry, Vehicle};
 use mppi::CostToGoConfig;
 use physics_prior::PriorConfig;
 use serde::{Deserialize, Serialize};
-use terrain::{BodyBox, ElevationConfig};
+use terrain::{BodyBox, ElevationConfig, Mount};
 
-use crate::{GuardConfig, NavigatorError};
+use crate::{Areas, GuardConfig, NavigatorError};
 
 /// Vehicles below this length cannot look over what hides ground from them [m].
 const SMALL_LENGTH_M: f64 = 1.0;
@@ -33,6 +33,12 @@ pub struct Config {
     /// Share of the limits of roll and pitch that a plan may use, in (0, 1]; the rest is for what no map shows:
     /// rocking, sinking springs, the edge of a rock between two cells.
     pub attitude_share: f64,
+    /// Where the vehicle may be.
+    #[serde(default)]
+    pub areas: Areas,
+    /// Range sensors whose scans come in their own frames, numbered from 1; scans of number 0 come in the body frame.
+    #[serde(default)]
+    pub sensors: Vec<Mount>,
 }
 
 /// Window of the risk map; its cells are whole multiples of the elevation map's.
@@ -97,6 +103,8 @@ impl Config {
             controller,
             guard: GuardConfig::default(),
             attitude_share: 0.9,
+            areas: Areas::default(),
+            sensors: Vec::new(),
         }
     }
 
@@ -109,7 +117,7 @@ impl Config {
     pub(crate) fn validate(&self) -> Result<(), NavigatorError> {
         match self.first_invalid() {
             Some((field, expected, found)) => Err(NavigatorError::Config { field, expected, found }),
-            None => Ok(()),
+            None => self.areas.validate(),
         }
     }
 
@@ -138,6 +146,11 @@ impl Config {
         let own = checks.into_iter().find(|(allowed, ..)| !allowed);
         own.map(|(_, field, expected, found)| (field, expected, found))
             .or(self.guard.first_invalid().map(|(field, found)| (field, "a finite number > 0", found)))
+            .or(self
+                .sensors
+                .iter()
+                .find_map(Mount::first_invalid)
+                .map(|(field, found)| (field, "a finite number", found)))
     }
 }
 

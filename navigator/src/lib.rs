@@ -9,6 +9,7 @@
 //! [`Config::for_vehicle`] fits all settings to a machine, a [`Belief`] says how the ground is judged, a [`Guard`] what
 //! may enter. `examples/own_surface.rs` drives the three on a map of one's own.
 
+mod areas;
 mod assessor;
 mod author;
 mod config;
@@ -23,6 +24,7 @@ mod route;
 mod surveyor;
 mod track;
 
+pub use areas::Areas;
 pub use assessor::Assessor;
 pub use config::{Config, RiskMapConfig};
 pub use guard::{Admitted, Guard, GuardConfig};

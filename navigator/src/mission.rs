@@ -10,7 +10,7 @@ use bicycle::{Decision, HoldReason, Odometry, StopReason};
 use mppi::ReferencePath;
 use traversability::CvarLevel;
 
-use crate::{Destination, Route};
+use crate::{Areas, Destination, Route};
 
 /// Speed below which a vehicle that is near its last goal has arrived: a little above the noise of odometry [m/s].
 const STANDING_MPS: f64 = 0.15;
@@ -118,11 +118,14 @@ pub enum OrderRefusal {
     /// Its numbers make no order.
     #[error("its numbers make no order")]
     Malformed,
+    /// It leads to where the vehicle may not be.
+    #[error("it leads out of the geofence or into an area to keep out of")]
+    OutOfArea,
 }
 
 impl OrderRefusal {
     /// All of them; messages number them from 1.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 9] = [
         Self::Stale,
         Self::OutOfOrder,
         Self::FromFuture,
@@ -131,6 +134,7 @@ impl OrderRefusal {
         Self::NoMission,
         Self::Manual,
         Self::Malformed,
+        Self::OutOfArea,
     ];
 }
 
@@ -153,6 +157,7 @@ pub enum Stage {
 #[derive(Clone, Debug)]
 pub struct Mission {
     order_age_max_ns: u64,
+    areas: Areas,
     stage: Stage,
     route: Option<Route>,
     leg: usize,
@@ -170,6 +175,7 @@ impl Mission {
     pub fn new(order_age_max_ns: u64) -> Self {
         Self {
             order_age_max_ns,
+            areas: Areas::default(),
             stage: Stage::Idle,
             route: None,
             leg: 0,
@@ -184,8 +190,13 @@ impl Mission {
     }
 
     /// The same with the emergency stop latched, for whoever does not know what was ordered before.
-    pub fn latched(order_age_max_ns: u64) -> Self {
-        Self { is_latched: true, ..Self::new(order_age_max_ns) }
+    pub fn latched(self) -> Self {
+        Self { is_latched: true, ..self }
+    }
+
+    /// The same for a vehicle that may not be everywhere.
+    pub fn within(self, areas: Areas) -> Self {
+        Self { areas, ..self }
     }
 
     /// Takes an order, or counts why it does not count.
@@ -304,7 +315,7 @@ impl Mission {
             }
             _ if self.is_latched => return Err(OrderRefusal::EmergencyStop),
             Order::Drive(_) if self.is_manual => return Err(OrderRefusal::Manual),
-            Order::Drive(route) => self.begin(route),
+            Order::Drive(route) => self.begin(route)?,
             Order::Pause => {
                 self.require_mission()?;
                 self.stage = Stage::Paused;
@@ -315,11 +326,15 @@ impl Mission {
         Ok(())
     }
 
-    fn begin(&mut self, route: Route) {
+    fn begin(&mut self, route: Route) -> Result<(), OrderRefusal> {
+        if !route.points_m().iter().all(|point_m| self.areas.allow(*point_m)) {
+            return Err(OrderRefusal::OutOfArea);
+        }
         self.leg = route.first_leg();
         self.route = Some(route);
         self.stage = Stage::Driving;
         self.number += 1;
+        Ok(())
     }
 
     fn end(&mut self, stage: Stage) {

@@ -77,6 +77,9 @@ pub enum NavigatorError {
     /// Where to go is nowhere.
     #[error(transparent)]
     Route(#[from] RouteError),
+    /// The first goal may not be driven to.
+    #[error("goal: {0}")]
+    Order(#[from] OrderRefusal),
 }
 
 /// The planner: its three parts, one after the other, behind two calls.
@@ -104,10 +107,9 @@ impl<M: Driven> Navigator<M> {
     /// A pipeline that has seen nothing.
     pub fn new(setup: Setup<'_, M>) -> Result<Self, NavigatorError> {
         let Setup { geometry, model, config, belief, surface, level, seed, goal_m, tolerance_m } = setup;
-        let mut mission = Mission::new(ORDER_AGE_MAX_NS);
+        let mut mission = Mission::new(ORDER_AGE_MAX_NS).within(config.areas.clone());
         let route = Route::goals(vec![goal_m], tolerance_m)?;
-        // Nothing speaks against the first order.
-        mission.order(Order::Drive(route), Said { sequence: 1, ..Said::default() }, 0).ok();
+        mission.order(Order::Drive(route), Said { sequence: 1, ..Said::default() }, 0)?;
         Ok(Self {
             surveyor: Surveyor::new(geometry, config.elevation, config.guard, surface)?
                 .with_sensors(model.sensors()),

@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 
 use bicycle::{Model, Odometry, SensorModel, Vehicle};
 use navigator::{Assessor, Belief, Config, Jump, Surface, Surveyor, Whereabouts};
-use terrain::Scan;
+use terrain::{Mount, Scan};
 use traversability::CvarLevel;
 
 use crate::RuntimeError;
@@ -60,6 +60,7 @@ pub fn run(bus: &Bus, setup: &MappingSetup<'_>, is_over: &dyn Fn() -> bool) -> R
 
 struct Mapping {
     surveyor: Surveyor,
+    mounts: Vec<Mount>,
     waiting: VecDeque<Waiting>,
     wait_max_ns: u64,
     intake: Intake,
@@ -70,7 +71,7 @@ struct Mapping {
     meter: Meter,
     last_scan: Option<Stamp>,
     last_odometry: Option<Stamp>,
-    /// Scans that made no map.
+    /// Scans that made no map, those of unknown sensors among them.
     n_unmapped: u64,
 }
 
@@ -99,6 +100,7 @@ impl Mapping {
         Ok(Self {
             surveyor: Surveyor::new(vehicle, config.elevation, config.guard, Surface::Sensed)?
                 .with_sensors(SensorModel::of(&model.effects)),
+            mounts: config.sensors.clone(),
             waiting: VecDeque::with_capacity(WAITING_MAX),
             wait_max_ns: clock::nanoseconds(config.guard.odometry_wait_max_s),
             intake: Intake::default(),
@@ -120,14 +122,17 @@ impl Mapping {
         for (stamp, record) in odometry {
             self.follow(&stamp, &record)?;
         }
-        let (waiting, n_unmapped) = (&mut self.waiting, &mut self.n_unmapped);
+        let (waiting, n_unmapped, mounts) = (&mut self.waiting, &mut self.n_unmapped, &self.mounts);
         self.scans.poll(|header, points| {
+            let Some(scan) = header.scan(points, mounts) else {
+                *n_unmapped += 1;
+                return;
+            };
             if waiting.len() == WAITING_MAX {
                 waiting.pop_front();
                 *n_unmapped += 1;
             }
-            let (stamp, scan) = (header.stamp, header.scan(points));
-            waiting.push_back(Waiting { since_ns: clock::now_ns(), stamp, scan });
+            waiting.push_back(Waiting { since_ns: clock::now_ns(), stamp: header.stamp, scan });
         });
         self.take_waiting()?;
         self.fallback.listen()?;

@@ -4,7 +4,7 @@ mod heard;
 mod record;
 
 use bicycle::{Model, SensorModel};
-use navigator::{Mission, Order, OrderRefusal, Route, Said};
+use navigator::{Areas, Mission, NavigatorError, Order, OrderRefusal, Route, Said};
 
 use crate::RuntimeError;
 use bus::ages::{AgeLimits, Periods};
@@ -32,6 +32,8 @@ pub struct MissionSetup<'a> {
     pub periods: Periods,
     /// How old orders may be.
     pub ages: AgeLimits,
+    /// Where the vehicle may be.
+    pub areas: Areas,
 }
 
 /// How a mission begins.
@@ -78,9 +80,9 @@ struct Leader {
 
 impl Leader {
     fn new(bus: &Bus, setup: MissionSetup<'_>) -> Result<Self, RuntimeError> {
-        let MissionSetup { beginning, tolerance_m, model, periods, ages } = setup;
+        let MissionSetup { beginning, tolerance_m, model, periods, ages, areas } = setup;
         Ok(Self {
-            mission: begun(beginning, ages.order_ns),
+            mission: begun(beginning, Mission::new(ages.order_ns).within(areas))?,
             tolerance_m,
             sensors: SensorModel::of(&model.effects),
             orders: bus.inlet(&ORDER)?,
@@ -165,17 +167,16 @@ impl Leader {
     }
 }
 
-fn begun(beginning: Beginning, order_age_max_ns: u64) -> Mission {
-    let mut mission = Mission::new(order_age_max_ns);
+fn begun(beginning: Beginning, mut mission: Mission) -> Result<Mission, NavigatorError> {
     match beginning {
         Beginning::Idle => {}
-        // The first order of all: nothing speaks against it, and every other is said later.
         Beginning::Driving(route) => {
-            mission.order(Order::Drive(route), Said { sequence: 1, ..Said::default() }, 0).ok();
+            // The first order of all: every other is said later.
+            mission.order(Order::Drive(route), Said { sequence: 1, ..Said::default() }, 0)?;
         }
-        Beginning::Latched => mission = Mission::latched(order_age_max_ns),
+        Beginning::Latched => mission = mission.latched(),
     }
-    mission
+    Ok(mission)
 }
 
 /// Time of the mission: from the first odometry that it had until it was over.

@@ -6,17 +6,18 @@ mod views;
 use std::path::PathBuf;
 
 use bytemuck::NoUninit;
+use terrain::Mount;
 
 use crate::RuntimeError;
 use crate::setup::RecordedSetup;
 use bus::channel::{
-    Bus, CHECKPOINT, COMMAND, DECISION, EMERGENCY_STOP, Element, Header, Inlet, MISSION, ODOMETRY, ORDER,
-    RISK, RISK_PHYSICS, SCAN, STUCK, SURFACE,
+    Bus, CHECKPOINT, COMMAND, DECISION, EMERGENCY_STOP, Element, Header, IMU, Inlet, MISSION, ODOMETRY,
+    ORDER, RISK, RISK_PHYSICS, SCAN, STUCK, SURFACE,
 };
 use bus::clock::{self, SECOND_NS};
 use bus::message::{
-    CheckpointHeader, CommandRecord, DecisionRecord, MissionRecord, OdometryRecord, OrderHeader, PointRecord,
-    RiskHeader, ScanHeader, Stamp, StuckRecord, SurfaceHeader,
+    CheckpointHeader, CommandRecord, DecisionRecord, ImuRecord, MissionRecord, OdometryRecord, OrderHeader,
+    PointRecord, RiskHeader, ScanHeader, Stamp, StuckRecord, SurfaceHeader,
 };
 use bus::status::{Health, Meter, Role};
 use file::RotatingFile;
@@ -31,6 +32,8 @@ pub mod topic {
     pub const CHANNELS: &str = "/channel/";
     /// [`bus::channel::ODOMETRY`].
     pub const ODOMETRY: &str = "/channel/odometry";
+    /// [`bus::channel::IMU`].
+    pub const IMU: &str = "/channel/imu";
     /// [`bus::channel::SCAN`].
     pub const SCAN: &str = "/channel/scan";
     /// Headers of [`bus::channel::SURFACE`].
@@ -69,6 +72,8 @@ pub struct RecorderSetup {
     pub file_time_max_s: f64,
     /// Size that all recordings of the folder together may reach, those of before included [bytes].
     pub quota_bytes: u64,
+    /// Sensors that scans may be of.
+    pub mounts: Vec<Mount>,
     /// Time after which what was recorded is put onto the disk, so that a failure of the power costs no more [s].
     pub sync_interval_s: f64,
 }
@@ -83,7 +88,7 @@ pub fn run(
     warn: &mut dyn FnMut(&str),
 ) -> Result<(), RuntimeError> {
     let mut tell = |error: RuntimeError| warn(&format!("{error}; driving on without a recording"));
-    let mut recorder = Recorder::new(bus)?;
+    let mut recorder = Recorder::new(bus, setup.mounts.clone())?;
     recorder.file = match RotatingFile::create(setup, clock::now_ns()) {
         Err(error @ RuntimeError::Quota { .. }) => {
             tell(error);
@@ -113,6 +118,7 @@ struct Recorder {
 
 struct Inlets {
     odometry: Inlet<Stamp, OdometryRecord>,
+    imu: Inlet<Stamp, ImuRecord>,
     scans: Inlet<ScanHeader, PointRecord>,
     surfaces: Inlet<SurfaceHeader, [f32; 8]>,
     risks: [Inlet<RiskHeader, [f32; 4]>; 2],
@@ -125,9 +131,10 @@ struct Inlets {
 }
 
 impl Recorder {
-    fn new(bus: &Bus) -> Result<Self, RuntimeError> {
+    fn new(bus: &Bus, mounts: Vec<Mount>) -> Result<Self, RuntimeError> {
         let inlets = Inlets {
             odometry: bus.inlet(&ODOMETRY)?,
+            imu: bus.inlet(&IMU)?,
             scans: bus.inlet(&SCAN)?,
             surfaces: bus.inlet(&SURFACE)?,
             risks: [bus.inlet(&RISK)?, bus.inlet(&RISK_PHYSICS)?],
@@ -139,7 +146,7 @@ impl Recorder {
             checkpoints: bus.inlet(&CHECKPOINT)?,
         };
         let meter = Meter::new(bus, Role::Recorder)?;
-        Ok(Self { inlets, file: None, views: Views::default(), meter, n_unrecorded: 0 })
+        Ok(Self { inlets, file: None, views: Views::new(mounts), meter, n_unrecorded: 0 })
     }
 
     /// Takes everything from the channels, what others are made of first, and writes it.
@@ -158,6 +165,9 @@ impl Recorder {
         inlets.odometry.poll(|header, records| {
             keep(&mut result, write(file, topic::ODOMETRY, header, records, OdometryRecord::layout));
             keep(&mut result, views.odometry(file.recorder(), header, records));
+        });
+        inlets.imu.poll(|header, samples| {
+            keep(&mut result, write(file, topic::IMU, header, samples, ImuRecord::layout));
         });
         inlets.scans.poll(|header, points| {
             keep(&mut result, write(file, topic::SCAN, header, points, PointRecord::layout));
@@ -200,10 +210,12 @@ impl Recorder {
 
     fn report(&mut self) -> Result<(), RuntimeError> {
         let bytes = self.file.as_ref().map_or(-1.0, |file| file.bytes() as f64);
-        let Inlets { odometry, scans, surfaces, risks: [learned, physics], decisions, .. } = &self.inlets;
+        let Inlets { odometry, imu, scans, surfaces, risks: [learned, physics], decisions, .. } =
+            &self.inlets;
         Ok(self.meter.report(clock::now_ns(), || {
             Health { figure: bytes, n_missed: self.n_unrecorded, ..Health::default() }
                 .with(odometry.counts())
+                .with(imu.counts())
                 .with(scans.counts())
                 .with(surfaces.counts())
                 .with(learned.counts())
@@ -223,6 +235,7 @@ impl Inlets {
         }
         let ([learned, physics], [orders, emergency_stops]) = (&mut self.risks, &mut self.orders);
         all(&mut self.odometry)
+            + all(&mut self.imu)
             + all(&mut self.scans)
             + all(&mut self.surfaces)
             + all(learned)

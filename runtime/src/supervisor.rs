@@ -11,6 +11,7 @@ use crate::timing::{ControlTiming, Timing};
 use crate::usage::{ProcessUsage, Usage};
 use bus::channel::{Bus, DECISION, Inlet, MISSION};
 use bus::clock::{self, SECOND_NS};
+use bus::message::mission::UNDER_WAY;
 use bus::message::{DecisionRecord, MissionRecord, Stamp, StatusRecord};
 use bus::status::Role;
 
@@ -48,6 +49,8 @@ const PATIENCE_NS: u64 = 3 * SECOND_NS;
 pub enum RunEnd {
     /// The vehicle's process ended of itself, with this exit code.
     Plant(i32),
+    /// The mission is over, with this [`MissionRecord::outcome`].
+    MissionOver(u64),
     /// The user ended it.
     Interrupted,
     /// A process refused its input, or kept dying.
@@ -98,6 +101,8 @@ pub struct Supervisor<'a> {
     policy: RestartPolicy,
     command: &'a dyn Fn(Role, Start) -> Command,
     unended: Vec<String>,
+    /// Whether the run is over when the mission is.
+    ends_with_mission: bool,
 }
 
 impl<'a> Supervisor<'a> {
@@ -129,7 +134,13 @@ impl<'a> Supervisor<'a> {
             policy,
             command,
             unended: Vec::new(),
+            ends_with_mission: false,
         })
+    }
+
+    /// The same for a run that ends when its mission does, because no process of a vehicle says when.
+    pub fn until_the_mission_is_over(self) -> Self {
+        Self { ends_with_mission: true, ..self }
     }
 
     /// Keeps them going until the vehicle's process ends, one cannot be kept, or `is_over`; `show` is given the state
@@ -149,6 +160,9 @@ impl<'a> Supervisor<'a> {
                 break end;
             }
             self.listen();
+            if let Some(outcome) = self.outcome() {
+                break RunEnd::MissionOver(outcome);
+            }
             if now_ns.saturating_sub(shown_at_ns) >= SECOND_NS {
                 shown_at_ns = now_ns;
                 self.kept.iter_mut().for_each(|kept| kept.account(now_ns));
@@ -175,6 +189,12 @@ impl<'a> Supervisor<'a> {
     pub fn report(&self) -> RunReport {
         let usage = |kept: &Kept| kept.usage.report(kept.role.name(), kept.deaths_at_ns.len());
         RunReport { control: self.timing.report(), processes: self.kept.iter().map(usage).collect() }
+    }
+
+    /// How the mission ended that the run ends with.
+    fn outcome(&self) -> Option<u64> {
+        let outcome = self.mission.as_ref().map_or(UNDER_WAY, |mission| mission.outcome);
+        (self.ends_with_mission && outcome != UNDER_WAY).then_some(outcome)
     }
 
     fn tend(&mut self, now_ns: u64) -> Option<RunEnd> {

@@ -3,21 +3,23 @@
 //!
 //! It is a driver like that of any vehicle: what it knows of the processes that command it is in [`bus`].
 
-use bicycle::{Decision, Vehicle};
+use bicycle::{Decision, ImuSample, Vehicle};
 use scenarios::{Episode, EpisodeConfig, Observation, Outcome, Task};
 
 use bus::ages::{AgeLimits, Periods};
-use bus::channel::{Bus, COMMAND, Inlet, MISSION, ODOMETRY, Outlet, SCAN};
+use bus::channel::{Bus, COMMAND, IMU, Inlet, MISSION, ODOMETRY, Outlet, SCAN};
 use bus::clock::{self, Cycle, SECOND_NS};
 use bus::message::mission::REACHED;
 use bus::message::{
-    CommandRecord, MissionRecord, OdometryRecord, PointRecord, ScanHeader, Stamp, StatusRecord,
+    CommandRecord, ImuRecord, MissionRecord, OdometryRecord, PointRecord, ScanHeader, Stamp, StatusRecord,
 };
 use bus::status::{Health, Meter, Role};
 use bus::watchdog::Watchdog;
 
 /// Returns of a sweep at the most.
 pub const POINTS_MAX: usize = 1 << 16;
+/// Inertial samples between two odometry messages at the most.
+const SAMPLES_MAX: usize = 256;
 /// The world does not wait: a plant that is late catches up, from no further back than this [ns].
 const BEHIND_MAX_NS: u64 = SECOND_NS / 4;
 
@@ -126,6 +128,7 @@ struct Plant {
     has_arrived: bool,
     commands: Inlet<Stamp, CommandRecord>,
     odometry: Outlet<Stamp, OdometryRecord>,
+    imu: Outlet<Stamp, ImuRecord>,
     scans: Outlet<ScanHeader, PointRecord>,
     missions: Inlet<Stamp, MissionRecord>,
     mapping: Inlet<Stamp, StatusRecord>,
@@ -156,6 +159,7 @@ impl Plant {
             has_arrived: false,
             commands,
             odometry,
+            imu: bus.outlet(&IMU, SAMPLES_MAX)?,
             scans,
             missions: bus.inlet(&MISSION)?,
             mapping: bus.inlet(&Role::Mapping.status())?,
@@ -212,9 +216,19 @@ impl Plant {
 
     fn measure(&mut self) -> Result<(), SimulatorError> {
         let at_ns = self.at_ns();
-        let Observation { odometry, scan, .. } = self.episode.observe();
+        let Observation { odometry, imu, scan, .. } = self.episode.observe();
         let record = OdometryRecord::from(odometry).with_applied(self.watchdog.applied());
         self.odometry.send_one(Stamp::default(), record, at_ns)?;
+        let samples = &imu[imu.len().saturating_sub(SAMPLES_MAX)..];
+        if !samples.is_empty() {
+            // The episode's clock and this one began at different times.
+            let of = |sample: &ImuSample| ImuRecord {
+                valid_at_ns: self.began_ns + sample.valid_at_ns,
+                ..ImuRecord::from(sample)
+            };
+            let loan = self.imu.write(samples.len(), |place| of(&samples[place]))?;
+            self.imu.send(loan, at_ns)?;
+        }
         let Some(scan) = scan else { return Ok(()) };
         let n_points = scan.points.len().min(self.scans.n_max());
         let mut loan = self.scans.write(n_points, |place| PointRecord::from(&scan.points[place]))?;

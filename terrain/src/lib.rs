@@ -54,6 +54,7 @@ mod elevation;
 mod footprint;
 mod grid;
 mod ground_filter;
+mod mount;
 mod observation;
 mod plane;
 mod region;
@@ -68,6 +69,7 @@ pub use elevation::{
 pub use footprint::{Footprint, WheelLayout, YawFootprint};
 pub use grid::{Cell, DistantPosition, GridGeometry, GridMap, LATTICE_MAX};
 pub use ground_filter::{FilteredGround, GroundFilter, GroundFilterError, filter_ground, height_step_m};
+pub use mount::Mount;
 pub use observation::{Pose, RangePoint, Scan, TerrainClass};
 pub use region::CellRegion;
 pub use sampling::{PatchSample, PatchShape, bilinear_height, envelope_height, height_at, wheel_heights_m};

@@ -1,9 +1,11 @@
 //! Between the messages and what the pipeline is made of.
 
-use bicycle::{Applied, AppliedBy, Column, Command, Decision, DriveRow, HoldReason, Odometry, StopReason};
-use terrain::{GridGeometry, LATTICE_MAX, RangePoint, Scan, TerrainClass};
+use bicycle::{
+    Applied, AppliedBy, Column, Command, Decision, DriveRow, HoldReason, ImuSample, Odometry, StopReason,
+};
+use terrain::{GridGeometry, LATTICE_MAX, Mount, RangePoint, Scan, TerrainClass};
 
-use super::{CommandRecord, Grid, OdometryRecord, PointRecord, ScanHeader, Source, Stamp};
+use super::{CommandRecord, Grid, ImuRecord, OdometryRecord, PointRecord, ScanHeader, Source, Stamp};
 
 /// Reasons to stop; the first has the number 1.
 pub const STOP_REASONS: [StopReason; 12] = [
@@ -156,6 +158,20 @@ impl OdometryRecord {
     }
 }
 
+impl From<&ImuSample> for ImuRecord {
+    fn from(sample: &ImuSample) -> Self {
+        let ImuSample { valid_at_ns, acceleration_mps2, angular_rate_radps } = *sample;
+        Self { valid_at_ns, acceleration_mps2, angular_rate_radps }
+    }
+}
+
+impl From<&ImuRecord> for ImuSample {
+    fn from(record: &ImuRecord) -> Self {
+        let ImuRecord { valid_at_ns, acceleration_mps2, angular_rate_radps } = *record;
+        Self { valid_at_ns, acceleration_mps2, angular_rate_radps }
+    }
+}
+
 impl From<&RangePoint> for PointRecord {
     fn from(point: &RangePoint) -> Self {
         Self { position_m: point.position_m, class_number: point.class as u32 }
@@ -171,12 +187,17 @@ impl PointRecord {
 }
 
 impl ScanHeader {
-    /// As the pipeline takes it, without points of a class that there is not.
-    pub fn scan(&self, points: &[PointRecord]) -> Scan {
-        Scan {
+    /// The scan in the body frame, of the returns that are of a known class; `None` of a sensor that is not among
+    /// `mounts`.
+    pub fn scan(&self, points: &[PointRecord], mounts: &[Mount]) -> Option<Scan> {
+        let scan = Scan {
             valid_at_ns: self.stamp.valid_at_ns,
             origin_m: self.origin_m,
             points: points.iter().filter_map(PointRecord::point).collect(),
+        };
+        match (self.sensor as usize).checked_sub(1) {
+            None => Some(scan),
+            Some(place) => mounts.get(place).map(|mount| mount.in_body_frame(&scan)),
         }
     }
 }
@@ -268,9 +289,22 @@ mod tests {
     fn points_of_no_class_are_left_out() {
         let header = ScanHeader::default();
         let point = |class_number| PointRecord { position_m: [1.0, 2.0, 3.0], class_number };
-        let scan = header.scan(&[point(0), point(4), point(3), point(u32::MAX)]);
+        let scan = header.scan(&[point(0), point(4), point(3), point(u32::MAX)], &[]).unwrap();
         assert_eq!(scan.points.len(), 2);
         assert_eq!(scan.points[1].class, TerrainClass::Obstacle);
+    }
+
+    #[test]
+    fn scans_of_a_sensor_lie_where_it_sits_and_those_of_an_unknown_one_nowhere() {
+        let mount = Mount { position_m: [0.5, 0.0, 1.0], ..Mount::default() };
+        let point = PointRecord { position_m: [2.0, 0.0, -1.0], class_number: 0 };
+        let of = |sensor| {
+            ScanHeader { sensor, ..ScanHeader::default() }.scan(&[point], std::slice::from_ref(&mount))
+        };
+        assert_eq!(of(0).unwrap().points[0].position_m, [2.0, 0.0, -1.0]);
+        assert_eq!(of(1).unwrap().points[0].position_m, [2.5, 0.0, 0.0]);
+        assert_eq!(of(1).unwrap().origin_m, [0.5, 0.0, 1.0]);
+        assert_eq!([of(2), of(u32::MAX)], [None, None]);
     }
 
     #[test]

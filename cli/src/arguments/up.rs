@@ -6,12 +6,31 @@ use bus::ages::Periods;
 use bus::channel::{RunName, THIRD_PARTIES};
 use bus::status::Role;
 use clap::{Args, ValueEnum};
+use formats::RobotFile;
 
 use super::DriveArguments;
 use super::values;
 
 /// Where the live view is served: on this machine, at the port that Foxglove looks for.
 pub const LIVE_DEFAULT: &str = "127.0.0.1:8765";
+
+/// What describes a simulated vehicle or its world, and what a robot's file says.
+const SIMULATION: [&str; 14] = [
+    "world",
+    "bush_height",
+    "start",
+    "vehicle",
+    "deviation",
+    "model",
+    "config",
+    "method",
+    "weights",
+    "time_limit",
+    "rate",
+    "odometry_rate",
+    "scan_rate",
+    "command_age",
+];
 
 /// What to run, and for which machine.
 #[derive(Args, Clone, Debug)]
@@ -20,6 +39,21 @@ pub struct UpArguments {
     /// Which process to be; all starts every one of them and keeps them alive
     #[arg(long, value_enum, default_value_t = UpRole::All, help_heading = "Processes")]
     pub role: UpRole,
+
+    /// Supervise the processes of a real robot, which this TOML file describes, and simulate none: vehicle, roles, rates,
+    /// ages, sensors, goals, areas to keep out of
+    ///
+    /// The robot's own driver publishes odometry and scans and follows commands; see docs/runtime.md, "Your robot".
+    #[arg(long, value_name = "FILE", conflicts_with_all = SIMULATION, help_heading = "Processes")]
+    pub robot: Option<std::path::PathBuf>,
+
+    /// Simulate the vehicle, as without --robot
+    #[arg(long, conflicts_with = "robot", help_heading = "Processes")]
+    pub sim: bool,
+
+    /// What the robot's file says.
+    #[arg(skip)]
+    pub described: Option<Box<RobotFile>>,
 
     /// Name of the run: processes of the same name find one another
     #[arg(long, value_name = "NAME", default_value = "field", help_heading = "Processes")]
@@ -208,6 +242,8 @@ Examples:
       One of them, in its own terminal, for the run `north`.
   surefoot up --realtime --rate 50
       As regular as the system permits, 50 decisions a second.
+  surefoot up --robot mine.toml
+      The processes of a robot of your own, without a simulator; its driver is yours.
   surefoot up --standby --time-limit 3600
       Wait for `surefoot goal`, `pause`, `estop` and the others; see `surefoot goal --help`.
 

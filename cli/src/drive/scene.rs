@@ -51,6 +51,15 @@ pub(super) fn prepare(arguments: &DriveArguments) -> Result<Scene, UsageError> {
 /// The machine alone, with a guard that its configuration may change.
 pub(crate) fn machine(arguments: &DriveArguments, guard: GuardConfig) -> Result<Machine, UsageError> {
     let vehicle = read_vehicle(arguments.vehicle_name_or_path()).map_err(UsageError::from_input)?;
+    machine_of(vehicle, arguments, guard)
+}
+
+/// The same of a vehicle that has been read.
+pub(crate) fn machine_of(
+    vehicle: Vehicle,
+    arguments: &DriveArguments,
+    guard: GuardConfig,
+) -> Result<Machine, UsageError> {
     let model = match &arguments.model {
         Some(path) => read_model(path).map_err(UsageError::from_input)?,
         None => Model::of(&vehicle),

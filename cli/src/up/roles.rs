@@ -4,8 +4,8 @@ use bench::closed_loop::Method;
 use bus::ages::AgeLimits;
 use bus::channel::{Bus, ChannelError};
 use bus::status::Role;
-use navigator::{Belief, Route};
-use runtime::ages::{self as age_limits, AskedAges};
+use navigator::{Assessor, Belief, Route};
+use runtime::ages as age_limits;
 use runtime::control::{self, ControlSetup};
 use runtime::learning::{self, LearningSetup};
 use runtime::mapping::{self, MappingSetup};
@@ -23,7 +23,7 @@ use std::ffi::OsString;
 use std::sync::Arc;
 use traversability::CvarLevel;
 
-use super::learn;
+use super::{learn, robot};
 use crate::arguments::UpArguments;
 use crate::drive::scene::{self, Machine};
 use crate::summary::revision;
@@ -33,19 +33,29 @@ use crate::{UsageError, WorkFailed, interrupt};
 /// over: processes are started meanwhile [s].
 const STANDING_MAX_S: f64 = 30.0;
 
-/// Reads everything that the processes will, so that bad input is refused before they start.
-/// Returns the drive.
-pub(super) fn prepare(arguments: &UpArguments) -> Result<Task, UsageError> {
+/// Reads everything that the processes will, so that bad input is refused before they start. Returns the words by which
+/// the mission's process knows route and tolerance, without building a world to find them in.
+pub(super) fn prepare(arguments: &UpArguments) -> Result<Vec<OsString>, UsageError> {
     let machine = machine(arguments)?;
-    let task = scene::task(&arguments.drive, &machine.vehicle)?;
     learn::school(arguments, &machine)?;
     ages(arguments, &machine)?;
-    simulator::cycles_per_scan(&arguments.periods()).map_err(UsageError::from_input)?;
-    Ok(task)
+    if arguments.described.is_some() {
+        Assessor::new(
+            &machine.vehicle,
+            &machine.model.limits,
+            &machine.config,
+            &Belief::Physics,
+            level(arguments)?,
+        )
+        .map_err(UsageError::from_input)?;
+        beginning(arguments, &machine)?;
+        return Ok(Vec::new());
+    }
+    simulator::cycles_per_scan(&robot::periods(arguments)).map_err(UsageError::from_input)?;
+    Ok(words_of_route(arguments, &scene::task(&arguments.drive, &machine.vehicle)?))
 }
 
-/// The words by which the mission's process knows route and tolerance, without building a world to find them in.
-pub(super) fn words_of_route(arguments: &UpArguments, task: &Task) -> Vec<OsString> {
+fn words_of_route(arguments: &UpArguments, task: &Task) -> Vec<OsString> {
     let [x_m, y_m] = task.goal_m;
     let is_known = arguments.standby || !arguments.drive.goal.is_empty();
     let goal = [format!("--goal={x_m},{y_m}")].into_iter().filter(|_| !is_known);
@@ -55,15 +65,37 @@ pub(super) fn words_of_route(arguments: &UpArguments, task: &Task) -> Vec<OsStri
 }
 
 fn run_mission(arguments: &UpArguments, machine: &Machine, ages: AgeLimits) -> anyhow::Result<()> {
+    let (beginning, tolerance_m) = beginning(arguments, machine)?;
+    let setup = MissionSetup {
+        beginning,
+        tolerance_m,
+        model: &machine.model,
+        periods: robot::periods(arguments),
+        ages,
+        areas: machine.config.areas.clone(),
+    };
+    Ok(mission::run(&join(arguments)?, setup, &interrupt::interrupted)?)
+}
+
+/// How the mission begins, and how near to a goal counts as there [m].
+fn beginning(arguments: &UpArguments, machine: &Machine) -> Result<(Beginning, f64), UsageError> {
     let drive = &arguments.drive;
     let goals_m = drive.goal.iter().map(|goal| [goal.x_m, goal.y_m]).collect::<Vec<_>>();
-    let (goals_m, tolerance_m) = match (drive.tolerance, goals_m.is_empty() && !arguments.standby) {
+    let is_open = goals_m.is_empty() && !arguments.standby;
+    let (goals_m, tolerance_m) = match (robot::tolerance_m(arguments, machine), is_open) {
         (Some(tolerance_m), false) => (goals_m, tolerance_m),
         (_, is_open) => {
             let task = scene::task(drive, &machine.vehicle)?;
             (if is_open { vec![task.goal_m] } else { goals_m }, task.goal_tolerance_m)
         }
     };
+    let forbidden = goals_m.iter().find(|goal_m| !machine.config.areas.allow(**goal_m));
+    if let Some([x_m, y_m]) = forbidden {
+        return Err(UsageError(format!(
+            "goal: expected a place where the vehicle may be, found ({x_m}, {y_m}) m, out of the geofence or in an area \
+             to keep out of"
+        )));
+    }
     let beginning = match (arguments.again, goals_m.is_empty()) {
         (true, _) => Beginning::Latched,
         (false, true) => Beginning::Idle,
@@ -71,9 +103,7 @@ fn run_mission(arguments: &UpArguments, machine: &Machine, ages: AgeLimits) -> a
             Beginning::Driving(Route::goals(goals_m, tolerance_m).map_err(UsageError::from_input)?)
         }
     };
-    let setup =
-        MissionSetup { beginning, tolerance_m, model: &machine.model, periods: arguments.periods(), ages };
-    Ok(mission::run(&join(arguments)?, setup, &interrupt::interrupted)?)
+    Ok((beginning, tolerance_m))
 }
 
 /// Joins the processes of the run.
@@ -83,16 +113,12 @@ pub(super) fn join(arguments: &UpArguments) -> Result<Bus, ChannelError> {
 
 /// The machine, with a guard that fits the periods of the run.
 fn machine(arguments: &UpArguments) -> Result<Machine, UsageError> {
-    scene::machine(&arguments.drive, age_limits::guard(&arguments.periods()))
+    robot::machine(arguments, age_limits::guard(&robot::periods(arguments)))
 }
 
 fn ages(arguments: &UpArguments, machine: &Machine) -> Result<AgeLimits, UsageError> {
-    age_limits::limits(
-        &arguments.periods(),
-        &machine.config.guard,
-        &AskedAges::of_command(arguments.command_age),
-    )
-    .map_err(UsageError::from_input)
+    let (periods, asked) = (robot::periods(arguments), robot::ages(arguments));
+    age_limits::limits(&periods, &machine.config.guard, &asked).map_err(UsageError::from_input)
 }
 
 pub(super) fn run(arguments: &UpArguments, role: Role) -> anyhow::Result<()> {
@@ -142,7 +168,7 @@ pub(super) fn run(arguments: &UpArguments, role: Role) -> anyhow::Result<()> {
                 // It has one core of its own.
                 config.controller.n_threads = 1;
             }
-            let (seed, period_s) = (arguments.drive.seed, arguments.periods().control_s);
+            let (seed, period_s) = (arguments.drive.seed, robot::periods(arguments).control_s);
             let setup = ControlSetup { model, config, seed, period_s, ages };
             control::run(&join(arguments)?, setup, is_over)?;
         }
@@ -172,7 +198,7 @@ fn recorder_setup(
         Some(networks) => hexadecimal(&Sha256::digest(networks.weights_bytes()?)),
         None => String::new(),
     };
-    let vehicle_name = vehicle.name.clone();
+    let (vehicle_name, mounts) = (vehicle.name.clone(), config.sensors.clone());
     let [vehicle_toml, model_toml, config_toml] = MachineSetup { vehicle, model, config }.texts()?;
     let setup = RecordedSetup {
         format: RecordedSetup::FORMAT,
@@ -194,6 +220,7 @@ fn recorder_setup(
         setup,
         file_bytes_max: FILE_BYTES_MAX,
         file_time_max_s: FILE_TIME_MAX_S,
+        mounts,
         quota_bytes: (arguments.record_quota * 1e6) as u64,
         sync_interval_s: arguments.record_sync,
     })
@@ -250,7 +277,7 @@ fn run_plant(arguments: &UpArguments, machine: &Machine, ages: AgeLimits) -> any
         episode,
         ending: if arguments.standby { Ending::Never } else { Ending::AtGoal },
         seed: arguments.drive.seed,
-        periods: arguments.periods(),
+        periods: robot::periods(arguments),
         ages,
     };
     let report = simulator::run(&join(arguments)?, setup, &interrupt::interrupted)?;

@@ -114,7 +114,7 @@ fn an_emergency_stop_ends_by_a_reset_and_a_reset_moves_nothing() {
 
 #[test]
 fn whoever_does_not_know_what_was_ordered_before_begins_with_the_stop_latched() {
-    let mut operator = Operator { mission: Mission::latched(AGE_MAX_NS), ..Operator::new() };
+    let mut operator = Operator { mission: Mission::new(AGE_MAX_NS).latched(), ..Operator::new() };
     assert_eq!(operator.mission.instruction(), STOPPED);
     assert_eq!(operator.says(Order::Drive(route())), Err(OrderRefusal::EmergencyStop));
     operator.says(Order::Reset).unwrap();

@@ -47,6 +47,8 @@ fn config() -> Config {
         controller: mppi::Config { delay_s: DELAY_S, n_rollouts: 256, ..mppi::Config::default() },
         guard: GuardConfig::default(),
         attitude_share: 0.9,
+        areas: crate::Areas::default(),
+        sensors: Vec::new(),
     }
 }
 

@@ -2,7 +2,7 @@
 
 use bicycle::{Column, Decision, DriveRow};
 use formats::{DriveRecorder, RecordError};
-use terrain::Pose;
+use terrain::{Mount, Pose};
 
 use bus::clock::SECOND_NS;
 use bus::message::{
@@ -16,6 +16,7 @@ const MAP_NS: u64 = SECOND_NS;
 /// Remembers what was shown last.
 #[derive(Default)]
 pub(super) struct Views {
+    mounts: Vec<Mount>,
     odometry: Option<OdometryRecord>,
     scan_at_ns: u64,
     surface_at_ns: u64,
@@ -24,6 +25,10 @@ pub(super) struct Views {
 }
 
 impl Views {
+    pub fn new(mounts: Vec<Mount>) -> Self {
+        Self { mounts, ..Self::default() }
+    }
+
     pub fn odometry(
         &mut self,
         recorder: &mut DriveRecorder,
@@ -61,10 +66,11 @@ impl Views {
         header: &ScanHeader,
         points: &[PointRecord],
     ) -> Result<(), RecordError> {
-        if is_due(&mut self.scan_at_ns, header.stamp.published_at_ns) {
-            recorder.scan(header.stamp.valid_at_ns, &header.scan(points))?;
+        if !is_due(&mut self.scan_at_ns, header.stamp.published_at_ns) {
+            return Ok(());
         }
-        Ok(())
+        let scan = header.scan(points, &self.mounts);
+        scan.map_or(Ok(()), |scan| recorder.scan(header.stamp.valid_at_ns, &scan))
     }
 
     pub fn surface(

@@ -1,7 +1,6 @@
 //! One life of mapping, made again: the recorded odometry is shown to a surveyor in its order, and the jumps and places
 //! that come of it are held against those that the maps tell of.
 
-use crate::intake::jump_of;
 use std::ops::Bound;
 
 use bicycle::{Odometry, SensorModel};
@@ -9,10 +8,11 @@ use navigator::{Jump, NavigatorError, Surface, Surveyor, Whereabouts};
 
 use super::difference;
 use super::records::{Key, Records};
-use crate::intake::{Intake, hash_of};
+use crate::intake::{Intake, hash_of, jump_of};
 use crate::mapping::JUMPED;
 use crate::setup::MachineSetup;
 use bus::message::{OdometryRecord, Stamp, SurfaceHeader};
+use terrain::Mount;
 
 /// What became of the localisation that maps of the ground tell of.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -30,6 +30,7 @@ pub(super) struct Localisation {
 /// A life of mapping.
 pub(super) struct Survey {
     surveyor: Surveyor,
+    mounts: Vec<Mount>,
     intake: Intake,
     last_map: u64,
     last_odometry: Option<Key>,
@@ -69,6 +70,7 @@ impl Survey {
             .with_sensors(SensorModel::of(&model.effects));
         Ok(Self {
             surveyor,
+            mounts: config.sensors.clone(),
             intake: Intake::default(),
             last_map: 0,
             last_odometry: None,
@@ -106,7 +108,10 @@ impl Survey {
             self.judge(header, Err(None), found);
             return Ok(Err(format!("scan {}", header.scan.sequence)));
         };
-        let scan = scan.scan(points);
+        let Some(scan) = scan.scan(points, &self.mounts) else {
+            self.judge(header, Err(None), found);
+            return Ok(Err(format!("scan {} of unknown sensor {}", header.scan.sequence, scan.sensor)));
+        };
         let place = self.place(scan.valid_at_ns);
         let there = place.as_ref().map_or(told, |(there, _)| *there);
         self.judge(header, place, found);

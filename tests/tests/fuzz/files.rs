@@ -224,6 +224,21 @@ pub fn read_vehicle() -> Reader {
     text(|input| Fate::of(&formats::parse_vehicle(&ConfigText::new("v.toml", input))))
 }
 
+pub fn robot(rng: &mut Rng) -> Vec<u8> {
+    mutate::text(rng, include_str!("../../../examples/robot.toml"))
+}
+
+/// What is taken moves scans and judges places.
+pub fn read_robot() -> Reader {
+    text(|input| {
+        let robot = formats::parse_robot(&ConfigText::new("r.toml", input));
+        for sensor in robot.iter().flat_map(|robot| &robot.sensors) {
+            sensor.mount.in_body_frame(&terrain::Scan::default());
+        }
+        Fate::of(&robot)
+    })
+}
+
 /// A model with two effects, one of them twice.
 static MODEL: LazyLock<String> = LazyLock::new(|| {
     let mut model = bicycle::Model::of(&formats::read_vehicle("rc_car").unwrap());

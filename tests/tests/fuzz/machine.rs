@@ -109,7 +109,7 @@ impl Drive {
 
     /// The scan as the mapping takes it.
     pub fn scan(&self) -> Scan {
-        self.scan.0.scan(&self.scan.1)
+        self.scan.0.scan(&self.scan.1, &[]).unwrap()
     }
 
     /// The map of the ground as a message.
@@ -195,7 +195,7 @@ fn surveyed((header, points): &(ScanHeader, Vec<PointRecord>)) -> (SurfaceHeader
     let MachineSetup { vehicle, config, .. } = &*MACHINE;
     let mut surveyor = Surveyor::new(vehicle, config.elevation, config.guard, Surface::Sensed).unwrap();
     let odometry = Drive::odometry(1);
-    assert!(surveyor.fuse(&odometry, &header.scan(points)).unwrap());
+    assert!(surveyor.fuse(&odometry, &header.scan(points, &[]).unwrap()).unwrap());
     let surface = surveyor.surface();
     let cells: Vec<[f32; 8]> = surface.values().iter().map(cell_numbers).collect();
     let told = SurfaceHeader {

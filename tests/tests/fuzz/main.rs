@@ -61,6 +61,7 @@ targets! {
     scan_points: 8192, 8 * KB, 64 * KB, files::scan_points, files::read_scan_points;
     vehicle: 4096, KB, 64 * KB, files::vehicle, files::read_vehicle;
     model: 4096, KB, 64 * KB, files::model, files::read_model;
+    robot: 4096, KB, 64 * KB, files::robot, files::read_robot;
     settings: 2048, KB, 64 * KB, files::settings, files::read_settings;
     gap_case: 8192, KB, 64 * KB, files::gap_case, files::read_gap_case;
     gap_vehicle: 4096, KB, 64 * KB, files::gap_vehicle, files::read_gap_vehicle;
@@ -74,6 +75,7 @@ targets! {
     recorded_run: 512, 64, 8 * MB, runs::recorded_run, runs::read_recorded_run;
     pipeline: 4096, 64, 64 * MB, runs::pipeline, runs::read_pipeline;
     odometry: 1024, 0, MB, messages::odometry, messages::read_odometry;
+    imu: 8192, 64, 64 * KB, messages::imu, messages::read_imu;
     scan: 4096, 64, 2 * MB, messages::scan, messages::read_scan;
     surface: 256, 64, 4 * MB, messages::surface, messages::read_surface;
     risk: 1024, 64, MB, messages::risk, messages::read_risk;

@@ -7,8 +7,8 @@ use bus::ages::Periods;
 use bus::channel::{self, Channel, Element, Header};
 use bus::layout::Scalar;
 use bus::message::{
-    CheckpointHeader, CommandRecord, DecisionRecord, Grid, MissionRecord, OdometryRecord, OrderHeader,
-    RiskHeader, ScanHeader, StatusRecord, StuckRecord, SurfaceHeader, layouts,
+    CheckpointHeader, CommandRecord, DecisionRecord, Grid, ImuRecord, MissionRecord, OdometryRecord,
+    OrderHeader, RiskHeader, ScanHeader, StatusRecord, StuckRecord, SurfaceHeader, layouts,
 };
 use bus::payload::{RiskParts, surface_map};
 use bus::status::Role;
@@ -23,7 +23,7 @@ use runtime::ages::{self, AskedAges};
 use runtime::control::chart_of;
 use runtime::mission::{Heard, order_of, record_of, said_by};
 use runtime::timing::Timing;
-use terrain::Pose;
+use terrain::{Mount, Pose};
 
 use crate::harness::{Fate, Reader, Rng};
 use crate::machine::{Drive, MACHINE, at_ns, goal, judge, pilot, stamped, to_goal};
@@ -161,6 +161,30 @@ pub fn read_odometry() -> Reader {
     })
 }
 
+static IMU: LazyLock<Whole> = LazyLock::new(|| {
+    let sample = |valid_at_ns| ImuRecord {
+        valid_at_ns,
+        acceleration_mps2: [0.1, 0.0, 9.81],
+        angular_rate_radps: [0.0, 0.0, 0.2],
+    };
+    Whole::new((&stamped(1), "Stamp"), &[sample(at_ns(0)), sample(at_ns(1))], places("ImuRecord"))
+});
+
+pub fn imu(rng: &mut Rng) -> Vec<u8> {
+    IMU.broken(rng)
+}
+
+/// Whoever reads them may count on order and numbers.
+pub fn read_imu() -> Reader {
+    reader(channel::IMU, |_: &bus::message::Stamp, samples: &[ImuRecord]| {
+        assert!(samples.is_sorted_by_key(|sample| sample.valid_at_ns) && !samples.is_empty());
+        let numbers = samples
+            .iter()
+            .flat_map(|sample| sample.acceleration_mps2.into_iter().chain(sample.angular_rate_radps));
+        assert!(numbers.into_iter().all(f32::is_finite));
+    })
+}
+
 static SCAN: LazyLock<Whole> = LazyLock::new(|| {
     let drive = Drive::get();
     Whole::new((&drive.scan.0, "ScanHeader"), &drive.scan.1, places("PointRecord"))
@@ -173,7 +197,8 @@ pub fn scan(rng: &mut Rng) -> Vec<u8> {
 pub fn read_scan() -> Reader {
     let (drive, topics) = (Drive::get(), DriveTopics::new(&Context::new()));
     reader(channel::SCAN, move |header: &ScanHeader, points| {
-        let scan = header.scan(points);
+        let mount = Mount { position_m: [0.1, 0.0, 0.2], attitude_rad: [0.0, 0.2, 1.0], ..Mount::default() };
+        let Some(scan) = header.scan(points, &[mount]) else { return };
         topics.scan(header.stamp.valid_at_ns, &scan);
         let (vehicle, config) = (&MACHINE.vehicle, &MACHINE.config);
         let mut surveyor = Surveyor::new(vehicle, config.elevation, config.guard, Surface::Sensed).unwrap();

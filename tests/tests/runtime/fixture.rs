@@ -9,7 +9,7 @@ use bicycle::{Model, Vehicle};
 use bus::ages::{AgeLimits, Periods};
 use bus::channel::{Bus, RunName};
 use bus::status::Role;
-use navigator::{Belief, Config, Route};
+use navigator::{Areas, Belief, Config, Route};
 use runtime::ages::{self, AskedAges};
 use runtime::control::{self, ControlSetup};
 use runtime::learning::{self, LearningSetup};
@@ -268,6 +268,7 @@ fn be(role: Role, run: &RunName, folder: &Path, is_over: &dyn Fn() -> bool) {
                 model: &model,
                 periods: Periods::default(),
                 ages: ages(),
+                areas: Areas::default(),
             };
             mission::run(&bus, setup, is_over).unwrap();
         }
@@ -277,6 +278,7 @@ fn be(role: Role, run: &RunName, folder: &Path, is_over: &dyn Fn() -> bool) {
                 setup: recorded_setup(),
                 file_bytes_max: told(FILE_BYTES),
                 file_time_max_s: told(FILE_TIME),
+                mounts: Vec::new(),
                 quota_bytes: told(QUOTA),
                 sync_interval_s: told(SYNC),
             };
