@@ -48,6 +48,8 @@
 //! | simulate your world | `cargo run -p scenarios --example own_world` |
 //! | drive everything in your world | `cargo run -p bench --example drive_own_world` |
 //! | send and read messages of a run | `cargo run -p bus --example publish_and_read` |
+//! | learn how old messages may be | `cargo run -p runtime --example limits_of_rates` |
+//! | command the simulated vehicle from a program of your own | `cargo run -p simulator --example command_the_plant` |
 //! | find out why simulator and robot disagree | `cargo run -p sim_to_real --example diagnose_a_delay` |
 //!
 //! Those who come to read code begin with [`navigator::Navigator`], then [`traversability::RiskMapView`], then

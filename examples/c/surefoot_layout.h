@@ -1,4 +1,4 @@
-/* Messages of Surefoot, layout version 5. Written from its types; do not edit. */
+/* Messages of Surefoot, layout version 6. Written from its types; do not edit. */
 #ifndef SUREFOOT_LAYOUT_H
 #define SUREFOOT_LAYOUT_H
 
@@ -6,7 +6,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#define SUREFOOT_LAYOUT_VERSION 5u
+#define SUREFOOT_LAYOUT_VERSION 6u
 
 /* First field of every header: whose message it is, and of when. Known to the channels as surefoot.Stamp. */
 typedef struct SurefootStamp {
@@ -94,23 +94,37 @@ static_assert(offsetof(SurefootOdometryRecord, applied_steering_rad) == 92, "Odo
 static_assert(offsetof(SurefootOdometryRecord, applied_since_ns) == 96, "OdometryRecord.applied_since_ns");
 static_assert(offsetof(SurefootOdometryRecord, applied_by) == 104, "OdometryRecord.applied_by");
 
+/* One sample of the inertial measurement unit, in the body frame. Known to the channels as surefoot.Imu. */
+typedef struct SurefootImuRecord {
+    /* When it was measured, monotonic [ns]. */
+    uint64_t valid_at_ns;
+    /* Specific force [m/s2]; (0, 0, +9.81) at rest on level ground. */
+    float acceleration_mps2[3];
+    /* Angular rate [rad/s]. */
+    float angular_rate_radps[3];
+} SurefootImuRecord;
+static_assert(sizeof(SurefootImuRecord) == 32, "ImuRecord");
+static_assert(offsetof(SurefootImuRecord, valid_at_ns) == 0, "ImuRecord.valid_at_ns");
+static_assert(offsetof(SurefootImuRecord, acceleration_mps2) == 8, "ImuRecord.acceleration_mps2");
+static_assert(offsetof(SurefootImuRecord, angular_rate_radps) == 20, "ImuRecord.angular_rate_radps");
+
 /* Header of a sweep of the range sensor; the payload is one PointRecord per return. Known to the channels as surefoot.ScanHeader. */
 typedef struct SurefootScanHeader {
     /* Whose and of when. */
     SurefootStamp stamp;
-    /* Where the rays start, in the body frame [m]. */
+    /* Where the rays start, in the frame of the points [m]. */
     float origin_m[3];
-    /* Zero. */
-    uint32_t reserved;
+    /* Whose frame the points are of: 0 = the vehicle's body, else the sensor of this number, from 1. */
+    uint32_t sensor;
 } SurefootScanHeader;
 static_assert(sizeof(SurefootScanHeader) == 56, "ScanHeader");
 static_assert(offsetof(SurefootScanHeader, stamp) == 0, "ScanHeader.stamp");
 static_assert(offsetof(SurefootScanHeader, origin_m) == 40, "ScanHeader.origin_m");
-static_assert(offsetof(SurefootScanHeader, reserved) == 52, "ScanHeader.reserved");
+static_assert(offsetof(SurefootScanHeader, sensor) == 52, "ScanHeader.sensor");
 
 /* One return of the range sensor. Known to the channels as surefoot.Point. */
 typedef struct SurefootPointRecord {
-    /* Place in the body frame [m]. */
+    /* Place in the frame that the header names [m]. */
     float position_m[3];
     /* What it is: 0 open, 1 loose, 2 vegetation, 3 obstacle. */
     uint32_t class_number;

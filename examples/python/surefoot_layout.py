@@ -1,8 +1,8 @@
-"""Messages of Surefoot, layout version 5. Written from its types; do not edit."""
+"""Messages of Surefoot, layout version 6. Written from its types; do not edit."""
 
 import ctypes
 
-LAYOUT_VERSION = 5
+LAYOUT_VERSION = 6
 
 
 class Stamp(ctypes.Structure):
@@ -127,16 +127,39 @@ assert OdometryRecord.applied_since_ns.offset == 96
 assert OdometryRecord.applied_by.offset == 104
 
 
+class ImuRecord(ctypes.Structure):
+    """One sample of the inertial measurement unit, in the body frame."""
+
+    _fields_ = [
+        # When it was measured, monotonic [ns].
+        ("valid_at_ns", ctypes.c_uint64),
+        # Specific force [m/s2]; (0, 0, +9.81) at rest on level ground.
+        ("acceleration_mps2", ctypes.c_float * 3),
+        # Angular rate [rad/s].
+        ("angular_rate_radps", ctypes.c_float * 3),
+    ]
+
+    @staticmethod
+    def type_name() -> str:
+        return "surefoot.Imu"
+
+
+assert ctypes.sizeof(ImuRecord) == 32
+assert ImuRecord.valid_at_ns.offset == 0
+assert ImuRecord.acceleration_mps2.offset == 8
+assert ImuRecord.angular_rate_radps.offset == 20
+
+
 class ScanHeader(ctypes.Structure):
     """Header of a sweep of the range sensor; the payload is one PointRecord per return."""
 
     _fields_ = [
         # Whose and of when.
         ("stamp", Stamp),
-        # Where the rays start, in the body frame [m].
+        # Where the rays start, in the frame of the points [m].
         ("origin_m", ctypes.c_float * 3),
-        # Zero.
-        ("reserved", ctypes.c_uint32),
+        # Whose frame the points are of: 0 = the vehicle's body, else the sensor of this number, from 1.
+        ("sensor", ctypes.c_uint32),
     ]
 
     @staticmethod
@@ -147,14 +170,14 @@ class ScanHeader(ctypes.Structure):
 assert ctypes.sizeof(ScanHeader) == 56
 assert ScanHeader.stamp.offset == 0
 assert ScanHeader.origin_m.offset == 40
-assert ScanHeader.reserved.offset == 52
+assert ScanHeader.sensor.offset == 52
 
 
 class PointRecord(ctypes.Structure):
     """One return of the range sensor."""
 
     _fields_ = [
-        # Place in the body frame [m].
+        # Place in the frame that the header names [m].
         ("position_m", ctypes.c_float * 3),
         # What it is: 0 open, 1 loose, 2 vegetation, 3 obstacle.
         ("class_number", ctypes.c_uint32),

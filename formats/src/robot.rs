@@ -279,7 +279,7 @@ speed_max_mps = 0.8
     fn what_cannot_be_is_refused_by_line_and_field() {
         assert_eq!(
             told(&WHOLE.replace("speed_max_mps = 0.8", "speed_max_mps = -0.8")),
-            "robot.toml:41: safety.speed_max_mps: expected a finite number > 0, found -0.8"
+            "robot.toml:36: safety.speed_max_mps: expected a finite number > 0, found -0.8"
         );
         assert!(
             told(&WHOLE.replace("odometry_hz = 100.0", "odometry_hz = nan")).contains("rates.odometry_hz")

@@ -92,11 +92,11 @@ pub fn limits(periods: &Periods, guard: &GuardConfig, asked: &AskedAges) -> Resu
         ("guard.frozen_max_s", guard.frozen_max_s, 2.0 * odometry_s, &odometry),
         ("guard.odometry_wait_max_s", guard.odometry_wait_max_s, odometry_s, &odometry),
         ("guard.scan_age_max_s", guard.scan_age_max_s, heard_s, &maps),
-        ("command age", command_s, odometry_s + control_s, &commands),
-        ("learned age", learned_s, scan_s + control_s, &maps),
-        ("learning silence", silence_s, scan_s, &scans),
-        ("mission age", mission_age_s, mission_s, &missions),
-        ("order age", order_s, DELAY_S, &"messages on their way".to_owned()),
+        ("ages.command_s (--command-age)", command_s, odometry_s + control_s, &commands),
+        ("ages.learned_s", learned_s, scan_s, &scans),
+        ("ages.learning_silence_s", silence_s, scan_s, &scans),
+        ("ages.mission_s", mission_age_s, mission_s, &missions),
+        ("ages.order_s", order_s, DELAY_S, &"messages on their way".to_owned()),
     ];
     // What is no number is above nothing.
     let refused = checks
@@ -209,7 +209,7 @@ mod tests {
         let told = limits(&slow, Some(0.3)).unwrap_err().to_string();
         assert_eq!(
             told,
-            "command age: expected more than 1.020 s with decisions every 1 s and odometry every 0.02 s, found 0.3 s"
+            "ages.command_s (--command-age): expected more than 1.020 s with decisions every 1 s and odometry every 0.02 s, found 0.3 s"
         );
         let rare = Periods { scan_s: 0.5, ..Periods::default() };
         let told =

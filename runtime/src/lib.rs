@@ -3,7 +3,8 @@
 //!
 //! Every process does one of `navigator`'s parts, the same object that a closed loop in one process drives with, and
 //! tells the others what it found over the channels of [`bus`]. Whoever runs the vehicle is one more process, which needs
-//! nothing of this crate.
+//! nothing of this crate. How old what they say may be follows from how often they speak ([`ages`]):
+//! `examples/limits_of_rates.rs`.
 
 pub mod ages;
 pub mod budget;

@@ -2,6 +2,7 @@
 //! [Surefoot](../cli/index.html).
 //!
 //! It is a driver like that of any vehicle: what it knows of the processes that command it is in [`bus`].
+//! `examples/command_the_plant.rs` commands it from outside.
 
 use bicycle::{Decision, ImuSample, Vehicle};
 use scenarios::{Episode, EpisodeConfig, Observation, Outcome, Task};

@@ -48,7 +48,9 @@ pub(super) fn prepare(arguments: &UpArguments) -> Result<Vec<OsString>, UsageErr
             level(arguments)?,
         )
         .map_err(UsageError::from_input)?;
-        beginning(arguments, &machine)?;
+        if robot::roles(arguments)?.contains(&Role::Mission) {
+            beginning(arguments, &machine)?;
+        }
         return Ok(Vec::new());
     }
     simulator::cycles_per_scan(&robot::periods(arguments)).map_err(UsageError::from_input)?;

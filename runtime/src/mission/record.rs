@@ -168,6 +168,6 @@ mod tests {
         for taken in OrderRefusal::ALL.map(Err).into_iter().chain([Ok(())]) {
             assert_eq!(taken_by(verdict_of(taken)), Some(taken));
         }
-        assert_eq!([taken_by(9), taken_by(u64::MAX)], [None; 2]);
+        assert_eq!([taken_by(10), taken_by(u64::MAX)], [None; 2]);
     }
 }
