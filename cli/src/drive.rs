@@ -289,6 +289,7 @@ fn draw(
             unfamiliar: Some(&known.unfamiliar),
             driven: &driven,
             planned: &[],
+            areas: Some(&scene.config.areas),
             start_m: [x_m, y_m],
             goal_m: scene.task.goal_m,
             goal_radius_m: scene.task.goal_tolerance_m,

@@ -23,6 +23,7 @@ mod view;
 use std::path::{Path, PathBuf};
 
 use bicycle::Vehicle;
+use navigator::Areas;
 use scenarios::{Bounds, World};
 use terrain::GridMap;
 
@@ -61,6 +62,8 @@ pub struct DrivePicture<'a> {
     pub driven: &'a [PathSample],
     /// A reference path or the like, east and north [m]; may be empty.
     pub planned: &'a [[f64; 2]],
+    /// Where the vehicle might be; `None` = everywhere.
+    pub areas: Option<&'a Areas>,
     /// Where the drive starts, east and north [m].
     pub start_m: [f64; 2],
     /// Where it should end, east and north [m].

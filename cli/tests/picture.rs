@@ -10,6 +10,7 @@ use bench::closed_loop::Method;
 use bench::navigation::{DriveResult, Report, Row};
 use bicycle::Vehicle;
 use cli::picture::{DrivePicture, PathSample, RiskLayer, draw_drive, draw_navigation_table};
+use navigator::Areas;
 use scenarios::{
     ARENA_GOAL_M, ARENA_START, ArenaConfig, Outcome, RockFieldConfig, RockMap, Split, World, arena,
     rock_field,
@@ -91,6 +92,10 @@ fn rock_field_with_everything_on_it() {
     let vehicle = vehicle("pietra_full_size");
     let driven = swinging_path(&world, start_m, goal_m, 4.0, 1.0);
     let (risk, known) = risk_near(&world, &driven, 9.0);
+    let areas = Areas {
+        keep_out_m: vec![vec![[20.0, 12.0], [30.0, 12.0], [26.0, 18.0]]],
+        geofence_m: vec![[2.0, 4.0], [48.0, 4.0], [48.0, 46.0], [2.0, 46.0]],
+    };
     let picture = DrivePicture {
         title: "Goal reached in 52.4 s",
         subtitles: &["rocks, seed 1 · pietra_full_size · physics, alpha 0.6 · 44.1 m driven".to_owned()],
@@ -100,6 +105,7 @@ fn rock_field_with_everything_on_it() {
         unfamiliar: None,
         driven: &driven,
         planned: &[start_m, goal_m],
+        areas: Some(&areas),
         start_m,
         goal_m,
         goal_radius_m: 1.0,
@@ -133,6 +139,7 @@ fn arena_with_a_failure() {
         unfamiliar: None,
         driven: &driven,
         planned: &[],
+        areas: None,
         start_m,
         goal_m: ARENA_GOAL_M,
         goal_radius_m: 0.3,
@@ -156,6 +163,7 @@ fn drive_that_never_moved_still_has_a_map() {
         unfamiliar: None,
         driven: &[],
         planned: &[],
+        areas: None,
         start_m: [ARENA_START[0], ARENA_START[1]],
         goal_m: ARENA_GOAL_M,
         goal_radius_m: 0.3,
@@ -179,6 +187,7 @@ fn folder_in_place_of_the_file_is_told() {
         unfamiliar: None,
         driven: &[],
         planned: &[],
+        areas: None,
         start_m: [1.0, 1.0],
         goal_m: [2.0, 2.0],
         goal_radius_m: 0.3,

@@ -90,6 +90,7 @@ fn draw_map(collection: &Collection, vehicle: &Vehicle, canvas: &mut Canvas) {
         unfamiliar: None,
         driven: &[],
         planned: &[],
+        areas: None,
         start_m: [0.0; 2],
         goal_m: [0.0; 2],
         goal_radius_m: 0.0,

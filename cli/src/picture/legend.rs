@@ -88,6 +88,8 @@ struct Entry {
 enum Mark {
     Swatch(Rgb),
     Hatch(Rgb),
+    KeepOut,
+    Geofence,
     Driven,
     Planned,
     Footprint,
@@ -102,6 +104,8 @@ fn entries(picture: &DrivePicture<'_>) -> Vec<Entry> {
     let obstacles = patches.iter().any(|patch| patch.class == terrain::TerrainClass::Obstacle);
     let driven = !picture.driven.is_empty();
     let unfamiliar = picture.unfamiliar.is_some_and(|cells| cells.values().contains(&true));
+    let keeps_out = picture.areas.is_some_and(|areas| !areas.keep_out_m.is_empty());
+    let is_fenced = picture.areas.is_some_and(|areas| !areas.geofence_m.is_empty());
     let soft = Ramp::GROUND.at(0.5).blend(Rgb::VEGETATION, 0.6);
     let unseen = Ramp::GROUND.at(0.5).blend(Rgb::UNSEEN, 0.62);
     [
@@ -109,6 +113,8 @@ fn entries(picture: &DrivePicture<'_>) -> Vec<Entry> {
         (obstacles, Mark::Swatch(Rgb::OBSTACLE), "obstacle"),
         (picture.known.is_some(), Mark::Swatch(unseen), "never seen"),
         (unfamiliar, Mark::Hatch(Ramp::GROUND.at(0.5)), "unlike the training"),
+        (keeps_out, Mark::KeepOut, "area to keep out of"),
+        (is_fenced, Mark::Geofence, "geofence"),
         (driven, Mark::Driven, "driven, by speed"),
         (!picture.planned.is_empty(), Mark::Planned, "planned"),
         (driven, Mark::Footprint, "vehicle"),
@@ -126,6 +132,8 @@ impl Entry {
         let (x, y) = centre;
         let ends = [(x - 15.0, y), (x + 15.0, y)];
         let plate = Rect { x: x - 14.0, y: y - 9.0, width: 28.0, height: 18.0 };
+        let (left, top, right, bottom) = (plate.x, plate.y, plate.right(), plate.bottom());
+        let corners = [(left, bottom), (right, bottom), (right, top), (left, top), (left, bottom)];
         match self.mark {
             Mark::Swatch(colour) => {
                 canvas.rect(plate, colour, 1.0);
@@ -140,11 +148,9 @@ impl Entry {
             }
             Mark::Driven => draw_driven_sample(ends, canvas),
             Mark::Planned => map::planned_line(&ends, canvas),
-            Mark::Footprint => {
-                let (left, top, right, bottom) = (plate.x, plate.y, plate.right(), plate.bottom());
-                let corners = [(left, bottom), (right, bottom), (right, top), (left, top), (left, bottom)];
-                map::footprint_mark(&corners, canvas);
-            }
+            Mark::KeepOut => map::keep_out_mark(&corners, canvas),
+            Mark::Geofence => map::geofence_line(&ends, canvas),
+            Mark::Footprint => map::footprint_mark(&corners, canvas),
             Mark::Start => map::start_marker(centre, canvas),
             Mark::Goal => map::goal_marker(centre, canvas),
             Mark::Failure => map::failure_marker(centre, canvas),

@@ -13,6 +13,7 @@ const PLANNED: Stroke = Stroke { colour: Rgb::INK, width: 2.5, dash: "10 7" };
 pub(super) fn draw(picture: &DrivePicture<'_>, axes: &Axes, canvas: &mut Canvas) {
     canvas.image(axes.frame.x, axes.frame.y, &relief(picture, axes));
     canvas.clipped(axes.frame, |canvas| {
+        draw_areas(picture, axes, canvas);
         draw_planned(picture, axes, canvas);
         draw_goal_area(picture, axes, canvas);
         draw_footprints(picture, axes, canvas);
@@ -25,6 +26,29 @@ pub(super) fn draw(picture: &DrivePicture<'_>, axes: &Axes, canvas: &mut Canvas)
     axes.draw_y_ticks(canvas);
     axes.draw_x_label(canvas, "east x [m]");
     axes.draw_y_label(canvas, "north y [m]");
+}
+
+fn draw_areas(picture: &DrivePicture<'_>, axes: &Axes, canvas: &mut Canvas) {
+    let Some(areas) = picture.areas else { return };
+    let placed = |corners_m: &Vec<[f64; 2]>| -> Vec<Point> {
+        corners_m.iter().chain(corners_m.first()).map(|[x_m, y_m]| axes.place(*x_m, *y_m)).collect()
+    };
+    areas.keep_out_m.iter().for_each(|corners_m| keep_out_mark(&placed(corners_m), canvas));
+    if !areas.geofence_m.is_empty() {
+        geofence_line(&placed(&areas.geofence_m), canvas);
+    }
+}
+
+/// The look of an area to keep out of, here and in the legend.
+pub(super) fn keep_out_mark(corners: &[Point], canvas: &mut Canvas) {
+    canvas.polygon(corners, Rgb::FAILURE, 0.3);
+    canvas.polyline(corners, Stroke::solid(Rgb::FAILURE, 2.0));
+}
+
+/// The look of the fence, here and in the legend.
+pub(super) fn geofence_line(points: &[Point], canvas: &mut Canvas) {
+    canvas.polyline(points, Stroke::solid(Rgb::WHITE, 5.0));
+    canvas.polyline(points, Stroke { colour: Rgb::FAILURE, width: 3.0, dash: "12 6" });
 }
 
 fn draw_planned(picture: &DrivePicture<'_>, axes: &Axes, canvas: &mut Canvas) {

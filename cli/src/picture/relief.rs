@@ -208,6 +208,7 @@ mod tests {
             unfamiliar: None,
             driven: &[],
             planned: &[],
+            areas: None,
             start_m: [1.0, 1.0],
             goal_m: [7.0, 7.0],
             goal_radius_m: 1.0,
