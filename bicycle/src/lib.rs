@@ -29,6 +29,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod axle_demand;
 mod decision;
 mod drive_log;
 pub mod effect;
@@ -40,6 +41,7 @@ mod skid_steer;
 mod stepper;
 mod vehicle;
 
+pub use axle_demand::AxleDemand;
 pub use decision::{Decision, HoldReason, StopReason};
 pub use drive_log::{Column, DriveLog, DriveLogError, DriveRow, Run};
 pub use effect::{Effect, SensorModel};
