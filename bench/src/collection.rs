@@ -17,7 +17,7 @@ use evidential::{
     Surveyor, SurveyorError, estimate_responses, labels,
 };
 use navigator::Config;
-use physics_prior::PriorConfig;
+use physics_prior::{PriorConfig, SlopeLaw};
 use rayon::prelude::*;
 use scenarios::{Bounds, EpisodeError, LayersError, OdometryConfig, Outcome, Rules, World};
 use serde::Serialize;
@@ -68,7 +68,7 @@ impl Request {
         let speed_mps =
             if vehicle.geometry.length_m < 1.0 { vehicle.limits.speed_max_mps } else { SPEED_MPS };
         let odometry = OdometryConfig::for_length(vehicle.geometry.length_m);
-        let prior = Config::for_vehicle(&vehicle).prior;
+        let prior = paper_prior(&vehicle);
         Self {
             vehicle,
             prior,
@@ -293,6 +293,11 @@ fn fields(request: &Request, vehicle: &Vehicle, resolution_m: f64) -> Result<Vec
         Ok(Field::new(vehicle, world, surface))
     };
     (request.first_map..request.first_map + request.n_maps).into_par_iter().map(field).collect()
+}
+
+/// What examples are told by physics: equation 15 as printed, which the networks of the paper's tables are fused with.
+fn paper_prior(vehicle: &Vehicle) -> PriorConfig {
+    PriorConfig { slope_law: SlopeLaw::Linear, ..Config::for_vehicle(vehicle).prior }
 }
 
 fn dataset_of(

@@ -30,6 +30,7 @@
 //! ```
 
 mod applied;
+mod axle_demand;
 mod decision;
 mod drive_log;
 pub mod effect;
@@ -42,6 +43,7 @@ mod stepper;
 mod vehicle;
 
 pub use applied::{Applied, AppliedBy};
+pub use axle_demand::AxleDemand;
 pub use decision::{Decision, HoldReason, StopReason};
 pub use drive_log::{Column, DriveLog, DriveLogError, DriveRow, Run};
 pub use effect::{Effect, SensorModel};

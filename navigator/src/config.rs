@@ -2,7 +2,7 @@
 
 use bicycle::{Geometry, Vehicle};
 use mppi::CostToGoConfig;
-use physics_prior::PriorConfig;
+use physics_prior::{PriorConfig, SlopeLaw};
 use serde::{Deserialize, Serialize};
 use terrain::{BodyBox, ElevationConfig, Mount};
 
@@ -58,10 +58,12 @@ pub struct RiskMapConfig {
 }
 
 impl Config {
-    /// Settings that fit a vehicle, see [`Config::for_geometry`], and how far its body leans.
+    /// Settings that fit a vehicle, see [`Config::for_geometry`], what friction leaves it on a slope, and how far its body
+    /// leans.
     pub fn for_vehicle(vehicle: &Vehicle) -> Self {
         let fitting = Self::for_geometry(&vehicle.geometry, vehicle.limits.speed_max_mps);
-        Self { prior: PriorConfig { lean: vehicle.lean(), ..fitting.prior }, ..fitting }
+        let prior = PriorConfig { slope_law: SlopeLaw::of(vehicle), lean: vehicle.lean(), ..fitting.prior };
+        Self { prior, ..fitting }
     }
 
     /// Settings that fit a vehicle's lengths and its fastest speed: a window of at most 128 cells a side that holds twice

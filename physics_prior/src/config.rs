@@ -1,6 +1,6 @@
 //! What the physics prior assumes.
 
-use bicycle::Geometry;
+use bicycle::{AxleDemand, Geometry, Vehicle};
 use serde::{Deserialize, Serialize};
 
 /// Parameters of the physics prior (PIETRA, equations 15 to 18, and the extensions stated here).
@@ -9,9 +9,12 @@ use serde::{Deserialize, Serialize};
 pub struct PriorConfig {
     /// Share of the spread distribution in equation 18, in [0, 1].
     pub uniform_weight: f64,
-    /// Slope along the heading at which linear traction is gone (equation 15) [rad].
+    /// How linear traction falls with the slope along the heading.
+    pub slope_law: SlopeLaw,
+    /// Slope along the heading at which linear traction is gone by [`SlopeLaw::Linear`] (equation 15) [rad].
     pub linear_slope_max_rad: f64,
-    /// Slope along the heading at which a bump that works against the turn takes all of it (equation 15) [rad].
+    /// Slope along the heading at which a bump that works against the turn takes all of it (equation 15); by
+    /// [`SlopeLaw::Friction`] by how much the slope under a wheel differs from that under all of them [rad].
     pub angular_slope_max_rad: f64,
     /// Height of vegetation at which traction is gone (equation 16) [m]. The paper takes 0.2 m for wheels of
     /// 0.15 m diameter; see [`PriorConfig::for_vehicle`].
@@ -47,6 +50,31 @@ pub struct PriorConfig {
     pub obstacle_margin_m: f64,
 }
 
+/// How linear traction falls with the slope along the heading.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum SlopeLaw {
+    /// In a straight line to nothing (PIETRA, equation 15), whatever the vehicle: how its tables are made.
+    #[default]
+    Linear,
+    /// As the friction leaves it: with the probability that it is less than the slope asks for there is none, else what
+    /// is lost is the slip of the tyres, a brush (Pacejka, Tire and Vehicle Dynamics, section 3.2), and the way up.
+    /// Takes it that the motor can spin the wheels.
+    Friction {
+        /// Force per slip and load of a tyre that slips little [-].
+        slip_stiffness: f64,
+        /// The axle that slides first.
+        axle: AxleDemand,
+    },
+}
+
+impl SlopeLaw {
+    /// What friction leaves this vehicle.
+    pub fn of(vehicle: &Vehicle) -> Self {
+        Self::Friction { slip_stiffness: vehicle.tyre.slip_stiffness, axle: vehicle.axle_demand() }
+    }
+}
+
 /// Friction that is expected of natural ground: earth from wet, 0.55, to dry, 0.68, and gravel, 0.6, as peaks (Wong,
 /// Theory of Ground Vehicles, on road adhesion), and as far again to either side for what neither is.
 const FRICTION_OF_EARTH: [f64; 2] = [0.5, 0.8];
@@ -55,6 +83,7 @@ impl Default for PriorConfig {
     fn default() -> Self {
         Self {
             uniform_weight: 0.2,
+            slope_law: SlopeLaw::Linear,
             linear_slope_max_rad: 30f64.to_radians(),
             angular_slope_max_rad: 15f64.to_radians(),
             vegetation_height_max_m: 0.2,
@@ -117,6 +146,12 @@ impl PriorConfig {
         check(&[("obstacle_margin_m", self.obstacle_margin_m)], "a finite number >= 0", |v| v >= 0.0)?;
         let leans = [("lean[0]", self.lean[0]), ("lean[1]", self.lean[1])];
         check(&leans, "a number from 1 to 10", |v| (1.0..=10.0).contains(&v))?;
+        if let SlopeLaw::Friction { slip_stiffness, axle } = self.slope_law {
+            let positive =
+                [("slope_law.slip_stiffness", slip_stiffness), ("slope_law.axle.share", axle.share)];
+            check(&positive, "a finite number > 0", |v| v > 0.0)?;
+            check(&[("slope_law.axle.unloading", axle.unloading)], "a finite number", |_| true)?;
+        }
         let [least, most] = self.friction;
         check(&[("friction[0]", least)], "a finite number > 0", |v| v > 0.0)?;
         check(&[("friction[1]", most)], "a finite number above friction[0]", |v| v > least)
@@ -143,6 +178,11 @@ mod tests {
         assert_eq!(PriorConfig::default().validate(), Ok(()));
     }
 
+    fn with_law(slip_stiffness: f64, share: f64, unloading: f64) -> PriorConfig {
+        let slope_law = SlopeLaw::Friction { slip_stiffness, axle: AxleDemand { share, unloading } };
+        PriorConfig { slope_law, ..PriorConfig::default() }
+    }
+
     #[test]
     fn a_wrong_value_is_refused_with_field_range_and_number() {
         let default = PriorConfig::default();
@@ -162,6 +202,9 @@ mod tests {
             (PriorConfig { friction: [f64::NAN, 0.8], ..default }, "friction[0]"),
             (PriorConfig { friction: [0.6, 0.6], ..default }, "friction[1]"),
             (PriorConfig { friction: [0.6, f64::INFINITY], ..default }, "friction[1]"),
+            (with_law(0.0, 1.0, 0.5), "slope_law.slip_stiffness"),
+            (with_law(12.0, f64::INFINITY, 0.5), "slope_law.axle.share"),
+            (with_law(12.0, 1.0, f64::NAN), "slope_law.axle.unloading"),
         ];
         for (config, field) in wrong {
             assert_eq!(config.validate().unwrap_err().field, field);

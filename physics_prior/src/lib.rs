@@ -15,7 +15,11 @@
 //! - A slope across the heading takes its tangent t of the friction, to keep the vehicle where it is. Friction is
 //!   uncertain: with the probability that it is less than t the vehicle slides down and has no traction at all; else
 //!   `sqrt(1 - (t / friction)^2)` is left of the circle of friction to drive and steer with: the slope at which
-//!   equation 15 ends shrinks to that share, and so does the angular traction. It is the slope of the contacts: whoever leans on level ones does not slide.
+//!   equation 15 ends shrinks to that share, and so does the angular traction. It is the slope of the contacts: whoever leans
+//!   on level ones does not slide.
+//! - By [`SlopeLaw::Friction`], which `navigator` takes for a vehicle, traction does not end in a straight line at 30 degrees:
+//!   what is lost is the slip of the tyres and the way up, until the axle that the slope unloads needs more friction than
+//!   there is. By [`SlopeLaw::Linear`], the default, it does: what was learned is fused with it.
 //! - Springs let the body lean further than the ground, by a factor that the description of the vehicle gives.
 //! - Equation 17 takes the absolute angle; roll from the wheel pairs of each axle, pitch from those of each side.
 //! - A wheel stands on the first ground that a ball of its radius touches, not on the height under its centre;
@@ -56,7 +60,7 @@ mod triangle;
 
 pub use belief::PriorBelief;
 pub use block_prior::{BlockPrior, PoseLine};
-pub use config::{PriorConfig, PriorConfigError};
+pub use config::{PriorConfig, PriorConfigError, SlopeLaw};
 pub use lattice::Ratio;
 pub use planes::{Planes, span};
 pub use prior_field::PriorField;

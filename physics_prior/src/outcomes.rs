@@ -10,14 +10,20 @@
 //! mu, the slope t across takes t; the rest, `sqrt(1 - (t / mu)^2)` of it, drives and steers: s_max of the linear
 //! traction shrinks to that share, and so does the angular traction. Friction is equally likely anywhere in a range.
 //! What of it lies below t does not hold the vehicle, which slides; what lies above stands for its mean.
+//!
+//! That is the law of [`SlopeLaw::Linear`]. By [`SlopeLaw::Friction`] a slope s along the heading asks for the friction a(s)
+//! of the axle that slides first ([`bicycle::AxleDemand`]), together with t for `d = sqrt(a^2 + t^2)`, and that is what
+//! holds or slides. A wheel that holds slips by `3 mu / C (1 - cbrt(1 - d / mu))`, of which a / d lies along the heading,
+//! and the way up counts by its level part: `linear = (1 - slip) / sqrt(1 + s^2)`. A plane under all wheels turns nobody:
+//! what equation 15 takes of a turn, or gives to it, is the slope under a wheel less the mean of all.
 
 use bicycle::lanes::{Lanes, Real};
 use traversability::{Bins, N_BINS};
 
-use crate::PriorConfig;
 use crate::lengths::Lengths;
 use crate::pose::{PoseGround, WheelGround};
 use crate::triangle::{Triangle, Triangles};
+use crate::{PriorConfig, SlopeLaw};
 
 /// The part of equation 18 that is not spread out: outcomes of traction and of attitude. Probabilities include
 /// the weights of equation 18; per parameter they sum to one less the uniform share of traction.
@@ -48,7 +54,9 @@ pub(crate) struct Equations {
     pub uniform_weight: f32,
     /// Half the width of the triangle of angles of unknown ground, in attitude bins.
     pub unknown_bins: f32,
-    per_slope: [f32; 2],
+    law: Law,
+    /// Over the slope that takes all of a turn.
+    per_turn_slope: f32,
     per_vegetation_m: f32,
     friction: [f32; 2],
     per_friction_range: f32,
@@ -62,13 +70,31 @@ pub(crate) struct Equations {
     lean: [f32; 4],
 }
 
-/// How a vehicle holds on a slope across its heading.
+/// [`SlopeLaw`] in that form.
+#[derive(Clone, Copy, Debug)]
+enum Law {
+    Linear { per_slope: f32 },
+    Friction { per_stiffness: f32, share: f32, unloading: f32 },
+}
+
+/// How a vehicle holds on a slope.
+#[derive(Clone, Copy)]
 struct Hold<L: Lanes> {
     /// Of friction that is less than the slope asks for.
     sliding_probability: Real<L>,
-    /// Share of the mean of the other friction that is left for driving and turning, and one over it.
+    /// Mean of the other friction.
+    friction: Real<L>,
+    /// Share of that mean that a slope across the heading leaves for driving and turning.
     share: Real<L>,
-    per_share: Real<L>,
+}
+
+/// What a wheel on dirt makes of its turning.
+struct Rolling<L: Lanes> {
+    hold: Hold<L>,
+    /// Linear traction.
+    speed: Real<L>,
+    /// Slope that works for or against a turn [-].
+    bump: Real<L>,
 }
 
 /// Wheel pairs of equation 17, wheels counted from 0 as front left, rear left, rear right, front right: two for
@@ -77,7 +103,6 @@ const PAIRS: [[usize; 2]; 4] = [[0, 3], [1, 2], [0, 1], [3, 2]];
 
 impl Equations {
     pub fn new(config: &PriorConfig, lengths: &Lengths) -> Self {
-        let slopes_rad = [config.linear_slope_max_rad, config.angular_slope_max_rad];
         let (track_m, wheelbase_m) = (lengths.wheels.track_m, lengths.wheels.wheelbase_m);
         let distances_m = [track_m, track_m, wheelbase_m, wheelbase_m];
         let belly_depth_m = (config.high_centred_clearances - 1.0) * f64::from(lengths.ground_clearance_m);
@@ -86,7 +111,8 @@ impl Equations {
         Self {
             uniform_weight: config.uniform_weight as f32,
             unknown_bins: config.unknown_attitude_rad as f32 / Bins::ATTITUDE_WIDTH_RAD,
-            per_slope: slopes_rad.map(|slope_rad| (1.0 / libm::tan(slope_rad)) as f32),
+            law: Law::new(config),
+            per_turn_slope: (1.0 / libm::tan(config.angular_slope_max_rad)) as f32,
             per_vegetation_m: (1.0 / config.vegetation_height_max_m) as f32,
             friction: config.friction.map(|friction| friction as f32),
             per_friction_range: (1.0 / (config.friction[1] - config.friction[0])) as f32,
@@ -113,10 +139,8 @@ impl Equations {
         let per_belly_depth_m = lanes.real_single(self.per_belly_depth_m);
         let freedom = (one - pose.belly_depth_m * per_belly_depth_m).max(zero);
         let per_wheel = lanes.real_single(0.25 * (1.0 - self.uniform_weight));
-        let [per_linear, per_angular] = self.per_slope;
-        let hold = self.hold(lanes, pose.across);
-        let per_linear = lanes.real_single(per_linear) * hold.per_share;
-        let per_angular = lanes.real_single(per_angular);
+        let across = self.hold(lanes, pose.across, pose.across);
+        let per_turn_slope = lanes.real_single(self.per_turn_slope);
         let per_vegetation_m = lanes.real_single(self.per_vegetation_m);
         let mut known = [zero; 4];
         let (mut linear_dirt, mut angular_dirt) = ([[zero; 4]; 1], [[zero; 4]; 2]);
@@ -125,8 +149,8 @@ impl Equations {
         let (mut sliding_probability, mut unknown_probability) = (zero, zero);
         for (wheel, ground) in pose.wheels.iter().enumerate() {
             known[wheel] = zero.or_else(all_unknown, one - ground.unknown);
-            let (linear, angular) = (ground.slope * per_linear, ground.slope * per_angular);
-            let speed = (one - linear).max(zero) * freedom;
+            let Rolling { hold, speed, bump } = self.rolling(lanes, pose, ground, across);
+            let (speed, angular) = (speed * freedom, bump * per_turn_slope);
             linear_dirt[0][wheel] = speed;
             let turn = speed * hold.share;
             angular_dirt[0][wheel] = turn * (one - angular).max(zero);
@@ -155,20 +179,50 @@ impl Equations {
         }
     }
 
-    /// What a slope across the heading leaves of the circle of friction.
+    /// What a wheel on dirt makes of its turning, by the law; `across` is how the vehicle holds across the heading alone.
     #[inline(always)]
-    fn hold<L: Lanes>(&self, lanes: L, across: Real<L>) -> Hold<L> {
+    fn rolling<L: Lanes>(
+        &self,
+        lanes: L,
+        pose: &PoseGround<L>,
+        ground: &WheelGround<L>,
+        across: Hold<L>,
+    ) -> Rolling<L> {
+        let (zero, one) = (lanes.real(0.0), lanes.real(1.0));
+        let slope = ground.forward_slope.abs();
+        match self.law {
+            Law::Linear { per_slope } => {
+                let per_share = one / across.share.max(lanes.real_single(SHARE_LEAST));
+                let lost = slope * (lanes.real_single(per_slope) * per_share);
+                Rolling { hold: across, speed: (one - lost).max(zero), bump: slope }
+            }
+            Law::Friction { per_stiffness, share, unloading } => {
+                let left = (one - lanes.real_single(unloading) * slope).max(lanes.real_single(SHARE_LEAST));
+                let along = lanes.real_single(share) * slope / left;
+                let asked = (along * along + pose.across * pose.across).sqrt();
+                let hold = self.hold(lanes, asked, pose.across);
+                let kept = cube_root(lanes, (one - asked / hold.friction).max(zero));
+                let slip = lanes.real_single(3.0 * per_stiffness) * hold.friction * (one - kept);
+                let slip_along = slip * along / asked.max(lanes.real_single(SHARE_LEAST));
+                let speed = (one - slip_along).max(zero) / (one + slope * slope).sqrt();
+                Rolling { hold, speed, bump: (ground.forward_slope - pose.along).abs() }
+            }
+        }
+    }
+
+    /// Whether the friction holds that is asked for, and what a slope across the heading leaves of its circle.
+    #[inline(always)]
+    fn hold<L: Lanes>(&self, lanes: L, asked: Real<L>, across: Real<L>) -> Hold<L> {
         let (zero, one) = (lanes.real(0.0), lanes.real(1.0));
         let [least, most] = self.friction;
         let (least, most) = (lanes.real_single(least), lanes.real_single(most));
-        let beyond = (across - least).max(zero);
-        let mean = lanes.real(0.5) * (across.max(least) + most);
+        let beyond = (asked - least).max(zero);
+        let mean = lanes.real(0.5) * (asked.max(least) + most);
         let taken = across / mean;
-        let share = (one - taken * taken).max(zero).sqrt();
         Hold {
             sliding_probability: (beyond * lanes.real_single(self.per_friction_range)).min(one),
-            share,
-            per_share: one / share.max(lanes.real_single(SHARE_LEAST)),
+            friction: mean,
+            share: (one - taken * taken).max(zero).sqrt(),
         }
     }
 
@@ -214,6 +268,34 @@ impl Equations {
     }
 }
 
+impl Law {
+    fn new(config: &PriorConfig) -> Self {
+        match config.slope_law {
+            SlopeLaw::Linear => {
+                Self::Linear { per_slope: (1.0 / libm::tan(config.linear_slope_max_rad)) as f32 }
+            }
+            SlopeLaw::Friction { slip_stiffness, axle } => Self::Friction {
+                per_stiffness: (1.0 / slip_stiffness) as f32,
+                share: axle.share as f32,
+                unloading: axle.unloading as f32,
+            },
+        }
+    }
+}
+
+/// Cube root of numbers from 0 to 1, error below 1e-3: two of Halley's steps from the fourth root.
+#[inline(always)]
+fn cube_root<L: Lanes>(lanes: L, x: Real<L>) -> Real<L> {
+    let double = x + x;
+    // At zero the steps have no direction.
+    let mut root = x.max(lanes.real_single(1e-10)).sqrt().sqrt();
+    for _ in 0..2 {
+        let cube = root * root * root;
+        root = root * (cube + double) / (cube + cube + x);
+    }
+    root
+}
+
 /// What is left of the circle of friction counts as no less [-].
 const SHARE_LEAST: f32 = 1e-6;
 
@@ -253,6 +335,15 @@ mod tests {
     use bicycle::lanes::Portable;
 
     use super::*;
+
+    #[test]
+    fn the_cube_root_is_good_to_a_thousandth() {
+        for step in 0..=10_000 {
+            let x = step as f32 * 1e-4;
+            let found = super::cube_root(Portable, Portable.real_single(x)).1[3];
+            assert!((found - x.cbrt()).abs() < 1e-3, "{x}: {found}");
+        }
+    }
 
     fn arc_tangent(tangent: f32) -> f32 {
         super::arc_tangent(Portable, Portable.real_single(tangent)).1[3]

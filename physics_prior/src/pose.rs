@@ -17,8 +17,8 @@ pub(crate) struct WheelGround<L: Lanes> {
     pub height_m: Real<L>,
     pub variance_m2: Real<L>,
     pub vegetation_m: Real<L>,
-    /// |slope| along the heading [-].
-    pub slope: Real<L>,
+    /// Slope along the heading, signed [-].
+    pub forward_slope: Real<L>,
     /// Slope to the left of the heading, signed [-].
     pub left_slope: Real<L>,
     /// Share of it that is unknown.
@@ -35,6 +35,8 @@ pub(crate) struct PoseGround<L: Lanes> {
     pub vegetation_share: Real<L>,
     /// Share of the footprint that is unknown.
     pub unknown_share: Real<L>,
+    /// Slope along the heading, signed, the mean under the wheels [-].
+    pub along: Real<L>,
     /// |slope| across the heading, the mean under the wheels: the axles hold together [-].
     pub across: Real<L>,
     /// How far the ground between the axles would reach into the body, 0 where it does not [m].
@@ -70,11 +72,16 @@ impl<L: Lanes> Placed<'_, L> {
         let per_known = self.lanes.real_single(VEGETATION_SHARES) * n_known;
         let left_slopes =
             wheels[0].left_slope + wheels[1].left_slope + wheels[2].left_slope + wheels[3].left_slope;
+        let forward_slopes = wheels[0].forward_slope
+            + wheels[1].forward_slope
+            + wheels[2].forward_slope
+            + wheels[3].forward_slope;
         PoseGround {
             wheels,
             n_obstacles: self.n_obstacles(),
             vegetation_share: self.count(&self.ground.vegetation) / per_known,
             unknown_share: n_unknown / n_cells,
+            along: self.lanes.real_single(0.25) * forward_slopes,
             across: (self.lanes.real_single(0.25) * left_slopes).abs(),
             belly_depth_m: self.belly_depth_m(&wheels, lengths),
         }
@@ -105,7 +112,7 @@ impl<L: Lanes> Placed<'_, L> {
             height_m: self.interpolated(Contact::HEIGHT, tap),
             variance_m2: self.interpolated(Contact::VARIANCE, tap),
             vegetation_m: self.interpolated(Contact::VEGETATION, tap),
-            slope: (rise_east * east + rise_north * north).abs(),
+            forward_slope: rise_east * east + rise_north * north,
             left_slope: rise_north * east - rise_east * north,
             unknown: self.interpolated(Contact::UNKNOWN, tap),
         }

@@ -325,11 +325,11 @@ fn window(risk: &GridGeometry, ratio: Ratio, reach: Reach, resolution_m: f64) ->
 
 #[cfg(test)]
 mod tests {
-    use bicycle::Geometry;
+    use bicycle::{AxleDemand, Geometry};
     use terrain::Cell;
 
     use super::*;
-    use crate::PriorConfig;
+    use crate::{PriorConfig, SlopeLaw};
 
     const CAR: Geometry = Geometry {
         wheelbase_m: 0.18,
@@ -357,8 +357,15 @@ mod tests {
 
     #[test]
     fn every_instruction_set_gives_the_same_bits() {
+        let axle = AxleDemand { share: 1.0, unloading: 0.6 };
+        let by_friction = SlopeLaw::Friction { slip_stiffness: 12.0, axle };
+        for slope_law in [SlopeLaw::Linear, by_friction] {
+            same_bits_on_every_instruction_set(PriorConfig { slope_law, ..PriorConfig::default() });
+        }
+    }
+
+    fn same_bits_on_every_instruction_set(prior: PriorConfig) {
         let window = GridGeometry { resolution_m: 0.1, origin: [0, 0], n_rows: 24, n_cols: 24 };
-        let prior = PriorConfig::default();
         let lengths = Lengths::new(&CAR, &prior);
         let equations = Equations::new(&prior, &lengths);
         let level = CvarLevel::new(0.4).unwrap();

@@ -121,6 +121,19 @@ fn the_servo_holds_its_speed_up_and_down_a_slope() {
     }
 }
 
+#[test]
+fn a_descent_that_friction_holds_is_driven_at_the_speed_asked_for() {
+    // 28 degrees leave the rear axle 0.5 - 0.289 tan 28 = 0.346 of the weight, and it brakes with half of tan 28 = 0.532:
+    // its wheels slide, for 0.65 0.346 = 0.225 is less than 0.266. With the front axle's 0.65 0.654 all hold 0.65.
+    let world = incline(-28f64.to_radians(), coulomb(0.65));
+    let mut plant = Plant::new(&full_size(), world, [-20.0, 0.0, 0.0]).unwrap();
+    drive(&mut plant, 1.0, 0.0, 5.0);
+    let speed_mps = plant.motion().velocity_mps[0];
+    let wheels_mps = plant.wheels().map(|wheel| wheel.speed_mps);
+    assert!(wheels_mps[2].max(wheels_mps[3]) < 0.7 * wheels_mps[0], "{wheels_mps:?}");
+    assert!((speed_mps - 1.0).abs() < 0.1, "{speed_mps} m/s, wheels {wheels_mps:?}");
+}
+
 /// Steady speed, yaw rate [m/s, rad/s] of the cog after 12 s at a command.
 fn steady_turn(vehicle: &Vehicle, friction: Stribeck, speed_mps: f32, steering_rad: f32) -> [f64; 2] {
     let mut plant = Plant::new(vehicle, level(friction), [0.0; 3]).unwrap();

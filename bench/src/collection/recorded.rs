@@ -8,7 +8,7 @@ use navigator::Config;
 use scenarios::{Bounds, LayerConfig, World, WorldLayers, world_from_layers};
 use terrain::{GridMap, SurfaceCell, height_at};
 
-use super::{Collection, CollectionError, Recorded, Trial, dataset_of, examples};
+use super::{Collection, CollectionError, Recorded, Trial, dataset_of, examples, paper_prior};
 use crate::closed_loop::true_surface;
 
 /// Share of the labels that must lie on known ground.
@@ -27,7 +27,7 @@ pub fn collect_recorded(
     layers: &WorldLayers,
     source: &Recorded,
 ) -> Result<Collection, CollectionError> {
-    let config = Config::for_vehicle(vehicle);
+    let (config, prior) = (Config::for_vehicle(vehicle), paper_prior(vehicle));
     let is_steered = log.columns().any(|column| column == Column::CmdSteer);
     let reversing = if is_steered { Reversing::Masked } else { Reversing::Labelled };
     let labelling = LabelConfig { reversing, ..LabelConfig::for_vehicle(&vehicle.geometry, &vehicle.limits) };
@@ -44,7 +44,7 @@ pub fn collect_recorded(
     let (world, surface) = ground(vehicle, layers, poses_m(), &source.ground, config.elevation.resolution_m)?;
 
     let layout = FeatureLayout::for_vehicle(&vehicle.geometry);
-    let surveyor = Surveyor::new(&vehicle.geometry, layout, config.prior, config.elevation.resolution_m)?;
+    let surveyor = Surveyor::new(&vehicle.geometry, layout, prior, config.elevation.resolution_m)?;
     let (mut all, mut trials) = (Vec::new(), Vec::new());
     for (index, (run, labels)) in log.runs().zip(&drives).enumerate() {
         let examples = examples(&surveyor, labels, &surface, index as u32)?;
@@ -63,7 +63,7 @@ pub fn collect_recorded(
     }
     let names = log.runs().map(|run| run.name().to_owned()).collect();
     let provenance = format!("recorded drive {} on {}", source.log, source.ground);
-    let dataset = dataset_of(vehicle, layout, config.prior, names, provenance, all)?;
+    let dataset = dataset_of(vehicle, layout, prior, names, provenance, all)?;
     Ok(Collection { dataset, trials, responses, labelling, worlds: vec![world], log })
 }
 

@@ -21,6 +21,8 @@ use traversability::RiskMapView;
 #[derive(Clone, Copy)]
 pub(super) enum TaskOrder<'a> {
     Goal([f64; 2], f64, Terminal<'a>),
+    /// Come as near to the point as counts as progress, in reverse.
+    Back([f64; 2]),
     Path(ReferencePath<'a>),
 }
 
@@ -136,7 +138,7 @@ impl<M: Driven, S: StepCost, R: RolloutCost> Controller<M, S, R> {
 
     pub(super) fn task<'a>(&self, input: &Input<'a, MotionState>, mode: Mode) -> TaskOrder<'a> {
         match (mode, input.objective) {
-            (Mode::BackUp { target_m }, _) => TaskOrder::Goal(target_m, 0.0, Terminal::StraightLine),
+            (Mode::BackUp { target_m }, _) => TaskOrder::Back(target_m),
             (Mode::Onward, Objective::Goal { goal_m, tolerance_m, terminal }) => {
                 TaskOrder::Goal(goal_m, tolerance_m, terminal)
             }
@@ -160,23 +162,24 @@ impl<M: Driven, S: StepCost, R: RolloutCost> Controller<M, S, R> {
                 *step = ReferenceStep { x_cells, y_cells, tangent, along_s, across_s };
             }
         }
+        let to = |at_m: [f64; 2], tolerance_m: f64, field| {
+            let [x_cells, y_cells] = cells(at_m);
+            Task::Goal(GoalTask {
+                x_cells,
+                y_cells,
+                tolerance_cells: tolerance_m / cell_m,
+                step_s: self.config.step_s,
+                distance_s: self.config.costs.distance_s_per_m * cell_m,
+                rest_s: cell_m / self.config.costs.rest_speed_mps,
+                field,
+            })
+        };
         let task = match order {
             TaskOrder::Path(_) => Task::Path(&self.reference),
-            TaskOrder::Goal(goal_m, tolerance_m, terminal) => {
-                let [x_cells, y_cells] = cells(goal_m);
-                let field = match terminal {
-                    Terminal::StraightLine => None,
-                    Terminal::CostToGo(view) => TerminalField::new(view, geometry),
-                };
-                Task::Goal(GoalTask {
-                    x_cells,
-                    y_cells,
-                    tolerance_cells: tolerance_m / cell_m,
-                    step_s: self.config.step_s,
-                    distance_s: self.config.costs.distance_s_per_m * cell_m,
-                    rest_s: cell_m / self.config.costs.rest_speed_mps,
-                    field,
-                })
+            TaskOrder::Back(target_m) => to(target_m, self.config.recovery.progress_m, None),
+            TaskOrder::Goal(goal_m, tolerance_m, Terminal::StraightLine) => to(goal_m, tolerance_m, None),
+            TaskOrder::Goal(goal_m, tolerance_m, Terminal::CostToGo(view)) => {
+                to(goal_m, tolerance_m, TerminalField::new(view, geometry))
             }
         };
         let [x_cells, y_cells] = cells([self.start.x_m, self.start.y_m]);
@@ -192,7 +195,7 @@ impl<M: Driven, S: StepCost, R: RolloutCost> Controller<M, S, R> {
             },
             tilted_start: self.judge_over(input.map).tilt(&self.start),
             slots: &self.slots[..self.cell_stepper.n_slots()],
-            prices: self.prices(),
+            prices: self.prices(&order),
             task,
             cost: &self.step_cost,
             frame,
@@ -229,7 +232,8 @@ impl<M: Driven, S: StepCost, R: RolloutCost> Controller<M, S, R> {
         }
     }
 
-    fn prices(&self) -> Prices {
+    /// Who is to back up pays nothing for it: a metre would cost more than it gains.
+    fn prices(&self, order: &TaskOrder<'_>) -> Prices {
         let (limits, costs) = (&self.limits, &self.config.costs);
         Prices {
             roll_max_rad: limits.roll_max_rad,
@@ -237,7 +241,7 @@ impl<M: Driven, S: StepCost, R: RolloutCost> Controller<M, S, R> {
             attitude_s: costs.attitude_s,
             lateral_max_mps2: limits.lateral_acceleration_max_mps2,
             lateral_s: costs.lateral_s,
-            reverse_s: costs.reverse_s,
+            reverse_s: if matches!(order, TaskOrder::Back(_)) { 0.0 } else { costs.reverse_s },
         }
     }
 

@@ -16,6 +16,9 @@ const INTEGRAL_RATIO: f64 = 4.0;
 const PARKING_SPEED_MPS: f64 = 1e-3;
 /// Wheel speed below which the parking brake is set [m/s].
 const STANDSTILL_MPS: f64 = 0.05;
+/// Wheels below this share of the fastest one's speed count as locking while the brakes are on; in a turn as tight as
+/// they come the inner rear wheel rolls at a little less [-].
+const LOCKING_SHARE: f64 = 0.7;
 /// A battery gives at least this share of its voltage [-].
 const VOLTAGE_MIN: f64 = 0.2;
 
@@ -114,9 +117,9 @@ impl Drivetrain {
 
     /// Torques of motor and brakes for wheels that turn at `spin_radps` relative to the body.
     pub(crate) fn step(&mut self, commanded_mps: f64, spin_radps: [f64; 4], step_s: f64) -> [WheelTorque; 4] {
-        let mean_radps = self.mean_spin_radps(&spin_radps);
+        let rolling_radps = self.rolling_radps(&spin_radps);
         let understood_mps = self.understood_mps(commanded_mps, step_s);
-        let (drive_nm, brake_nm) = self.servo(understood_mps, mean_radps, step_s);
+        let (drive_nm, brake_nm) = self.servo(understood_mps, rolling_radps, step_s);
         let share = step_s / (self.response_s + step_s);
         self.drive_nm += share * (drive_nm - self.drive_nm);
         // Brakes let go at once: else the motor starts against them.
@@ -170,6 +173,19 @@ impl Drivetrain {
     fn mean_spin_radps(&self, spin_radps: &[f64; 4]) -> f64 {
         let driven = || (0..4).filter(|&i| self.drive_share[i] > 0.0);
         driven().map(|i| spin_radps[i]).sum::<f64>() / driven().count() as f64
+    }
+
+    /// The same of those that tell how fast the vehicle is: a wheel that its brake locks does not, and would have the
+    /// servo let go of the others.
+    fn rolling_radps(&self, spin_radps: &[f64; 4]) -> f64 {
+        let forward = if self.reference_mps < 0.0 { -1.0 } else { 1.0 };
+        let driven = || (0..4).filter(|&i| self.drive_share[i] > 0.0).map(|i| forward * spin_radps[i]);
+        let least_radps = LOCKING_SHARE * driven().fold(0.0, f64::max);
+        if self.brake_nm == 0.0 || least_radps == 0.0 {
+            return self.mean_spin_radps(spin_radps);
+        }
+        let rolling = || driven().filter(|&spin_radps| spin_radps >= least_radps);
+        forward * rolling().sum::<f64>() / rolling().count() as f64
     }
 
     /// Wanted drive and brake torque: proportional-integral control of the wheel speed with the acceleration of
