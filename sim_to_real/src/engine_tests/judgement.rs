@@ -6,7 +6,6 @@ use crate::baseline::Null;
 use crate::causes::Explanation;
 use crate::judgement::{Judgement, Weighed};
 use crate::limits_shown::LimitsShown;
-use bicycle::Effect;
 use proptest::prelude::*;
 use std::collections::BTreeMap;
 
