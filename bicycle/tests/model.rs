@@ -209,7 +209,7 @@ fn a_neutral_effect_changes_nothing() {
 
 /// Sets of effects that leave one another something to do; together they hold every effect that moves a vehicle.
 fn sets_of_effects() -> [Vec<Effect>; 2] {
-    let first: [(&str, &[f64]); 21] = [
+    let first: [(&str, &[f64]); 23] = [
         ("steer_delay", &[0.17]),
         ("speed_delay", &[0.25]),
         ("motor_deadband", &[0.8]),
@@ -222,7 +222,9 @@ fn sets_of_effects() -> [Vec<Effect>; 2] {
         ("speed_loop", &[0.4]),
         ("feed_forward", &[0.4]),
         ("speed_integral", &[1.5]),
+        ("hill_compensation", &[0.4]),
         ("drive_limit", &[1.4, 1.2]),
+        ("drive_power", &[1.5]),
         ("drive_lag", &[0.2]),
         ("rolling_drag", &[0.2]),
         ("veg_drag", &[0.4]),
@@ -232,9 +234,10 @@ fn sets_of_effects() -> [Vec<Effect>; 2] {
         ("understeer", &[0.02]),
         ("rear_slip", &[0.01]),
     ];
-    let second: [(&str, &[f64]); 10] = [
+    let second: [(&str, &[f64]); 11] = [
         ("steer_rate", &[0.8]),
         ("accel_limit", &[1.5]),
+        ("compensation_loss", &[0.3]),
         ("drive_force_limit", &[1.1]),
         ("mass", &[1.3]),
         ("quad_drag", &[0.1]),

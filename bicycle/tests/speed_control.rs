@@ -39,6 +39,50 @@ fn speeds(stepper: &Stepper, speed_mps: f64, n: usize) -> (Vec<f64>, Vec<f64>) {
     (speeds, stepper.held(&mut memory).to_vec())
 }
 
+/// Speed at the end of a long drive up a slope, from and to [`SPEED_MPS`].
+fn speed_uphill_mps(effects: &[(&str, f64)], slope: f64) -> f64 {
+    let stepper = stepper(effects);
+    let command = Command { speed_mps: SPEED_MPS as f32, steering_rad: 0.0 };
+    let ground = GroundSample { gradient: [slope, 0.0], ..GroundSample::FIRM };
+    let mut memory = vec![0.0; stepper.n_slots()];
+    stepper.settle(command, &mut memory);
+    let mut state = State { speed_mps: SPEED_MPS, ..State::default() };
+    (0..1000).for_each(|t| state = stepper.step_state(&state, command, &ground, &mut memory, t));
+    state.speed_mps
+}
+
+/// A loop of time constant T that pushes against the share C of gravity holds (e / T + C g s) / M = g s on a slope s with a
+/// mass ratio of M: e = (M - C) g s T, T being the discrete one of the drag's test. What is lost of C counts as less of it.
+#[test]
+fn hill_compensation_leaves_what_it_does_not_push_against() {
+    let slope = 0.05;
+    let per_share_mps = 9.80665 * slope * STEP_S / (1.0 - (-STEP_S / 0.4).exp());
+    let with = |more: &[(&str, f64)]| {
+        let loop_ = [("speed_loop", 0.4), ("hill_compensation", 0.6)];
+        let after = [("slope_gravity", 1.0)];
+        SPEED_MPS - speed_uphill_mps(&[&loop_, more, &after].concat(), slope)
+    };
+    for (more, share) in [
+        (&[][..], 1.0 - 0.6),
+        (&[("mass", 1.5)], 1.5 - 0.6),
+        (&[("compensation_loss", 0.2)], 1.0 - 0.6 + 0.2),
+    ] {
+        let behind_mps = with(more);
+        assert!((behind_mps - share * per_share_mps).abs() < 1e-6, "{more:?}: {behind_mps}");
+    }
+}
+
+/// Against a drag D a drive of power P comes to P / D, however fast it is asked to go.
+#[test]
+fn power_bounds_the_speed_under_drag() {
+    let (speeds, _) = speeds(
+        &stepper(&[("speed_loop", 0.1), ("drive_power", 0.6), ("rolling_drag", 0.5)]),
+        SPEED_MPS,
+        2000,
+    );
+    assert!((speeds[1999] - 0.6 / 0.5).abs() < 1e-3, "{}", speeds[1999]);
+}
+
 /// A drag D leaves a loop that closes the share 1 - exp(-dt / T) of its distance every step D dt over that share behind its
 /// command, about D T.
 #[test]

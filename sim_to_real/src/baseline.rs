@@ -1,19 +1,20 @@
 //! What is known before the real drives are opened: the calibrated nominal model, its noise, and how much of a gap one
 //! nominal drive shows against the others.
 
-use crate::calibration::{calibrated, proportional};
+use crate::calibration::{calibrated, proportional, recalibrated};
 use crate::causes::{Explanation, Trial};
 use crate::comparison::{Comparison, Yardstick, root_mean_square};
 use crate::conditions::StartRecord;
 use crate::drive::{Drive, DriveError};
 use crate::explanation::{best_pair, single_explanations};
 use crate::findings::ResidualCell;
-use crate::least_squares::mean_loss;
+use crate::limits_shown::LimitsShown;
 use crate::machine::Machine;
 use crate::residual_table::residual_cells;
+use crate::whitening::Whitening;
 use bicycle::{DriveLog, Effect};
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Why a diagnosis cannot begin.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -50,6 +51,7 @@ pub struct Baseline {
     /// The same with a proportional speed loop.
     pub(crate) proportional: Vec<Effect>,
     pub(crate) yardstick: Yardstick,
+    pub(crate) whitening: Whitening,
     pub(crate) null: Null,
 }
 
@@ -61,14 +63,14 @@ pub(crate) struct Null {
     pub(crate) error: f64,
     /// Mean robust loss.
     pub(crate) loss: f64,
-    /// Largest logarithmic gain in loss that each effect brought where there was none.
+    /// Logarithmic gain in loss that each effect brings by chance where there is none.
     pub(crate) gains: BTreeMap<String, f64>,
-    /// The largest of them.
-    pub(crate) gain_of_one: f64,
-    /// The same for a second effect.
+    /// The same of the best second effect.
     pub(crate) gain_of_two: f64,
     /// Residuals by quantity and horizon; before and after hold the same.
     pub(crate) cells: Vec<ResidualCell>,
+    /// Limits that would have shown.
+    pub(crate) limits_shown: LimitsShown,
     /// Every rollout with its conditions.
     pub(crate) starts: Vec<StartRecord>,
 }
@@ -89,15 +91,24 @@ impl Baseline {
         let (effects, yardstick) = calibrated(wheelbase_m, &all);
         let share = |done: usize| progress(done as f64 / (drives.len() + 1) as f64);
         share(1);
-        let mut left_out = Vec::new();
+        let mut folds = Vec::new();
         for out in 0..drives.len() {
             let rest: Vec<&Drive> = (0..drives.len()).filter(|&i| i != out).map(|i| &drives[i]).collect();
-            let (effects, own) = calibrated(wheelbase_m, &rest);
-            left_out.push(LeftOut::new(wheelbase_m, &drives[out], &effects, [&own, &yardstick]));
+            let effects = recalibrated(wheelbase_m, &rest, (&effects, &yardstick));
+            let comparison = Comparison::new(wheelbase_m, vec![&drives[out]], &yardstick);
+            folds.push((comparison.residuals(&effects), comparison, effects));
             share(out + 2);
         }
+        let whitening = Whitening::of(&folds.iter().flat_map(|fold| fold.0.clone()).collect::<Vec<_>>());
+        let left_out = folds.into_iter().map(|(residuals, comparison, effects)| {
+            let comparison = comparison.whitened_by(&whitening);
+            LeftOut::new(&Trial { comparison, baseline: &effects }, residuals)
+        });
+        let comparison = Comparison::new(wheelbase_m, all.clone(), &yardstick).whitened_by(&whitening);
+        let limits_shown = LimitsShown::of(&Trial { comparison, baseline: &effects });
+        let null = Null::of(&left_out.collect::<Vec<_>>(), limits_shown);
         let proportional = proportional(wheelbase_m, &all, &yardstick);
-        Ok(Self { wheelbase_m, effects, proportional, yardstick, null: Null::of(&left_out) })
+        Ok(Self { wheelbase_m, effects, proportional, yardstick, whitening, null })
     }
 
     /// The ordinary physics of this machine, calibrated for a controller's model, which needs it beside what is announced.
@@ -124,54 +135,74 @@ pub(crate) fn drives_of(
 /// One nominal run against a model of the others.
 struct LeftOut {
     residuals: Vec<f32>,
-    gains: [f64; 2],
+    loss: f64,
+    gain_of_two: f64,
     gain_by_id: BTreeMap<String, f64>,
     starts: Vec<StartRecord>,
 }
 
 impl LeftOut {
-    fn new(wheelbase_m: f64, drive: &Drive, effects: &[Effect], [own, yardstick]: [&Yardstick; 2]) -> Self {
-        let trial = Trial { comparison: Comparison::new(wheelbase_m, vec![drive], own), baseline: effects };
+    fn new(trial: &Trial<'_>, residuals: Vec<f32>) -> Self {
         let before = trial.loss(&[]);
-        let singles = single_explanations(&trial);
-        let pair = best_pair(&trial, &singles);
+        let singles = single_explanations(trial);
+        let pair = best_pair(trial, &singles);
         let one = singles.first().map_or(before, |single| single.loss);
         let two = pair.map_or(one, |pair| pair.loss);
-        let residuals = Comparison::new(wheelbase_m, vec![drive], yardstick).residuals(effects);
-        let starts = StartRecord::of(&[drive], &residuals);
+        let starts = StartRecord::of(&trial.comparison.drives().collect::<Vec<_>>(), &residuals);
         let gain = |single: &Explanation| (single.ids()[0].to_owned(), (before / single.loss).ln());
         let gain_by_id = singles.iter().map(gain).collect();
-        Self { residuals, gains: [(before / one).ln(), (one / two).ln()], gain_by_id, starts }
+        Self { residuals, loss: before, gain_of_two: (one / two).ln(), gain_by_id, starts }
     }
 }
 
-fn largest_by_id(left_out: &[LeftOut]) -> BTreeMap<String, f64> {
-    let mut largest = BTreeMap::new();
-    for (id, &gain) in left_out.iter().flat_map(|one| &one.gain_by_id) {
-        let so_far = largest.entry(id.clone()).or_insert(0.0_f64);
-        *so_far = so_far.max(gain);
-    }
-    largest
+/// A gain by chance is so many times the second largest of all runs.
+const CHANCE_MARGIN: f64 = 1.5;
+
+/// By effect what it gains by chance.
+fn chance_by_id(left_out: &[LeftOut]) -> BTreeMap<String, f64> {
+    let ids: BTreeSet<&String> = left_out.iter().flat_map(|one| one.gain_by_id.keys()).collect();
+    let gain =
+        |id: &String| chance_gain(left_out.iter().map(|one| one.gain_by_id.get(id).copied().unwrap_or(0.0)));
+    ids.into_iter().map(|id| (id.clone(), gain(id))).collect()
+}
+
+/// The largest gain is left aside: that run may be the only one to show what the effect does, and the model that knows all
+/// runs knows it. Of two runs the larger counts.
+fn chance_gain(gains: impl Iterator<Item = f64>) -> f64 {
+    let mut gains: Vec<f64> = gains.map(|gain| gain.max(0.0)).collect();
+    gains.sort_by(|a, b| b.total_cmp(a));
+    if gains.len() > 2 { CHANCE_MARGIN * gains[1] } else { gains.first().copied().unwrap_or(0.0) }
 }
 
 impl Null {
-    fn of(left_out: &[LeftOut]) -> Self {
+    fn of(left_out: &[LeftOut], limits_shown: LimitsShown) -> Self {
         let residuals: Vec<f32> = left_out.iter().flat_map(|one| one.residuals.iter().copied()).collect();
         // One drive in a regime that the others never saw shall not make the null of all.
-        let median = |of: &dyn Fn(&[f32]) -> f64| {
-            let mut values: Vec<f64> = left_out.iter().map(|one| of(&one.residuals)).collect();
+        let median = |of: &dyn Fn(&LeftOut) -> f64| {
+            let mut values: Vec<f64> = left_out.iter().map(of).collect();
             values.sort_by(f64::total_cmp);
             0.5 * (values[(values.len() - 1) / 2] + values[values.len() / 2])
         };
-        let largest = |i: usize| left_out.iter().map(|one| one.gains[i]).fold(0.0, f64::max);
         Self {
-            error: median(&root_mean_square),
-            loss: median(&mean_loss),
-            gains: largest_by_id(left_out),
-            gain_of_one: largest(0),
-            gain_of_two: largest(1),
+            error: median(&|one| root_mean_square(&one.residuals)),
+            loss: median(&|one| one.loss),
+            gains: chance_by_id(left_out),
+            limits_shown,
+            gain_of_two: chance_gain(left_out.iter().map(|one| one.gain_of_two)),
             cells: residual_cells(&residuals, &residuals, None),
             starts: left_out.iter().flat_map(|one| one.starts.clone()).collect(),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::chance_gain;
+
+    /// 1.5 times 0.02; of two runs the larger.
+    #[test]
+    fn one_run_that_stands_out_is_no_measure_of_chance() {
+        assert!((chance_gain([0.02, 0.3, -0.1, 0.01].into_iter()) - 0.03).abs() < 1e-12);
+        assert!((chance_gain([0.02, 0.3].into_iter()) - 0.3).abs() < 1e-12);
     }
 }

@@ -7,7 +7,7 @@ use bicycle::Effect;
 use bicycle::effect::Parameter;
 
 /// What every machine has a little of, in order of action, with the values that the fit starts from.
-const ORDINARY: [(&str, [f64; 4]); 22] = [
+const ORDINARY: [(&str, [f64; 4]); 25] = [
     ("steer_delay", [0.02, 0.0, 0.0, 0.0]),
     ("speed_delay", [0.02, 0.0, 0.0, 0.0]),
     ("speed_scale", [1.0, 0.0, 0.0, 0.0]),
@@ -15,12 +15,15 @@ const ORDINARY: [(&str, [f64; 4]); 22] = [
     ("steer_bias", [0.0; 4]),
     ("steer_rate", [3.0, 0.0, 0.0, 0.0]),
     ("steer_lag", [0.06, 0.0, 0.0, 0.0]),
+    ("steer_lag", [0.03, 0.0, 0.0, 0.0]),
     ("accel_limit", [3.0, 0.0, 0.0, 0.0]),
     ("speed_lag", [0.15, 0.0, 0.0, 0.0]),
     ("speed_loop", [0.3, 0.0, 0.0, 0.0]),
     ("feed_forward", [0.6, 0.0, 0.0, 0.0]),
     ("speed_integral", [3.0, 0.0, 0.0, 0.0]),
+    ("hill_compensation", [0.0; 4]),
     ("drive_limit", [8.0, 8.0, 0.0, 0.0]),
+    ("drive_power", [1e4, 0.0, 0.0, 0.0]),
     ("drive_lag", [0.05, 0.0, 0.0, 0.0]),
     ("rolling_drag", [0.0; 4]),
     ("veg_drag", [0.0; 4]),
@@ -47,6 +50,10 @@ const WORTH_A_CONTROLLER_ON_A_PLANE: f64 = 0.5;
 const PULL: f64 = 1.5;
 /// Shares of gravity, along and across.
 const GRAVITY: [&str; 2] = ["slope_gravity", "cross_slope"];
+/// What a controller does against the first of them.
+const COMPENSATION: &str = "hill_compensation";
+/// Below this share of gravity along the slope the simulator is one of a plane.
+const PLANE: f64 = 0.25;
 
 /// Fits the ordinary effects to drives, and the yardstick to what is left.
 pub(crate) fn calibrated(wheelbase_m: f64, drives: &[&Drive]) -> (Vec<Effect>, Yardstick) {
@@ -56,20 +63,33 @@ pub(crate) fn calibrated(wheelbase_m: f64, drives: &[&Drive]) -> (Vec<Effect>, Y
         let comparison = Comparison::new(wheelbase_m, drives.to_vec(), &yardstick);
         let fitted = |start, held| refined(&comparison, &with_limits_tried(&comparison, start), held);
         effects = if round == 0 {
-            with_controller(&comparison, CONTROLLERS.map(|own| fitted(ordinary(own), &[])))
+            with_controller(&comparison, CONTROLLERS.map(|own| fitted(ordinary(own), &[COMPENSATION][..])))
         } else {
-            fitted(with_whole_gravity(effects), &GRAVITY)
+            let whole = with_whole_gravity(effects);
+            let held = held_of(&whole);
+            fitted(whole, &held)
         };
         yardstick = Yardstick::of(&comparison.residuals(&effects), &yardstick);
     }
     (effects, yardstick)
 }
 
+/// The same effects fitted to other drives, from where they are.
+pub(crate) fn recalibrated(
+    wheelbase_m: f64,
+    drives: &[&Drive],
+    (effects, yardstick): (&[Effect], &Yardstick),
+) -> Vec<Effect> {
+    let comparison = Comparison::new(wheelbase_m, drives.to_vec(), yardstick);
+    refined(&comparison, effects, &held_of(effects))
+}
+
 /// The ordinary effects with a proportional speed loop, fitted to drives in units of their yardstick.
 pub(crate) fn proportional(wheelbase_m: f64, drives: &[&Drive], yardstick: &Yardstick) -> Vec<Effect> {
     let comparison = Comparison::new(wheelbase_m, drives.to_vec(), yardstick);
-    let effects = refined(&comparison, &with_limits_tried(&comparison, ordinary(&[])), &[]);
-    refined(&comparison, &with_whole_gravity(effects), &GRAVITY)
+    let effects = refined(&comparison, &with_limits_tried(&comparison, ordinary(&[])), &[COMPENSATION]);
+    let whole = with_whole_gravity(effects);
+    refined(&comparison, &whole, &held_of(&whole))
 }
 
 /// The ordinary effects with a speed controller of some kind.
@@ -110,20 +130,37 @@ fn with_limits_tried(comparison: &Comparison<'_>, mut effects: Vec<Effect>) -> V
     effects
 }
 
-/// Gravity acts whole or, in a simulator of a plane, not at all. Told apart, the shares are not fitted any more: else the
-/// gain of the speed loop, by which every force is measured, would be anybody's.
+/// Gravity acts whole or, in a simulator of a plane, not at all. Told apart, the shares are not fitted any more; what is
+/// missing along the slope is what the controller compensates.
 fn with_whole_gravity(mut effects: Vec<Effect>) -> Vec<Effect> {
-    let whole = if is_heavy(&effects) { 1.0 } else { 0.0 };
-    for effect in effects.iter_mut().filter(|effect| GRAVITY.contains(&effect.description().id)) {
+    let along = share_along(&effects);
+    let whole = if along > PLANE { 1.0 } else { 0.0 };
+    let is_found_whole = (along - whole).abs() < f64::EPSILON;
+    for effect in &mut effects {
         let id = effect.description().id;
-        *effect = Effect::from_values(id, [whole, 0.0, 0.0, 0.0]).unwrap_or(*effect);
+        let share = match id {
+            _ if GRAVITY.contains(&id) => whole,
+            COMPENSATION if !is_found_whole => (whole - along).max(0.0),
+            _ => continue,
+        };
+        *effect = Effect::from_values(id, [share, 0.0, 0.0, 0.0]).unwrap_or(*effect);
     }
     effects
 }
 
-/// Whether more than half of gravity was found to act along slopes.
+/// Share of gravity that acts along slopes.
+fn share_along(effects: &[Effect]) -> f64 {
+    let along = effects.iter().find(|effect| effect.description().id == GRAVITY[0]);
+    along.map_or(0.0, |effect| effect.values()[0])
+}
+
 fn is_heavy(effects: &[Effect]) -> bool {
-    effects.iter().any(|effect| effect.description().id == GRAVITY[0] && effect.values()[0] > 0.5)
+    share_along(effects) > PLANE
+}
+
+/// What is not fitted once gravity is whole: its shares, and on a plane what would compensate them.
+fn held_of(effects: &[Effect]) -> Vec<&'static str> {
+    if is_heavy(effects) { GRAVITY.to_vec() } else { vec![GRAVITY[0], GRAVITY[1], COMPENSATION] }
 }
 
 /// All parameters of all effects fitted together, but for those of effects that are held.

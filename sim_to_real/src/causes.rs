@@ -66,6 +66,11 @@ impl Trial<'_> {
         self.comparison.residuals(&composed(self.baseline, causes))
     }
 
+    /// The residuals as the loss judges them.
+    pub(crate) fn judged_residuals(&self, causes: &[Effect]) -> Vec<f32> {
+        self.comparison.judged_residuals(&composed(self.baseline, causes))
+    }
+
     /// The best of `known` with one effect more: the values that the catalogue tries, then the best of them refined
     /// while the known ones stay.
     pub(crate) fn with_one_more(&self, known: &[Effect], description: &Description) -> Option<Explanation> {
@@ -91,7 +96,7 @@ impl Trial<'_> {
                     .map(|(parameter, value)| coordinate(parameter, value, None))
             })
             .collect();
-        let found = fit(&coordinates, |values| self.residuals(&with_values(&causes, values)));
+        let found = fit(&coordinates, |values| self.judged_residuals(&with_values(&causes, values)));
         if found.loss < explanation.loss {
             Explanation::new(with_values(&causes, &found.values), found.loss)
         } else {

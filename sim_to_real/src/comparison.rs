@@ -3,6 +3,7 @@
 use crate::drive::{Drive, HORIZONS};
 use crate::least_squares::mean_loss;
 use crate::rollout::{N_QUANTITIES, PER_START, Simulator};
+use crate::whitening::Whitening;
 use bicycle::Effect;
 use serde::{Deserialize, Serialize};
 
@@ -17,13 +18,19 @@ pub(crate) struct Comparison<'a> {
     drives: Vec<&'a Drive>,
     measured: Vec<Vec<f32>>,
     per_sigma: Vec<f32>,
+    whitening: Option<&'a Whitening>,
 }
 
 impl<'a> Comparison<'a> {
     pub(crate) fn new(wheelbase_m: f64, drives: Vec<&'a Drive>, yardstick: &Yardstick) -> Self {
         let measured = drives.iter().map(|drive| outcomes(drive)).collect();
         let per_sigma = yardstick.0.iter().map(|sigma| (1.0 / sigma) as f32).collect();
-        Self { wheelbase_m, drives, measured, per_sigma }
+        Self { wheelbase_m, drives, measured, per_sigma, whitening: None }
+    }
+
+    /// The same with residuals judged by what belongs together in them.
+    pub(crate) fn whitened_by(self, whitening: &'a Whitening) -> Self {
+        Self { whitening: Some(whitening), ..self }
     }
 
     /// Foretold less measured, in standard deviations: drive by drive, start by start, [`PER_START`] numbers each;
@@ -68,9 +75,15 @@ impl<'a> Comparison<'a> {
         both.map(noise).collect()
     }
 
+    /// The residuals as they are judged.
+    pub(crate) fn judged_residuals(&self, effects: &[Effect]) -> Vec<f32> {
+        let residuals = self.residuals(effects);
+        self.whitening.map_or_else(|| residuals.clone(), |whitening| whitening.applied(&residuals))
+    }
+
     /// Mean robust loss of a model; infinite where a rollout runs away beyond all numbers.
     pub(crate) fn loss(&self, effects: &[Effect]) -> f64 {
-        let loss = mean_loss(&self.residuals(effects));
+        let loss = mean_loss(&self.judged_residuals(effects));
         if loss.is_finite() { loss } else { f64::INFINITY }
     }
 }

@@ -5,6 +5,7 @@ use crate::baseline::{Baseline, GapError, drives_of};
 use crate::causes::{Explanation, Trial};
 use crate::comparison::{Comparison, root_mean_square};
 use crate::conditions::{StartRecord, condition_tables, ground_residuals, places};
+use crate::constancy::differing_halves;
 use crate::cross_validation::{CrossValidation, Split, foretold};
 use crate::drive::Drive;
 use crate::explanation::{pairs, single_explanations};
@@ -55,8 +56,15 @@ pub fn diagnose(baseline: &Baseline, machine: &Machine, real: &[DriveLog]) -> Re
     let before = trial.residuals(&[]);
     let cross_validation = CrossValidation::of(&drives);
     let splits = cross_validation.splits(baseline);
-    let judgement = judged(baseline, &trial, &splits);
+    let mut judgement = judged(baseline, &trial, &splits);
     let causes = judgement.announced.clone();
+    let mut notes = of_evidence(&all);
+    if drives.len() > 1
+        && let Some(halves) = differing_halves(baseline, &drives, (&causes, judgement.foretold_loss))
+    {
+        judgement.verdict = Verdict::EffectsAndUnknown;
+        notes.push(halves.told().to_owned());
+    }
     let after = trial.residuals(&causes);
     let (own, repaired) = (StartRecord::of(&all, &before), StartRecord::of(&all, &after));
     let tables = condition_tables(&own, &baseline.null.starts);
@@ -76,13 +84,14 @@ pub fn diagnose(baseline: &Baseline, machine: &Machine, real: &[DriveLog]) -> Re
         ranking: judgement.ranking,
         credible_set: judgement.credible_set,
         floor: baseline.null.error,
-        notes: of_evidence(&all),
+        notes,
     })
 }
 
 impl Baseline {
     pub(crate) fn trial<'a>(&'a self, drives: &[&'a Drive]) -> Trial<'a> {
-        let comparison = Comparison::new(self.wheelbase_m, drives.to_vec(), &self.yardstick);
+        let comparison =
+            Comparison::new(self.wheelbase_m, drives.to_vec(), &self.yardstick).whitened_by(&self.whitening);
         Trial { comparison, baseline: &self.effects }
     }
 

@@ -117,10 +117,10 @@ impl Evidence {
             | "speed_integral" | "drive_lag" => {
                 self.judges_speed() && self.speed_input == SpeedInput::Commanded
             }
-            "speed_delay" | "speed_scale" | "speed_lag" | "drive_limit" | "mass" | "rolling_drag"
-            | "quad_drag" | "wind" => self.judges_speed(),
+            "speed_delay" | "speed_scale" | "speed_lag" | "drive_limit" | "drive_power" | "mass"
+            | "rolling_drag" | "quad_drag" | "wind" => self.judges_speed(),
             "cornering_drag" => self.judges_speed() && by_angle,
-            "slope_gravity" => self.judges_speed() && self.slopes,
+            "slope_gravity" | "hill_compensation" | "compensation_loss" => self.judges_speed() && self.slopes,
             "veg_drag" | "loose_drag" => self.judges_speed() && self.classes,
             "cross_slope" => self.slopes,
             "steer_rate" | "backlash" => is_commanded,

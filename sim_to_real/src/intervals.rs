@@ -24,7 +24,8 @@ pub(crate) fn named_effects(trial: &Trial<'_>, causes: &[Effect]) -> Vec<NamedEf
         .map(|(parameter, value)| coordinate(parameter, value, None))
         .collect();
     let places: Vec<f64> = centre.iter().map(|coordinate| coordinate.start).collect();
-    let linearised = Linearised::at(&centre, &places, |values| trial.residuals(&with_values(causes, values)));
+    let linearised =
+        Linearised::at(&centre, &places, |values| trial.judged_residuals(&with_values(causes, values)));
     let errors = linearised.jackknife(N_STRETCHES);
     let mut estimates = parameters.iter().zip(&centre).zip(errors).map(|((parameter, centre), error)| {
         let size = if is_limit(parameter) { 1.0 } else { centre.start - parameter.neutral };

@@ -7,27 +7,31 @@ use crate::causes::{Explanation, candidates};
 use bicycle::Effect;
 
 /// Logarithmic gain that an effect must bring beyond what it brings between nominal drives.
-const PRICE_OF_ONE: f64 = 0.105;
+const PRICE_OF_ONE: f64 = 0.05;
 /// The same for a second effect, which a wrong shape of the first one invites.
-const PRICE_OF_TWO: f64 = 0.24;
-/// The same for a second effect in the sensors, which no wrong shape of a motion looks like.
-const PRICE_OF_A_SECOND_SENSOR: f64 = 0.15;
+const PRICE_OF_TWO: f64 = 0.12;
+/// The same on top where both are in one actuator: two of them are the usual shape of a third that has no name.
+const PRICE_OF_ONE_ACTUATOR: f64 = 0.18;
+/// Effects of one actuator.
+const ACTUATORS: [&[&str]; 2] = [
+    &["steer_lag", "steer_delay", "steer_rate", "backlash"],
+    &["speed_lag", "speed_delay", "accel_limit", "motor_deadband"],
+];
 /// Difference in energy that makes one explanation e times as probable as another.
 pub(crate) const TEMPERATURE: f64 = 0.035;
-/// An effect is announced only when nothing at all is this much worse in energy.
-const BEYOND_DOUBT: f64 = 0.06;
+/// An effect is announced only when it takes this share off the loss, or off the null's where that is larger, beyond what it
+/// takes off between nominal drives.
+const BEYOND_DOUBT: f64 = 0.085;
 /// Explanations this much less probable than the best are told apart from it.
 const TOLD_APART: f64 = 0.05;
 /// Where the data tell nothing apart, this many names are enough to say so.
 const MOST_NAMES: usize = 6;
-/// What is left is unknown when its error exceeds this many floors and
-const UNKNOWN_IN_FLOORS: f64 = 1.55;
-/// this share of the gap.
-const UNKNOWN_SHARE: f64 = 0.35;
-/// The same beside friction, where a rest is no sign of anything else: how a vehicle slides is only outlined.
-const UNKNOWN_SHARE_WHILE_SLIDING: f64 = 0.75;
+/// What is left is unknown when its loss exceeds this many losses of the null and
+const UNKNOWN_IN_NULLS: f64 = 1.7;
+/// this share of what there was above it.
+const UNKNOWN_SHARE: f64 = 0.45;
 /// An unknown rest beside less than this part of the squared gap makes a name worthless.
-const WORTH_A_NAME: f64 = 0.25;
+const WORTH_A_NAME: f64 = 0.45;
 /// The loss that a drive may have at best, in losses of the null.
 const LEAST_LOSS: f64 = 0.65;
 
@@ -42,29 +46,40 @@ pub(crate) struct Weighed {
 pub(crate) struct Judgement {
     pub(crate) verdict: Verdict,
     pub(crate) announced: Vec<Effect>,
+    /// Loss of what is announced on drives that it was not fitted to.
+    pub(crate) foretold_loss: f64,
     pub(crate) ranking: Vec<Ranked>,
     pub(crate) credible_set: Vec<String>,
 }
 
 /// What an explanation must gain to be believed.
 fn price(explanation: &Explanation, null: &Null) -> f64 {
-    let own = |id: &&str| null.gains.get(*id).copied().unwrap_or(0.0);
-    let nulls: f64 = explanation.ids().iter().map(own).sum();
-    let has_sensor = explanation.causes.iter().any(Effect::acts_on_sensors);
+    let nulls = chance_gain(explanation, null);
+    let ids = explanation.ids();
+    let is_one_actuator = |own: &&&[&str]| ids.iter().all(|id| own.contains(id));
     nulls
-        + match explanation.causes.len() {
+        + match ids.len() {
             0 => 0.0,
             1 => PRICE_OF_ONE,
-            _ if has_sensor => PRICE_OF_ONE + PRICE_OF_A_SECOND_SENSOR,
+            _ if ACTUATORS.iter().any(|own| is_one_actuator(&own)) => {
+                PRICE_OF_ONE + PRICE_OF_TWO + PRICE_OF_ONE_ACTUATOR
+            }
             _ => PRICE_OF_ONE + PRICE_OF_TWO,
         }
+}
+
+/// What an explanation gains between nominal drives: of a pair what its likelier member does, and a second one.
+fn chance_gain(explanation: &Explanation, null: &Null) -> f64 {
+    let own = |id: &&str| null.gains.get(*id).copied().unwrap_or(0.0);
+    let gains = explanation.ids().iter().map(own).fold(0.0, f64::max);
+    if explanation.causes.len() > 1 { gains + null.gain_of_two } else { gains }
 }
 
 impl Weighed {
     /// Whether what the best single leaves is more than a pair's price above what could be left at best.
     pub(crate) fn may_hold_pairs(&self, null: &Null) -> bool {
         let least = LEAST_LOSS * null.loss;
-        self.singles.first().is_some_and(|single| (single.loss / least).ln() > PRICE_OF_A_SECOND_SENSOR)
+        self.singles.first().is_some_and(|single| (single.loss / least).ln() > PRICE_OF_TWO)
     }
 
     pub(crate) fn judge(&self, null: &Null) -> Judgement {
@@ -73,20 +88,28 @@ impl Weighed {
             .map(|explanation| (explanation.energy() + price(explanation, null), explanation))
             .collect();
         all.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let is_beyond_doubt = all[0].0 + BEYOND_DOUBT < self.none.loss.ln();
-        let best = if is_beyond_doubt { all[0].1 } else { &self.none };
+        let best = if self.is_beyond_doubt(all[0].1, null) { all[0].1 } else { &self.none };
         let (verdict, announced) = self.verdict(best, null);
         let credible_set = self.credible_set(best);
-        Judgement { verdict, announced, ranking: ranking(&all), credible_set }
+        Judgement {
+            verdict,
+            announced,
+            foretold_loss: best.foretold_loss,
+            ranking: ranking(&all),
+            credible_set,
+        }
+    }
+
+    fn is_beyond_doubt(&self, best: &Explanation, null: &Null) -> bool {
+        let gain = (self.none.loss - best.energy().exp()) / self.none.loss.max(null.loss);
+        let would_show = best.causes.iter().all(|own| null.limits_shown.would_show(own));
+        would_show && gain - chance_gain(best, null) > BEYOND_DOUBT
     }
 
     fn verdict(&self, best: &Explanation, null: &Null) -> (Verdict, Vec<Effect>) {
         let over = |loss: f64| (loss - null.loss).max(0.0);
         let left = over(best.loss) / over(self.none.loss).max(1e-9);
-        let floors = (best.loss / null.loss).sqrt();
-        let slides = best.causes.iter().any(|cause| matches!(cause, Effect::Friction(_)));
-        let share = if slides { UNKNOWN_SHARE_WHILE_SLIDING } else { UNKNOWN_SHARE };
-        let unknown = floors > UNKNOWN_IN_FLOORS && left.sqrt() > share;
+        let unknown = best.loss / null.loss > UNKNOWN_IN_NULLS && left > UNKNOWN_SHARE;
         match (best.causes.is_empty(), unknown) {
             (true, false) => (Verdict::None, Vec::new()),
             (true, true) => (Verdict::Unknown, Vec::new()),

@@ -18,6 +18,7 @@ mod calibration;
 mod causes;
 mod comparison;
 mod conditions;
+mod constancy;
 mod cross_validation;
 mod diagnosis;
 mod drive;
@@ -29,6 +30,7 @@ mod intervals;
 mod judgement;
 mod learned_bound;
 mod least_squares;
+mod limits_shown;
 mod machine;
 mod manoeuvre;
 mod residual_table;
@@ -40,6 +42,7 @@ mod smoothing;
 mod steering;
 mod unseen;
 mod verification;
+mod whitening;
 mod without_simulator;
 
 #[cfg(test)]

@@ -9,6 +9,9 @@ use std::f64::consts::TAU;
 /// Steps on either side over which a rate is taken from a path or a yaw.
 const RATE_REACH: usize = 5;
 
+/// Columns that one sensor gives together.
+const POSE: [Column; 3] = [Column::X, Column::Y, Column::Yaw];
+
 /// Columns of a run every [`STEP_S`].
 pub(crate) struct Signals<'a> {
     run: &'a Run<'a>,
@@ -77,6 +80,13 @@ impl<'a> Signals<'a> {
             .map(|column| self.run.column(column).map(|_| filled(&self.interpolated(column))))
     }
 
+    /// Whether a row repeats the pose of the row before it: a sensor slower than the log is held until it speaks again.
+    fn repeats_pose(&self) -> Vec<bool> {
+        let columns: Vec<&[f64]> = POSE.iter().filter_map(|column| self.run.column(*column)).collect();
+        let repeats = |row: usize| row > 0 && columns.iter().all(|values| values[row] == values[row - 1]);
+        (0..self.run.time_s().len()).map(repeats).collect()
+    }
+
     /// For each even step the last row at or before it.
     fn rows(&self) -> impl Iterator<Item = (f64, usize)> {
         let time_s = self.run.time_s();
@@ -101,8 +111,11 @@ impl<'a> Signals<'a> {
     /// Linear between rows; an angle takes the short way round and is freed of jumps.
     fn interpolated(&self, column: Column) -> Vec<f64> {
         let Some(values) = self.run.column(column) else { return vec![f64::NAN; self.n] };
-        let continuous = if column == Column::Yaw { unwrapped(values) } else { values.to_vec() };
+        let mut continuous = if column == Column::Yaw { unwrapped(values) } else { values.to_vec() };
         let time_s = self.run.time_s();
+        if POSE.contains(&column) {
+            bridge(&mut continuous, time_s, &self.repeats_pose());
+        }
         let between = |(now_s, row): (f64, usize)| match time_s.get(row + 1) {
             None => continuous[row],
             Some(next_s) => {
@@ -111,6 +124,17 @@ impl<'a> Signals<'a> {
             }
         };
         self.rows().map(between).collect()
+    }
+}
+
+/// Puts values on a straight line between the rows around them that repeat none; at the end they stay.
+fn bridge(values: &mut [f64], time_s: &[f64], repeats: &[bool]) {
+    let spoken: Vec<usize> = (0..values.len()).filter(|&row| !repeats[row]).collect();
+    for pair in spoken.windows(2).filter(|pair| pair[1] > pair[0] + 1) {
+        let slope = (values[pair[1]] - values[pair[0]]) / (time_s[pair[1]] - time_s[pair[0]]);
+        for row in pair[0] + 1..pair[1] {
+            values[row] = values[pair[0]] + slope * (time_s[row] - time_s[pair[0]]);
+        }
     }
 }
 
@@ -195,6 +219,33 @@ mod tests {
         let nan = f64::NAN;
         assert_eq!(filled(&[nan, 1.0, nan, nan, 4.0, nan]), [1.0, 1.0, 2.0, 3.0, 4.0, 4.0]);
         assert_eq!(filled(&[nan, nan]), [0.0, 0.0]);
+    }
+
+    /// A pose every third row, held between: on a straight way at constant speed the line between them is the way, and a
+    /// log in which every row speaks stays as it is.
+    #[test]
+    fn a_held_pose_is_put_on_the_line_between_those_that_were_measured() {
+        let columns = [Column::X, Column::Y, Column::Yaw, Column::CmdSteer, Column::CmdSpeed];
+        let at = |hold: usize| {
+            let value = move |column: Column, t: f64| {
+                let row = (t / 0.02).round() as usize / hold * hold;
+                let t = row as f64 * 0.02;
+                match column {
+                    Column::X => 3.0 * t,
+                    Column::Y => -t,
+                    Column::Yaw => 0.1 * t,
+                    _ => 1.0,
+                }
+            };
+            states(&log(&columns, 100, 0.02, value))[1].clone()
+        };
+        let (held, spoken) = (at(3), at(1));
+        for quantity in [X, Y, YAW] {
+            // The last row speaks in both: 99 is a multiple of 3.
+            for (held, spoken) in held[quantity].iter().zip(&spoken[quantity]) {
+                assert!((held - spoken).abs() < 1e-9, "{held} {spoken}");
+            }
+        }
     }
 
     #[test]

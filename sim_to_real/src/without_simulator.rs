@@ -18,8 +18,10 @@ use crate::drive::Drive;
 use crate::findings::Findings;
 use crate::intervals::named_effects;
 use crate::least_squares::mean_loss;
+use crate::limits_shown::LimitsShown;
 use crate::machine::Machine;
 use crate::residual_table::residual_cells;
+use crate::whitening::Whitening;
 use bicycle::DriveLog;
 pub(crate) use notes::of_evidence;
 use selection::{LeftOut, Selection, grown};
@@ -81,7 +83,7 @@ fn bare_baseline(machine: &Machine, drives: &[&Drive], yardstick: Yardstick) -> 
         error: root_mean_square(&noise),
         loss: mean_loss(&noise),
         gains: BTreeMap::new(),
-        gain_of_one: 0.0,
+        limits_shown: LimitsShown::default(),
         gain_of_two: 0.0,
         cells: residual_cells(&noise, &noise, None),
         starts: StartRecord::of(drives, &noise),
@@ -91,6 +93,7 @@ fn bare_baseline(machine: &Machine, drives: &[&Drive], yardstick: Yardstick) -> 
         effects: Vec::new(),
         proportional: Vec::new(),
         yardstick,
+        whitening: Whitening::none(),
         null,
     }
 }

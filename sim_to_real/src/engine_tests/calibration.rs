@@ -102,3 +102,12 @@ fn in_a_world_without_gravity_none_is_calibrated() {
     assert_eq!(value(&effects, "slope_gravity"), Some(0.0));
     assert!((value(&effects, "speed_loop").unwrap() - 0.5).abs() < 0.03, "{effects:?}");
 }
+
+/// A proportional controller on a plant that feels two fifths of gravity: what is missing is compensated.
+#[test]
+fn a_controller_that_pushes_against_slopes_is_found() {
+    let effects = found(Controller { time_constant_s: 0.5, integral_per_s2: 0.0, gravity: 0.4 });
+    assert_eq!(value(&effects, "slope_gravity"), Some(1.0));
+    assert!((value(&effects, "hill_compensation").unwrap() - 0.6).abs() < 0.05, "{effects:?}");
+    assert!((value(&effects, "speed_loop").unwrap() - 0.5).abs() < 0.03, "{effects:?}");
+}

@@ -6,7 +6,7 @@ use crate::comparison::{Comparison, Yardstick};
 use crate::explanation::{best_pair, single_explanations};
 use std::collections::BTreeSet;
 
-const RIGHT: Made = Made { curvature_ratio: 1.0, speed_ratio: 1.0 };
+const RIGHT: Made = Made { curvature_ratio: 1.0, left_ratio: 1.0, speed_ratio: 1.0 };
 
 fn on<T>(made: Made, told: impl Fn(&Trial<'_>) -> T) -> T {
     let drives = [arcs(made, 1), arcs(made, 2)];
@@ -21,7 +21,7 @@ fn on<T>(made: Made, told: impl Fn(&Trial<'_>) -> T) -> T {
 
 #[test]
 fn the_effect_that_was_put_in_is_the_best_alone_with_its_size() {
-    on(Made { curvature_ratio: 0.85, speed_ratio: 1.0 }, |trial| {
+    on(Made { curvature_ratio: 0.85, left_ratio: 1.0, speed_ratio: 1.0 }, |trial| {
         let singles = single_explanations(trial);
         let best = &singles[0];
         assert_eq!(best.ids(), ["steer_gain"], "{:?}", best.causes);
@@ -51,7 +51,7 @@ fn on_drives_of_the_model_itself_nothing_explains_anything() {
 
 #[test]
 fn two_effects_that_were_put_in_are_the_best_pair() {
-    on(Made { curvature_ratio: 0.85, speed_ratio: 0.9 }, |trial| {
+    on(Made { curvature_ratio: 0.85, left_ratio: 1.0, speed_ratio: 0.9 }, |trial| {
         let singles = single_explanations(trial);
         let pair = best_pair(trial, &singles).unwrap();
         let mut ids = pair.ids();

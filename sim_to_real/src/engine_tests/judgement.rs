@@ -5,7 +5,7 @@ use crate::answer::Verdict;
 use crate::baseline::Null;
 use crate::causes::Explanation;
 use crate::judgement::{Judgement, Weighed};
-use bicycle::Effect;
+use crate::limits_shown::LimitsShown;
 use proptest::prelude::*;
 use std::collections::BTreeMap;
 
@@ -23,8 +23,8 @@ fn null(gained: (&str, f64)) -> Null {
         error: 1.0,
         loss: 1.0,
         gains: BTreeMap::from([(gained.0.to_owned(), gained.1)]),
-        gain_of_one: gained.1,
         gain_of_two: 0.0,
+        limits_shown: LimitsShown::default(),
         cells: Vec::new(),
         starts: Vec::new(),
     }
@@ -61,10 +61,11 @@ fn a_gain_below_its_price_is_nothing_and_one_well_above_is_announced() {
     let at = |gain: f64| judged(1.3, &[1.3 * (-gain).exp(), 1.3, 1.3, 1.3, 1.3], None);
     assert_eq!(at(0.0).verdict, Verdict::None);
     assert_eq!(at(0.01).verdict, Verdict::None);
-    // A little more than its price is likelier than nothing, and not beyond doubt.
-    assert!(score(&at(0.15), "steer_lag") > 0.5);
-    assert_eq!(at(0.15).verdict, Verdict::None);
-    assert_eq!(announced(&at(0.18)), ["steer_lag"]);
+    // A little more than its price is likelier than nothing, and not beyond doubt: 1 - exp(-0.08) is 0.077 of the loss,
+    // 1 - exp(-0.1) is 0.095.
+    assert!(score(&at(0.08), "steer_lag") > 0.5);
+    assert_eq!(at(0.08).verdict, Verdict::None);
+    assert_eq!(announced(&at(0.1)), ["steer_lag"]);
     // Once announced, it stays so for every larger gain.
     let first = (0..60).find(|k| at(0.01 * f64::from(*k)).verdict != Verdict::None).unwrap();
     assert!((first..60).all(|k| announced(&at(0.01 * f64::from(k))) == ["steer_lag"]), "from {first}");
@@ -88,8 +89,23 @@ fn a_second_effect_has_its_own_price() {
     let losses = [2.0, 3.5, 3.8, 3.9, 4.0];
     assert_eq!(announced(&judged(4.0, &losses, Some(1.95))), ["steer_lag"]);
     assert_eq!(announced(&judged(4.0, &losses, Some(1.0))), ["steer_lag", "speed_scale"]);
+    // 1.76 is 0.128 below the single in the logarithm, 1.79 is 0.111.
+    assert_eq!(announced(&judged(4.0, &losses, Some(1.76))).len(), 2);
+    assert_eq!(announced(&judged(4.0, &losses, Some(1.79))).len(), 1);
     let credible = judged(4.0, &losses, Some(1.0)).credible_set;
     assert_eq!(credible, ["steer_lag", "speed_scale"], "of a pair, its members");
+}
+
+/// A second effect of the same actuator is dearer: 0.25 in the logarithm is enough for a gain and not for a delay.
+#[test]
+fn a_second_effect_in_the_same_actuator_is_dearer() {
+    let with = |second: (&str, f64)| {
+        let pair = Explanation::new(vec![effect("steer_lag", 0.2), effect(second.0, second.1)], 2.0);
+        let singles = vec![single(SINGLES[0], 2.0 * 0.25_f64.exp())];
+        let weighed = Weighed { none: Explanation::new(Vec::new(), 6.0), singles, pairs: vec![pair] };
+        weighed.judge(&null(("wind", 0.0))).announced.len()
+    };
+    assert_eq!((with(SINGLES[1]), with(SINGLES[2])), (1, 2));
 }
 
 /// Most is left: unknown. Much is left, but much was explained as well: both. Little is left: effects.
@@ -97,28 +113,32 @@ fn a_second_effect_has_its_own_price() {
 fn what_exceeds_the_floor_and_a_share_of_the_gap_is_unknown() {
     let with = |loss: f64| judged(20.0, &[loss, 19.9, 19.9, 19.9, 19.9], None);
     assert_eq!(with(1.1).verdict, Verdict::Effects);
-    assert_eq!(with(7.0).verdict, Verdict::EffectsAndUnknown);
-    assert_eq!(announced(&with(7.0)), ["steer_lag"]);
+    // 9.3 of 19 are left, 0.49, and 0.51 are explained.
+    assert_eq!(with(10.3).verdict, Verdict::EffectsAndUnknown);
+    assert_eq!(announced(&with(10.3)), ["steer_lag"]);
     let nothing = with(17.0);
     assert_eq!(nothing.verdict, Verdict::Unknown);
     assert!(nothing.announced.is_empty());
     // Three floors above it and nothing gained at all.
     assert_eq!(judged(9.0, &[9.0; 5], None).verdict, Verdict::Unknown);
-    // In reach of the floor a rest is no unknown, whatever its share.
+    // In reach of the null a rest is no unknown, whatever its share.
     assert_eq!(judged(1.2, &[1.2; 5], None).verdict, Verdict::None);
 }
 
-/// 5 of 20 floors left in loss, half of the gap in error, is more than the model of any effect but friction may leave.
+/// Where the best explanation is a limit that nominal drives never came near, nothing is announced, and no rival takes its
+/// place.
 #[test]
-fn a_rest_beside_sliding_is_no_sign_of_anything_else() {
-    let with = |own: Effect| {
-        let singles = vec![Explanation::new(vec![own], 5.75)];
-        let none = Explanation::new(Vec::new(), 20.0);
-        Weighed { none, singles, pairs: Vec::new() }.judge(&null(("wind", 0.0))).verdict
+fn a_limit_that_nominal_drives_would_not_have_shown_is_no_sign() {
+    let limit = |value: f64| Explanation::new(vec![effect("accel_limit", value)], 1.0);
+    let at = |value: f64| {
+        let rival = single(SINGLES[0], 1.1);
+        let singles = vec![limit(value), rival];
+        let null =
+            Null { limits_shown: LimitsShown::from_iter([("accel_limit", 2.0)]), ..null(("wind", 0.0)) };
+        Weighed { none: Explanation::new(Vec::new(), 2.0), singles, pairs: Vec::new() }.judge(&null)
     };
-    assert_eq!(with(effect("steer_lag", 0.2)), Verdict::EffectsAndUnknown);
-    let friction = Effect::from_values("friction", [0.4, 1.0, 3.0, 0.0]).unwrap();
-    assert_eq!(with(friction), Verdict::Effects);
+    assert_eq!(announced(&at(1.9)), ["accel_limit"]);
+    assert!(announced(&at(2.1)).is_empty());
 }
 
 /// Two that fit alike; one of them foretells other drives a tenth worse, which is half a tenth in energy.

@@ -4,6 +4,7 @@
 mod calibration;
 mod causes;
 mod conditions;
+mod constancy;
 mod intervals;
 mod judgement;
 
@@ -30,6 +31,8 @@ fn normal(seed: u64) -> impl FnMut() -> f64 {
 struct Made {
     /// Curvature over that of the commanded angle's tangent.
     curvature_ratio: f64,
+    /// The same once more to the left.
+    left_ratio: f64,
     /// Speed over the commanded one.
     speed_ratio: f64,
 }
@@ -47,7 +50,8 @@ fn arcs(made: Made, seed: u64) -> Drive {
             angle = (0.12 * noise()).clamp(-0.3, 0.3);
         }
         let speed = made.speed_ratio * asked;
-        let yaw_rate = speed * made.curvature_ratio * angle.tan();
+        let side = if angle > 0.0 { made.left_ratio } else { 1.0 };
+        let yaw_rate = speed * made.curvature_ratio * side * angle.tan();
         rows.push([
             x + 0.01 * noise(),
             y + 0.01 * noise(),

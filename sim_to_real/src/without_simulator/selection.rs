@@ -21,13 +21,15 @@ const TOLD_APART: f64 = 0.03;
 /// Effects this near to the best of their turn are tried in its place later.
 const NEAR: f64 = 0.3;
 /// What pushes or brakes the body, and what a speed loop does beside closing its distance.
-const FORCES: [&str; 10] = [
+const FORCES: [&str; 12] = [
     "rolling_drag",
     "quad_drag",
     "veg_drag",
     "loose_drag",
     "cornering_drag",
     "slope_gravity",
+    "hill_compensation",
+    "compensation_loss",
     "wind",
     "feed_forward",
     "speed_integral",
