@@ -1,7 +1,5 @@
 //! What the controller does with a vehicle: closed forms on level ground, and the ways in which ground can be bad.
 
-#![allow(clippy::unwrap_used, reason = "a test that cannot be set up has failed")]
-
 mod fixture;
 
 use bicycle::effect::{RollingDrag, SpeedLoop};
