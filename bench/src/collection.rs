@@ -297,7 +297,7 @@ fn fields(request: &Request, vehicle: &Vehicle, resolution_m: f64) -> Result<Vec
 
 /// What examples are told by physics: equation 15 as printed, which the networks of the paper's tables are fused with.
 fn paper_prior(vehicle: &Vehicle) -> PriorConfig {
-    PriorConfig { slope_law: SlopeLaw::Linear, ..Config::for_vehicle(vehicle).prior }
+    PriorConfig { slope_law: SlopeLaw::Linear {}, ..Config::for_vehicle(vehicle).prior }
 }
 
 fn dataset_of(

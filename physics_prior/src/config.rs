@@ -51,12 +51,12 @@ pub struct PriorConfig {
 }
 
 /// How linear traction falls with the slope along the heading.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum SlopeLaw {
     /// In a straight line to nothing (PIETRA, equation 15), whatever the vehicle: how its tables are made.
-    #[default]
-    Linear,
+    /// In settings a table without keys, as every choice is a table.
+    Linear {},
     /// As the friction leaves it: with the probability that it is less than the slope asks for there is none, else what
     /// is lost is the slip of the tyres, a brush (Pacejka, Tire and Vehicle Dynamics, section 3.2), and the way up.
     /// Takes it that the motor can spin the wheels.
@@ -83,7 +83,7 @@ impl Default for PriorConfig {
     fn default() -> Self {
         Self {
             uniform_weight: 0.2,
-            slope_law: SlopeLaw::Linear,
+            slope_law: SlopeLaw::Linear {},
             linear_slope_max_rad: 30f64.to_radians(),
             angular_slope_max_rad: 15f64.to_radians(),
             vegetation_height_max_m: 0.2,

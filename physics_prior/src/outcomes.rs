@@ -271,7 +271,7 @@ impl Equations {
 impl Law {
     fn new(config: &PriorConfig) -> Self {
         match config.slope_law {
-            SlopeLaw::Linear => {
+            SlopeLaw::Linear {} => {
                 Self::Linear { per_slope: (1.0 / libm::tan(config.linear_slope_max_rad)) as f32 }
             }
             SlopeLaw::Friction { slip_stiffness, axle } => Self::Friction {
