@@ -159,6 +159,9 @@ pub fn parse_robot(text: &ConfigText) -> Result<RobotFile, ConfigError> {
     if robot.format != FORMAT {
         return Err(text.refuse("format", format_args!("version {FORMAT}"), robot.format));
     }
+    if let Some((field, [least, most], found)) = robot.first_out_of_range() {
+        return Err(text.refuse(field, format_args!("a number from {least} to {most}"), found));
+    }
     if let Some((field, found)) = robot.first_not_positive() {
         return Err(text.refuse(field, "a finite number > 0", found));
     }
@@ -179,13 +182,23 @@ pub fn parse_robot(text: &ConfigText) -> Result<RobotFile, ConfigError> {
 }
 
 impl RobotFile {
+    /// Rates that no process keeps to, and more readers than memory is reserved for: the ranges of `surefoot up`.
+    fn first_out_of_range(&self) -> Option<(&'static str, [f64; 2], f64)> {
+        let rates = &self.rates;
+        let numbers = [
+            ("rates.control_hz", [1.0, 50.0], rates.control_hz),
+            ("rates.odometry_hz", [2.0, 400.0], rates.odometry_hz),
+            ("rates.scan_hz", [0.5, 50.0], rates.scan_hz),
+            ("third_parties", [0.0, 16.0], self.third_parties.map(|n| n as f64)),
+        ];
+        let given = numbers.into_iter().filter_map(|(field, range, value)| Some((field, range, value?)));
+        given.into_iter().find(|(_, [least, most], value)| !(*least..=*most).contains(value))
+    }
+
     /// Rates, ages and limits are all of one kind.
     fn first_not_positive(&self) -> Option<(&'static str, f64)> {
         let (rates, ages, safety) = (&self.rates, &self.ages, &self.safety);
         let numbers = [
-            ("rates.control_hz", rates.control_hz),
-            ("rates.odometry_hz", rates.odometry_hz),
-            ("rates.scan_hz", rates.scan_hz),
             ("rates.mission_hz", rates.mission_hz),
             ("ages.command_s", ages.command_s),
             ("ages.learned_s", ages.learned_s),
