@@ -155,6 +155,14 @@ impl MotionModel for Model {
         MotionLimits { lateral_acceleration_max_mps2, ..limits.into() }
     }
 
+    /// The turning circle of the geometry, `R = L / tan(steering)`, at the speed limit or at that of the largest lateral
+    /// acceleration, `sqrt(a R)`.
+    fn turning_s_per_rad(&self) -> f64 {
+        let limits = self.motion_limits();
+        let radius_m = self.wheelbase_m / libm::tan(self.limits.steering_max_rad);
+        radius_m / limits.high[0].min((limits.lateral_acceleration_max_mps2 * radius_m).sqrt())
+    }
+
     fn with_attitude_share(mut self, share: f64) -> Self {
         self.limits.roll_max_rad *= share;
         self.limits.pitch_max_rad *= share;

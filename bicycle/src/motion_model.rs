@@ -98,6 +98,10 @@ pub trait MotionModel: Clone + Debug + Send + Sync + 'static {
     /// What the vehicle can or may do.
     fn motion_limits(&self) -> MotionLimits;
 
+    /// Least time in which it turns by a radian while driving ahead: the tightest turn at the largest speed that the
+    /// limits allow there [s/rad].
+    fn turning_s_per_rad(&self) -> f64;
+
     /// With a share of its limits of roll and pitch.
     fn with_attitude_share(self, share: f64) -> Self;
 

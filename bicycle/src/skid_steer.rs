@@ -188,6 +188,10 @@ impl MotionModel for SkidSteer {
         (&self.limits).into()
     }
 
+    fn turning_s_per_rad(&self) -> f64 {
+        1.0 / self.limits.yaw_rate_max_radps
+    }
+
     fn with_attitude_share(mut self, share: f64) -> Self {
         self.limits.roll_max_rad *= share;
         self.limits.pitch_max_rad *= share;

@@ -36,9 +36,6 @@ pub enum Unfamiliar {
 /// Familiar metres for which unfamiliar ground that is to be avoided is worth one detour of. The map carries this as a
 /// linear traction that is smaller by as much: whoever plans by time to the goal goes around.
 pub const AVOIDED_METRES: f32 = 3.0;
-/// Traction that being avoided leaves, unless there was less to begin with: slower than this is stuck.
-const AVOIDED_TRACTION_MIN: f32 = 0.1;
-
 /// What a [`BeliefMap`] believes.
 #[derive(Clone, Debug)]
 pub struct Learned {
@@ -128,7 +125,8 @@ impl Fusion {
             Unfamiliar::Fuse => risk,
             Unfamiliar::Avoid => {
                 let traction = risk.linear_traction;
-                let left = (traction / AVOIDED_METRES).max(AVOIDED_TRACTION_MIN.min(traction));
+                // Being avoided makes nobody stuck who was not before.
+                let left = (traction / AVOIDED_METRES).max(Risk::STUCK_TRACTION.min(traction));
                 Risk { linear_traction: left, ..risk }
             }
         }

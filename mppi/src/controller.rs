@@ -78,6 +78,8 @@ pub struct Controller<M: Driven = Model, S = (), R = ()> {
     watch: Watch,
     /// How far the model's effects and lags keep its actuators behind the commands [s].
     lag_s: [f64; 2],
+    /// Of a radian of the vehicle's tightest turn [s].
+    turning_s_per_rad: f64,
     reference: Vec<ReferenceStep>,
     /// Whether there is no plan yet.
     is_fresh: bool,
@@ -118,7 +120,7 @@ impl<M: Driven, S: StepCost, R: RolloutCost> Controller<M, S, R> {
         config.validate()?;
         model.validate()?;
         let instructions = Instructions::find(config.isa)?;
-        let Prepared { limits, stepper, lag_s } = Prepared::new(&config, &model)?;
+        let Prepared { limits, stepper, lag_s, turning_s_per_rad } = Prepared::new(&config, &model)?;
         let reach_s = config.delay_s + LONGEST_STEPS * config.step_s + stepper.past_s();
         let ledger = Ledger::new(reach_s, config.period_min_s);
         let n_chunks = config.n_rollouts / CHUNK;
@@ -135,6 +137,7 @@ impl<M: Driven, S: StepCost, R: RolloutCost> Controller<M, S, R> {
             before: None,
             watch: Watch::new(config.recovery),
             lag_s,
+            turning_s_per_rad,
             reference: vec![ReferenceStep::default(); config.n_steps],
             is_fresh: true,
             slots: [0.0; MAX_SLOTS],
@@ -296,7 +299,8 @@ impl<M: Driven, S: StepCost, R: RolloutCost> Controller<M, S, R> {
         observe: &mut impl FnMut(Phase),
     ) -> Decision<M::Command> {
         self.plan.shift(input.elapsed_s / self.config.step_s);
-        let mode = self.watch.observe(&input.state, input.elapsed_s);
+        let told_mps = self.ledger.last().map_or(0.0, |command| f64::from(command.speed_mps()));
+        let mode = self.watch.observe(&input.state, told_mps, input.elapsed_s);
         self.follow_held(input);
         self.recall_slots(input.state, self.config.delay_s);
         self.start = self.predict_start(input);
@@ -346,6 +350,7 @@ impl<M: Driven, S: StepCost, R: RolloutCost> Controller<M, S, R> {
             n_feasible: totals.n_feasible as usize,
             n_non_finite: summary.n_non_finite,
             is_recovering: mode != Mode::Onward,
+            was_held: matches!(mode, Mode::BackUp { was_held: true, .. }),
             is_best_alone: false,
         };
     }

@@ -64,6 +64,8 @@ pub struct Diagnostics {
     pub n_non_finite: usize,
     /// Whether the vehicle is backing up because it was stuck.
     pub is_recovering: bool,
+    /// Whether it was the ground that held it there: it was told to drive and moved less than half as far.
+    pub was_held: bool,
     /// Whether the plan is a single rollout, because the mean of all broke a limit.
     pub is_best_alone: bool,
 }
@@ -82,6 +84,7 @@ impl Diagnostics {
             n_feasible: 0,
             n_non_finite: 0,
             is_recovering: false,
+            was_held: false,
             is_best_alone: false,
         }
     }

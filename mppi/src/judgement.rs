@@ -7,6 +7,11 @@ use crate::sampling::Control;
 use bicycle::{GroundSample, MotionLimits, MotionState, MotionStepper};
 use traversability::{Risk, RiskMapView};
 
+/// Plans expect no less traction than this of any ground, whatever the map says [-]. Who is stuck gains or loses nothing by
+/// what is decided, so plans are for the case in which the vehicle moves: one that expected it to stay would call every
+/// command as good as the others, and would not see the obstacle behind the mud.
+pub(crate) const TRACTION_LEAST: f32 = Risk::STUCK_TRACTION;
+
 /// Rolls single control sequences over the map with the reference model.
 pub(crate) struct Judge<'a, S> {
     /// The model in metres.
@@ -35,9 +40,11 @@ impl<S: MotionStepper> Judge<'_, S> {
         command: Control,
         (memory, t): (&mut [f64], usize),
     ) -> MotionState {
+        let at_least =
+            |traction: f32| f64::from(if traction < TRACTION_LEAST { TRACTION_LEAST } else { traction });
         let mut sample = GroundSample {
-            linear_traction: f64::from(risk.linear_traction),
-            angular_traction: f64::from(risk.angular_traction),
+            linear_traction: at_least(risk.linear_traction),
+            angular_traction: at_least(risk.angular_traction),
             ..GroundSample::FIRM
         };
         if self.stepper.uses_ground() {
@@ -54,20 +61,23 @@ impl<S: MotionStepper> Judge<'_, S> {
     }
 
     /// Whether the controls lead over a limit of attitude. A vehicle that stands beyond a limit may leave: its first
-    /// poses count only when they are worse than where it stands.
+    /// poses count only where the ground leans beyond the limit and more than where it stands. What blocks a pose is no
+    /// leaning: who leaves an obstacle does not come onto steeper ground for it.
     pub(crate) fn breaks_limits(
         &self,
         start: &MotionState,
         controls: impl Iterator<Item = Control>,
         memory: &mut [f64],
     ) -> bool {
-        let start_risk = self.risk(start);
-        let mut is_leaving = self.is_tilted(start_risk);
-        let (mut state, mut risk) = (*start, start_risk);
+        let leaning_rad = self.leaning_start_rad(start);
+        let mut is_leaving = leaning_rad.is_some();
+        let (mut state, mut risk) = (*start, self.risk(start));
         for (t, control) in controls.enumerate() {
             state = self.step_on(risk, &state, control, (&mut *memory, t));
             risk = self.risk(&state);
-            let is_no_worse = risk.roll_rad <= start_risk.roll_rad && risk.pitch_rad <= start_risk.pitch_rad;
+            let [roll_rad, pitch_rad] = risk.lean_rad().map(f64::from);
+            let is_no_worse =
+                leaning_rad.is_some_and(|most_rad| roll_rad <= most_rad[0] && pitch_rad <= most_rad[1]);
             if self.is_tilted(risk) && !(is_leaving && is_no_worse) {
                 return true;
             }
@@ -76,10 +86,12 @@ impl<S: MotionStepper> Judge<'_, S> {
         false
     }
 
-    /// |roll| and |pitch| where the vehicle stands, if beyond a limit [rad].
-    pub(crate) fn tilt(&self, state: &MotionState) -> Option<[f64; 2]> {
-        let risk = self.risk(state);
-        self.is_tilted(risk).then(|| [risk.roll_rad, risk.pitch_rad].map(f64::from))
+    /// |roll| and |pitch| up to which the ground may lean on the way out, if the vehicle stands beyond a limit: those of
+    /// where it stands, at least the limits [rad].
+    pub(crate) fn leaning_start_rad(&self, start: &MotionState) -> Option<[f64; 2]> {
+        let (risk, limits) = (self.risk(start), self.limits);
+        let [roll_rad, pitch_rad] = risk.lean_rad().map(f64::from);
+        self.is_tilted(risk).then(|| [roll_rad.max(limits.roll_max_rad), pitch_rad.max(limits.pitch_max_rad)])
     }
 
     /// A number that is not finite is beyond every limit.

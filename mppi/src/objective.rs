@@ -2,9 +2,13 @@
 
 use crate::cost_to_go::CostToGoView;
 use crate::kernel::Kernel;
-use bicycle::lanes::Real;
+use bicycle::lanes::{Lanes, Real};
 use bicycle::{MotionState, State};
+use std::f64::consts::FRAC_PI_2;
 use traversability::{GridGeometry, RiskMapView};
+
+/// Changes of the time to go per cell that are less than this lead nowhere [s].
+const SMALLEST_SLOPE_S: f64 = 1e-6;
 
 /// One cycle's input.
 #[derive(Clone, Copy, Debug)]
@@ -147,29 +151,71 @@ pub(crate) struct TerminalField<'a> {
     scale: f64,
     /// Of the field's first cell centre, in cells of the field.
     offset: [f64; 2],
+    /// Of a radian of the vehicle's tightest turn [s].
+    turning_s_per_rad: f64,
 }
 
 impl<'a> TerminalField<'a> {
     /// `None` when the field has less than two rows or columns, or not the length that its geometry says.
-    pub(crate) fn new(view: CostToGoView<'a>, map: &GridGeometry) -> Option<Self> {
+    pub(crate) fn new(view: CostToGoView<'a>, map: &GridGeometry, turning_s_per_rad: f64) -> Option<Self> {
         let GridGeometry { n_rows, n_cols, resolution_m, .. } = view.geometry;
         let (map_corner, corner) = (map.south_west_m(), view.geometry.south_west_m());
         let offset = [0, 1].map(|axis| (map_corner[axis] - corner[axis]) / resolution_m - 0.5);
         let usable = n_rows >= 2 && n_cols >= 2 && view.seconds.len() == n_rows * n_cols;
         let scale = map.resolution_m / resolution_m;
-        usable.then_some(Self { seconds: view.seconds, n_rows, n_cols, scale, offset })
+        let seconds = view.seconds;
+        usable.then_some(Self { seconds, n_rows, n_cols, scale, offset, turning_s_per_rad })
     }
 
-    /// Time to go, interpolated between cell centres; beyond the field, that of its rim [s].
+    /// Time to go from a pose [s]: that of its place, interpolated between cell centres, beyond the field that of its
+    /// rim; and what it takes to turn to where the time falls fastest.
     #[inline(always)]
-    pub(crate) fn seconds<K: Kernel>(&self, x_cells: Real<K>, y_cells: Real<K>) -> Real<K> {
+    pub(crate) fn time_to_go<K: Kernel>(
+        &self,
+        x_cells: Real<K>,
+        y_cells: Real<K>,
+        turns: Real<K>,
+    ) -> Real<K> {
+        let (seconds, gradient) = self.seconds(x_cells, y_cells);
+        seconds + self.turning_s(gradient, turns)
+    }
+
+    /// What it takes from a pose to turn to where the time falls fastest [s].
+    #[inline(always)]
+    pub(crate) fn time_to_turn<K: Kernel>(
+        &self,
+        x_cells: Real<K>,
+        y_cells: Real<K>,
+        turns: Real<K>,
+    ) -> Real<K> {
+        let (_, gradient) = self.seconds(x_cells, y_cells);
+        self.turning_s(gradient, turns)
+    }
+
+    /// Who faces away from the way by an angle e and drives the tightest turn of radius R covers R e until it faces it,
+    /// and comes R sin e nearer: R (e - sin e) are lost. With that much added, time to go falls by a second per second
+    /// in the tightest turn on open ground, whatever the heading (the Dubins vehicle, far from its goal).
+    #[inline(always)]
+    fn turning_s<K: Kernel>(&self, [east, north]: [Real<K>; 2], turns: Real<K>) -> Real<K> {
+        let kernel = turns.0;
+        let (sine, cosine) = turns.sin_cos_turns();
+        let slope = east.mul_add(east, north * north).sqrt().max(kernel.real(SMALLEST_SLOPE_S));
+        let facing_away = east.mul_add(cosine, north * sine) / slope;
+        lost_rad(facing_away) * kernel.real(self.turning_s_per_rad)
+    }
+
+    /// Time to go, and its change per cell to the east and to the north [s].
+    #[inline(always)]
+    fn seconds<K: Kernel>(&self, x_cells: Real<K>, y_cells: Real<K>) -> (Real<K>, [Real<K>; 2]) {
         let kernel = x_cells.0;
         let (col, east) = self.place(x_cells, self.offset[0], self.n_cols);
         let (row, north) = self.place(y_cells, self.offset[1], self.n_rows);
         let corner = kernel.add_bits(kernel.mul_bits(row, kernel.word(self.n_cols as u32)), col);
-        let south = self.along_row(corner, east);
-        let upper = self.along_row(kernel.add_bits(corner, kernel.word(self.n_cols as u32)), east);
-        (upper - south).mul_add(north, south)
+        let (south, rise_south) = self.along_row(corner, east);
+        let upper_corner = kernel.add_bits(corner, kernel.word(self.n_cols as u32));
+        let (upper, rise_upper) = self.along_row(upper_corner, east);
+        let eastward = (rise_upper - rise_south).mul_add(north, rise_south);
+        ((upper - south).mul_add(north, south), [eastward, upper - south])
     }
 
     /// Cell and share of the way to the next one, along one axis.
@@ -182,12 +228,29 @@ impl<'a> TerminalField<'a> {
         (whole, place - Real(kernel, kernel.convert(whole)))
     }
 
-    /// Between a cell and its eastern neighbour.
+    /// Between a cell and its eastern neighbour, and how much more the neighbour's is.
     #[inline(always)]
-    fn along_row<K: Kernel>(&self, index: K::Bits, share: Real<K>) -> Real<K> {
+    fn along_row<K: Kernel>(&self, index: K::Bits, share: Real<K>) -> (Real<K>, Real<K>) {
         let kernel = share.0;
         let west = Real(kernel, kernel.gather(self.seconds, index));
         let east = Real(kernel, kernel.gather(self.seconds, kernel.add_bits(index, kernel.word(1))));
-        (east - west).mul_add(share, west)
+        ((east - west).mul_add(share, west), east - west)
     }
+}
+
+/// e - sin e of the angle e in [0, pi] between a heading and the way [rad], by the cosine of the angle between the
+/// heading and the way back.
+///
+/// From the half angle: e = 2 asin(s), sin e = 2 s c; the arc sine by Abramowitz and Stegun 4.4.45, to 7e-5 rad.
+#[inline(always)]
+fn lost_rad<L: Lanes>(facing_away: Real<L>) -> Real<L> {
+    let lanes = facing_away.0;
+    let [one, half] = [1.0, 0.5].map(|value| lanes.real(value));
+    let away = facing_away.clamp(-one, one);
+    let (sine, cosine) = (away.mul_add(half, half).sqrt(), ((one - away) * half).sqrt());
+    let [c0, c1, c2, c3] =
+        [1.570_728_8, -0.212_114_4, 0.074_261, -0.018_729_3].map(|value| lanes.real(value));
+    let complement = (one - sine).sqrt() * c3.mul_add(sine, c2).mul_add(sine, c1).mul_add(sine, c0);
+    let angle = lanes.real(FRAC_PI_2) - complement;
+    (angle - sine * cosine) * lanes.real(2.0)
 }

@@ -11,7 +11,11 @@ pub(crate) enum Mode {
     /// Go for the objective.
     Onward,
     /// Drive backwards, towards this point [m].
-    BackUp { target_m: [f64; 2] },
+    BackUp {
+        target_m: [f64; 2],
+        /// Whether the ground held it: it moved less than half of what it was told. Else there was nowhere to go.
+        was_held: bool,
+    },
 }
 
 /// Watches progress.
@@ -21,13 +25,26 @@ pub(crate) struct Watch {
     mode: Mode,
     /// Where progress was last made, or backing up began [m]; none before the first look.
     anchor_m: Option<[f64; 2]>,
+    /// Where it was at the last look [m].
+    last_m: [f64; 2],
+    /// Way since then, to and fro, and what was told [m].
+    driven_m: f64,
+    told_m: f64,
     /// Since then [s].
     waited_s: f64,
 }
 
 impl Watch {
     pub(crate) fn new(config: Recovery) -> Self {
-        Self { config, mode: Mode::Onward, anchor_m: None, waited_s: 0.0 }
+        Self {
+            config,
+            mode: Mode::Onward,
+            anchor_m: None,
+            last_m: [0.0; 2],
+            driven_m: 0.0,
+            told_m: 0.0,
+            waited_s: 0.0,
+        }
     }
 
     /// Goes by another configuration from now on.
@@ -37,30 +54,41 @@ impl Watch {
 
     /// Forgets what was; to be called when the vehicle is not meant to move.
     pub(crate) fn reset(&mut self) {
-        (self.mode, self.anchor_m, self.waited_s) = (Mode::Onward, None, 0.0);
+        self.begin(Mode::Onward, [0.0; 2]);
+        self.anchor_m = None;
     }
 
     /// The frame moved: places of before lie where `carry` takes them.
     pub(crate) fn carry(&mut self, carry: impl Fn([f64; 2]) -> [f64; 2]) {
         self.anchor_m = self.anchor_m.map(&carry);
-        if let Mode::BackUp { target_m } = &mut self.mode {
+        self.last_m = carry(self.last_m);
+        if let Mode::BackUp { target_m, .. } = &mut self.mode {
             *target_m = carry(*target_m);
         }
     }
 
-    /// Looks at a vehicle that is meant to move.
-    pub(crate) fn observe(&mut self, state: &MotionState, elapsed_s: f64) -> Mode {
+    /// Looks at a vehicle that is meant to move, and was told to at this speed.
+    pub(crate) fn observe(&mut self, state: &MotionState, told_mps: f64, elapsed_s: f64) -> Mode {
         let here_m = [state.x_m, state.y_m];
-        let anchor_m = *self.anchor_m.get_or_insert(here_m);
-        let moved_m = libm::hypot(here_m[0] - anchor_m[0], here_m[1] - anchor_m[1]);
+        if self.anchor_m.is_none() {
+            self.begin(Mode::Onward, here_m);
+        }
+        let anchor_m = self.anchor_m.unwrap_or(here_m);
+        let (moved_m, step_m) = (distance_m(here_m, anchor_m), distance_m(here_m, self.last_m));
+        self.last_m = here_m;
         self.waited_s += elapsed_s;
+        self.driven_m += step_m;
+        self.told_m += told_mps.abs() * elapsed_s;
+        // Who rolled back before it gathered speed is about to pass the anchor.
+        let moves = step_m * self.config.patience_s >= self.config.progress_m * elapsed_s;
         match self.mode {
             Mode::Onward if moved_m >= self.config.progress_m => self.begin(Mode::Onward, here_m),
-            Mode::Onward if self.waited_s >= self.config.patience_s => {
+            Mode::Onward if self.waited_s >= self.config.patience_s && !moves => {
                 let back_m = self.config.distance_m;
                 let (sine, cosine) = libm::sincos(state.yaw_rad);
                 let target_m = [here_m[0] - back_m * cosine, here_m[1] - back_m * sine];
-                self.begin(Mode::BackUp { target_m }, here_m);
+                let was_held = self.told_m > 2.0 * self.driven_m + self.config.progress_m;
+                self.begin(Mode::BackUp { target_m, was_held }, here_m);
             }
             Mode::BackUp { .. }
                 if moved_m >= self.config.distance_m || self.waited_s >= self.config.duration_s =>
@@ -73,8 +101,13 @@ impl Watch {
     }
 
     fn begin(&mut self, mode: Mode, here_m: [f64; 2]) {
-        (self.mode, self.anchor_m, self.waited_s) = (mode, Some(here_m), 0.0);
+        (self.mode, self.anchor_m, self.last_m) = (mode, Some(here_m), here_m);
+        (self.waited_s, self.driven_m, self.told_m) = (0.0, 0.0, 0.0);
     }
+}
+
+fn distance_m(a_m: [f64; 2], b_m: [f64; 2]) -> f64 {
+    libm::hypot(a_m[0] - b_m[0], a_m[1] - b_m[1])
 }
 
 #[cfg(test)]
@@ -92,15 +125,32 @@ mod tests {
         let mut watch = Watch::new(CONFIG);
         // Progress of 0.5 m takes 1 s of the 3 s of patience.
         for k in 0..200 {
-            assert_eq!(watch.observe(&at(0.05 * f64::from(k)), 0.1), Mode::Onward);
+            assert_eq!(watch.observe(&at(0.05 * f64::from(k)), 1.0, 0.1), Mode::Onward);
         }
+    }
+
+    /// It rolls back by 0.4 m in 2 s and returns at 0.4 m/s: 3 s after the start it is where it was, within 0.5 m of the
+    /// anchor for longer than the patience, and on its way.
+    #[test]
+    fn a_vehicle_that_rolled_back_before_it_set_off_is_not_stuck() {
+        let mut watch = Watch::new(CONFIG);
+        let place_m = |t_s: f64| if t_s < 2.0 { -0.2 * t_s } else { 0.4 * (t_s - 3.0) };
+        for k in 0..60 {
+            assert_eq!(watch.observe(&at(place_m(0.1 * f64::from(k))), 1.0, 0.1), Mode::Onward, "{k}");
+        }
+        // Swaying by half as much it is: where it turns it stands.
+        let mut watch = Watch::new(CONFIG);
+        let modes: Vec<Mode> =
+            (0..60).map(|k| watch.observe(&at(0.2 * (0.3 * f64::from(k)).sin()), 1.0, 0.1)).collect();
+        assert!(modes[..30].iter().all(|mode| *mode == Mode::Onward));
+        assert!(modes.iter().any(|mode| *mode != Mode::Onward), "{modes:?}");
     }
 
     #[test]
     fn a_standing_vehicle_backs_up_after_its_patience_and_goes_on_after_the_duration() {
         let mut watch = Watch::new(CONFIG);
         let modes: Vec<bool> =
-            (0..80).map(|_| matches!(watch.observe(&at(0.0), 0.1), Mode::BackUp { .. })).collect();
+            (0..80).map(|_| matches!(watch.observe(&at(0.0), 1.0, 0.1), Mode::BackUp { .. })).collect();
         // 30 looks of 0.1 s are the patience; 20 more are the duration; then patience again.
         assert!(modes[..29].iter().all(|&back| !back));
         assert!(modes[31..49].iter().all(|&back| back));
@@ -114,12 +164,29 @@ mod tests {
             MotionState { x_m: 2.0, yaw_rad: std::f64::consts::FRAC_PI_2, ..MotionState::default() };
         let mut mode = Mode::Onward;
         for _ in 0..32 {
-            mode = watch.observe(&standing, 0.1);
+            mode = watch.observe(&standing, 1.0, 0.1);
         }
-        let Mode::BackUp { target_m } = mode else { panic!("stuck for longer than the patience") };
+        let Mode::BackUp { target_m, .. } = mode else { panic!("stuck for longer than the patience") };
         assert!((target_m[0] - 2.0).abs() < 1e-12 && (target_m[1] + 1.0).abs() < 1e-12);
         let moved = MotionState { y_m: -1.01, ..standing };
-        assert_eq!(watch.observe(&moved, 0.1), Mode::Onward);
+        assert_eq!(watch.observe(&moved, 1.0, 0.1), Mode::Onward);
+    }
+
+    /// Told to drive at 1 m/s it stood for 3 s: 3 m are more than none and the half metre of progress. Told to drive at
+    /// 0.1 m/s, where nothing better was to be had, it was not held: 0.3 m are less.
+    #[test]
+    fn the_ground_held_who_was_told_to_drive_and_stood() {
+        for (told_mps, expected) in [(1.0, true), (-1.0, true), (0.1, false)] {
+            let mut watch = Watch::new(CONFIG);
+            let mut mode = Mode::Onward;
+            for _ in 0..32 {
+                mode = watch.observe(&at(0.0), told_mps, 0.1);
+            }
+            assert!(
+                matches!(mode, Mode::BackUp { was_held, .. } if was_held == expected),
+                "{told_mps}: {mode:?}"
+            );
+        }
     }
 
     /// To the north by 100 m and a quarter turn to the left, in the midst of it: nothing else changes.
@@ -127,19 +194,21 @@ mod tests {
     fn backing_up_goes_on_behind_the_vehicle_in_a_frame_that_moved() {
         let mut watch = Watch::new(CONFIG);
         for _ in 0..32 {
-            watch.observe(&at(2.0), 0.1);
+            watch.observe(&at(2.0), 1.0, 0.1);
         }
         watch.carry(|[x_m, y_m]| [-y_m, x_m + 100.0]);
         let carried =
             MotionState { y_m: 102.0, yaw_rad: std::f64::consts::FRAC_PI_2, ..MotionState::default() };
-        let Mode::BackUp { target_m } = watch.observe(&carried, 0.1) else { panic!("not yet there") };
+        let Mode::BackUp { target_m, .. } = watch.observe(&carried, 1.0, 0.1) else {
+            panic!("not yet there")
+        };
         assert!(target_m[0].abs() < 1e-12 && (target_m[1] - 101.0).abs() < 1e-12, "{target_m:?}");
-        assert_eq!(watch.observe(&MotionState { y_m: 100.99, ..carried }, 0.1), Mode::Onward);
+        assert_eq!(watch.observe(&MotionState { y_m: 100.99, ..carried }, 1.0, 0.1), Mode::Onward);
     }
 
     #[test]
     fn endless_patience_never_backs_up() {
         let mut watch = Watch::new(Recovery { patience_s: f64::INFINITY, ..CONFIG });
-        assert!((0..1000).all(|_| watch.observe(&at(0.0), 10.0) == Mode::Onward));
+        assert!((0..1000).all(|_| watch.observe(&at(0.0), 1.0, 10.0) == Mode::Onward));
     }
 }

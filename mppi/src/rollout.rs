@@ -1,7 +1,8 @@
 //! The rollouts: every sampled control sequence through the model over the risk map, and what it costs.
 //!
 //! Positions are kept in cells of the map and yaws in turns, so that the map index is a truncation. Pack after pack
-//! of rollouts walks through all steps; a rollout that leaves the map is trapped on the border, where nothing moves.
+//! of rollouts walks through all steps; a rollout that leaves the map creeps on, as on
+//! any ground that lets nothing through.
 
 mod motion;
 mod stage;
@@ -9,6 +10,7 @@ mod stage;
 use crate::chunk::Chunk;
 use crate::cost::{Frame, Place, Step, StepCost};
 use crate::diagnostics::CostTerm;
+use crate::judgement::TRACTION_LEAST;
 use crate::kernel::{self, CHUNK, Kernel, Row, Work};
 use crate::objective::{ReferenceStep, TerminalField};
 use bicycle::lanes::{Instructions, Real};
@@ -26,8 +28,8 @@ pub(crate) struct Scene<'a, S, C> {
     pub(crate) stepper: &'a S,
     pub(crate) grid: Grid<'a>,
     pub(crate) start: Start,
-    /// |roll| and |pitch| where the vehicle stands, if beyond a limit [rad]: it may leave.
-    pub(crate) tilted_start: Option<[f64; 2]>,
+    /// |roll| and |pitch| up to which the vehicle may leave, if it stands beyond a limit [rad].
+    pub(crate) leaning_start_rad: Option<[f64; 2]>,
     /// What the effects remember at the start.
     pub(crate) slots: &'a [f32],
     pub(crate) prices: Prices,
@@ -101,8 +103,18 @@ pub(crate) struct GoalTask<'a> {
     pub(crate) distance_s: f64,
     /// Of a cell of distance at the end [s].
     pub(crate) rest_s: f64,
-    /// Time to go at the end instead of the straight line.
-    pub(crate) field: Option<TerminalField<'a>>,
+    pub(crate) rest: Rest<'a>,
+}
+
+/// What the rest of the way costs where a rollout ends.
+#[derive(Clone, Copy)]
+pub(crate) enum Rest<'a> {
+    /// The straight line.
+    Straight,
+    /// The time of the field, and to turn to where it leads.
+    Field(TerminalField<'a>),
+    /// The straight line, and to turn to where the field leads.
+    StraightFacing(TerminalField<'a>),
 }
 
 /// One chunk to roll out, and on which instructions.
@@ -145,7 +157,7 @@ fn roll_to<K: Kernel, P: MotionStepper, C: StepCost>(
     chunk: &mut Chunk,
 ) {
     let extent = scene.stepper.extent();
-    let is_plain = extent != Extent::Whole && scene.tilted_start.is_none();
+    let is_plain = extent != Extent::Whole && scene.leaning_start_rad.is_none();
     if is_plain && extent == Extent::Bare && !scene.prices.has_manoeuvres() {
         roll_chunk::<K, P, C, _, Bare>(kernel, scene, goal, chunk);
     } else if is_plain {
@@ -163,7 +175,7 @@ fn roll_along<K: Kernel, P: MotionStepper, C: StepCost, S: Stage<K>>(
     stage: &S,
     chunk: &mut Chunk,
 ) {
-    match scene.tilted_start {
+    match scene.leaning_start_rad {
         None => roll_chunk::<K, P, C, S, Whole>(kernel, scene, stage, chunk),
         Some(_) => roll_chunk::<K, P, C, S, Leaving>(kernel, scene, stage, chunk),
     }
@@ -368,7 +380,9 @@ fn advance<K: Kernel, P: MotionStepper, C, M: Motion>(
     let kernel = command[0].0;
     let cell = index.cell(state);
     let risk = kernel.risks(scene.grid.risks, index.risk(cell, state.turns)).map(|value| Real(kernel, value));
-    let [linear_traction, angular_traction, ..] = risk;
+    let least = kernel.real_single(TRACTION_LEAST);
+    // In this order NaN stays NaN.
+    let (linear_traction, angular_traction) = (least.max(risk[0]), least.max(risk[1]));
     let zero = kernel.real(0.0);
     let mut ground = GroundSample { linear_traction, angular_traction, gradient: [zero; 2], class: zero };
     if M::HAS_EFFECTS && scene.stepper.uses_ground() {
@@ -378,8 +392,8 @@ fn advance<K: Kernel, P: MotionStepper, C, M: Motion>(
     (M::step(scene.stepper, state, command, &ground, memory), risk)
 }
 
-/// Counts the poses beyond a limit. A vehicle that stands beyond one may leave: its first poses break a limit only when
-/// they are worse than where it stands. The same rule as [`crate::judgement::Judge::breaks_limits`].
+/// Counts the poses beyond a limit. A vehicle that stands beyond one may leave: its first poses break a limit only where
+/// the ground leans beyond it and more than where it stands. The same rule as [`crate::judgement::Judge::breaks_limits`].
 #[inline(always)]
 fn watch_attitude<K: Kernel, P, C, M: Motion>(
     scene: &Scene<'_, P, C>,
@@ -392,8 +406,11 @@ fn watch_attitude<K: Kernel, P, C, M: Motion>(
         .or(roll.exceeds(kernel.real(prices.roll_max_rad)), pitch.exceeds(kernel.real(prices.pitch_max_rad)));
     let tilted = kernel.and(beyond, flight.under_way);
     flight.n_tilted = flight.n_tilted.add_where(tilted, one);
-    if let Some(start) = scene.tilted_start.filter(|_| M::IS_LEAVING) {
+    if let Some(start) = scene.leaning_start_rad.filter(|_| M::IS_LEAVING) {
         let [start_roll, start_pitch] = start.map(|angle_rad| kernel.real(angle_rad));
+        let added = kernel.real(f64::from(Risk::BLOCKED_RAD));
+        let open = roll.less(added);
+        let [roll, pitch] = [roll, pitch].map(|angle| angle.or_else(open, angle - added));
         let worse = kernel.or(roll.exceeds(start_roll), pitch.exceeds(start_pitch));
         let counts = kernel.or(worse, flight.leaving.less(one));
         flight.n_broken = flight.n_broken.add_where(kernel.and(tilted, counts), one);

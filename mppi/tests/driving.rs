@@ -94,6 +94,25 @@ fn the_cost_to_go_field_leads_around_what_the_horizon_cannot_see() {
     assert_eq!(drive.decisions.last(), Some(&Decision::Hold(HoldReason::AtGoal)));
 }
 
+/// Without a reverse gear at 1 m/s a horizon of 5 s is less than half a circle of R = 2 m / tan(0.5) = 3.66 m, at whose
+/// end the vehicle is farther from a goal 15 m behind than at its start. The shortest way (Dubins 1957) is an arc of
+/// 2 pi - 2 acos(R / d), d = hypot(15, R), and the tangent of 15 m: 28.2 m with 0.5 m less for the tolerance, 28 s. Half a
+/// second to gather speed and one to steer, and a sixth for what the mean of clipped samples leaves of the tightest turn.
+#[test]
+fn a_goal_behind_is_turned_around_for_though_the_horizon_is_shorter_than_the_turn() {
+    let limits = Limits { speed_max_mps: 1.0, reverse_speed_max_mps: 0.0, ..model().limits };
+    let model = Model { limits, ..model() };
+    let map = level();
+    let mut field = CostToGo::new(CostToGoConfig::default(), &model.limits, 160, 160).unwrap();
+    field.update(map.view(), [-15.0, 0.0]).unwrap();
+    let terminal = Terminal::CostToGo(field.view());
+    let objective = Objective::Goal { goal_m: [-15.0, 0.0], tolerance_m: 0.5, terminal };
+    let drive = drive(&smooth(), &model, &map, objective, (standing(), 400));
+    assert_eq!(drive.decisions.last(), Some(&Decision::Hold(HoldReason::AtGoal)));
+    let time_s = (drive.states.len() - 1) as f64 * STEP_S;
+    assert!((27.5..7.0 / 6.0 * 28.0 + 1.5).contains(&time_s), "{time_s} s");
+}
+
 #[test]
 fn a_goal_close_behind_is_reached_in_reverse_only_with_the_gear() {
     let run = |reverse_speed_max_mps: f64| {
@@ -182,7 +201,7 @@ fn a_vehicle_walled_in_at_arm_s_length_stops() {
 }
 
 #[test]
-fn no_rollout_passes_the_border() {
+fn rollouts_creep_beyond_the_border() {
     let map = level();
     let config = Config { n_steps: 100, ..smooth() };
     let mut controller = Controller::new(config, model(), 5).unwrap();
@@ -192,8 +211,9 @@ fn no_rollout_passes_the_border() {
     controller.decide(&input);
     let rollouts = controller.best_rollouts(1024, map.view());
     let furthest_m = |rollout: &Rollout| rollout.states.iter().map(|state| state.x_m).fold(0.0, f64::max);
-    // A step of 0.2 m from the last inner cell reaches into the ring from 19.75 m on, and there it ends.
-    assert!(rollouts.iter().all(|rollout| furthest_m(rollout) < 19.95 + 1e-6));
+    // A step of 0.2 m from the last inner cell reaches into the ring from 19.75 m on; from there a tenth of it is left, for
+    // less than the 89 of 100 steps that two metres leave.
+    assert!(rollouts.iter().all(|rollout| furthest_m(rollout) < 19.95 + 89.0 * 0.02));
     assert!(rollouts.iter().filter(|rollout| furthest_m(rollout) > 19.75).count() > 100);
 }
 

@@ -22,19 +22,34 @@ impl Risk {
     /// Level ground with full traction.
     pub const NONE: Self =
         Self { linear_traction: 1.0, angular_traction: 1.0, roll_rad: 0.0, pitch_rad: 0.0 };
-    /// Beyond the map: nothing moves here, so a rollout that leaves is trapped without a branch.
+    /// Beyond the map: nothing is expected to move here.
     pub const OUTSIDE: Self =
         Self { linear_traction: 0.0, angular_traction: 0.0, roll_rad: 0.0, pitch_rad: 0.0 };
-    /// A pose whose footprint touches an obstacle: an attitude beyond every limit, so that the attitude
-    /// constraint forbids it; traction stays, so that a vehicle that finds itself here can leave.
+    /// Linear traction below which a vehicle counts as stuck [-].
+    pub const STUCK_TRACTION: f32 = 0.1;
+    /// What is added to the attitude of a blocked pose [rad].
+    pub const BLOCKED_RAD: f32 = std::f32::consts::PI;
+
+    /// A pose whose footprint touches an obstacle: half a turn on top of its attitude, beyond every limit, so that the
+    /// attitude constraint forbids it; traction stays, so that a vehicle that finds itself here can leave.
     pub fn blocked(self) -> Self {
-        let beyond_rad = std::f32::consts::PI;
-        Self { roll_rad: beyond_rad, pitch_rad: beyond_rad, ..self }
+        if self.is_blocked() {
+            return self;
+        }
+        let [roll_rad, pitch_rad] =
+            [self.roll_rad, self.pitch_rad].map(|angle_rad| angle_rad + Self::BLOCKED_RAD);
+        Self { roll_rad, pitch_rad, ..self }
     }
 
     /// Whether this is the risk of a pose that touches an obstacle.
     pub fn is_blocked(self) -> bool {
-        self.roll_rad >= std::f32::consts::PI
+        self.roll_rad >= Self::BLOCKED_RAD
+    }
+
+    /// |roll| and |pitch| of the ground, whether an obstacle blocks the pose or not [rad].
+    pub fn lean_rad(self) -> [f32; 2] {
+        let added_rad = if self.is_blocked() { Self::BLOCKED_RAD } else { 0.0 };
+        [self.roll_rad - added_rad, self.pitch_rad - added_rad]
     }
 }
 
@@ -346,6 +361,16 @@ mod tests {
         assert!(risk.blocked().is_blocked());
         assert_eq!(risk.blocked().linear_traction, 0.7);
         assert!(risk.blocked().pitch_rad > std::f32::consts::FRAC_PI_2);
+        assert_eq!(risk.blocked().blocked(), risk.blocked());
+    }
+
+    /// pi and an angle below pi/2 are a sum in f32 that is off by at most 2.4e-7 rad, half the last bit of 4.
+    #[test]
+    fn blocked_keeps_how_the_ground_leans() {
+        let risk = Risk { roll_rad: 0.1, pitch_rad: 0.3, ..Risk::NONE };
+        assert_eq!(risk.lean_rad(), [0.1, 0.3]);
+        let [roll_rad, pitch_rad] = risk.blocked().lean_rad();
+        assert!((roll_rad - 0.1).abs() < 2.4e-7 && (pitch_rad - 0.3).abs() < 2.4e-7);
     }
 
     #[test]

@@ -13,6 +13,7 @@ pub(super) struct Prepared<M: Driven> {
     pub(super) limits: MotionLimits,
     pub(super) stepper: M::Stepper,
     pub(super) lag_s: [f64; 2],
+    pub(super) turning_s_per_rad: f64,
 }
 
 impl<M: Driven> Prepared<M> {
@@ -28,7 +29,7 @@ impl<M: Driven> Prepared<M> {
             return Err(ConfigError::EffectMemory { found: stepper.n_slots(), step_s: config.step_s });
         }
         let lag_s = lag::of_actuators(&stepper, limits.rates, config.step_s);
-        Ok(Self { limits, stepper, lag_s })
+        Ok(Self { limits, stepper, lag_s, turning_s_per_rad: model.turning_s_per_rad() })
     }
 }
 
@@ -77,6 +78,7 @@ impl<M: Driven, S: StepCost, R: RolloutCost> Controller<M, S, R> {
         self.stepper = prepared.stepper;
         self.limits = prepared.limits;
         self.lag_s = prepared.lag_s;
+        self.turning_s_per_rad = prepared.turning_s_per_rad;
     }
 
     /// The model.

@@ -8,7 +8,7 @@ use crate::driven::Driven;
 use crate::kernel::CHUNK;
 use crate::objective::{Input, Objective, ReferencePath, ReferenceStep, Terminal, TerminalField};
 use crate::recovery::Mode;
-use crate::rollout::{GoalTask, Grid, Job, MAX_SLOTS, Prices, Scene, Start, Task};
+use crate::rollout::{GoalTask, Grid, Job, MAX_SLOTS, Prices, Rest, Scene, Start, Task};
 use crate::sampling::{Control, Sample, Sampler};
 use crate::summary::Accumulate;
 use crate::weights::{Weigh, WeightSummary};
@@ -21,8 +21,8 @@ use traversability::RiskMapView;
 #[derive(Clone, Copy)]
 pub(super) enum TaskOrder<'a> {
     Goal([f64; 2], f64, Terminal<'a>),
-    /// Come as near to the point as counts as progress, in reverse.
-    Back([f64; 2]),
+    /// Come towards the point in reverse, and face the way on.
+    Back([f64; 2], Terminal<'a>),
     Path(ReferencePath<'a>),
 }
 
@@ -138,7 +138,10 @@ impl<M: Driven, S: StepCost, R: RolloutCost> Controller<M, S, R> {
 
     pub(super) fn task<'a>(&self, input: &Input<'a, MotionState>, mode: Mode) -> TaskOrder<'a> {
         match (mode, input.objective) {
-            (Mode::BackUp { target_m }, _) => TaskOrder::Back(target_m),
+            (Mode::BackUp { target_m, .. }, Objective::Goal { terminal, .. }) => {
+                TaskOrder::Back(target_m, terminal)
+            }
+            (Mode::BackUp { target_m, .. }, _) => TaskOrder::Back(target_m, Terminal::StraightLine),
             (Mode::Onward, Objective::Goal { goal_m, tolerance_m, terminal }) => {
                 TaskOrder::Goal(goal_m, tolerance_m, terminal)
             }
@@ -146,7 +149,7 @@ impl<M: Driven, S: StepCost, R: RolloutCost> Controller<M, S, R> {
         }
     }
 
-    pub(super) fn roll_out(&mut self, input: &Input<'_, MotionState>, order: TaskOrder<'_>) {
+    pub(super) fn roll_out<'a>(&mut self, input: &Input<'_, MotionState>, order: TaskOrder<'a>) {
         let geometry = &input.map.geometry;
         let frame = Frame { corner_m: geometry.south_west_m(), cell_m: geometry.resolution_m };
         let cell_m = frame.cell_m;
@@ -162,24 +165,33 @@ impl<M: Driven, S: StepCost, R: RolloutCost> Controller<M, S, R> {
                 *step = ReferenceStep { x_cells, y_cells, tangent, along_s, across_s };
             }
         }
-        let to = |at_m: [f64; 2], tolerance_m: f64, field| {
+        let (costs, step_s) = (&self.config.costs, self.config.step_s);
+        let to = |at_m: [f64; 2], tolerance_m: f64, distance_s_per_m: f64, rest| {
             let [x_cells, y_cells] = cells(at_m);
             Task::Goal(GoalTask {
                 x_cells,
                 y_cells,
                 tolerance_cells: tolerance_m / cell_m,
-                step_s: self.config.step_s,
-                distance_s: self.config.costs.distance_s_per_m * cell_m,
-                rest_s: cell_m / self.config.costs.rest_speed_mps,
-                field,
+                step_s,
+                distance_s: distance_s_per_m * cell_m,
+                rest_s: cell_m / costs.rest_speed_mps,
+                rest,
             })
+        };
+        let rest = |terminal, of_field: fn(TerminalField<'a>) -> Rest<'a>| match terminal {
+            Terminal::StraightLine => Rest::Straight,
+            Terminal::CostToGo(view) => {
+                TerminalField::new(view, geometry, self.turning_s_per_rad).map_or(Rest::Straight, of_field)
+            }
         };
         let task = match order {
             TaskOrder::Path(_) => Task::Path(&self.reference),
-            TaskOrder::Back(target_m) => to(target_m, self.config.recovery.progress_m, None),
-            TaskOrder::Goal(goal_m, tolerance_m, Terminal::StraightLine) => to(goal_m, tolerance_m, None),
-            TaskOrder::Goal(goal_m, tolerance_m, Terminal::CostToGo(view)) => {
-                to(goal_m, tolerance_m, TerminalField::new(view, geometry))
+            // It counts to be near early, since nothing ends there.
+            TaskOrder::Back(target_m, terminal) => {
+                to(target_m, 0.0, step_s / costs.rest_speed_mps, rest(terminal, Rest::StraightFacing))
+            }
+            TaskOrder::Goal(goal_m, tolerance_m, terminal) => {
+                to(goal_m, tolerance_m, costs.distance_s_per_m, rest(terminal, Rest::Field))
             }
         };
         let [x_cells, y_cells] = cells([self.start.x_m, self.start.y_m]);
@@ -193,7 +205,7 @@ impl<M: Driven, S: StepCost, R: RolloutCost> Controller<M, S, R> {
                 speed_mps: self.start.speed_mps,
                 turn: self.start.turn,
             },
-            tilted_start: self.judge_over(input.map).tilt(&self.start),
+            leaning_start_rad: self.judge_over(input.map).leaning_start_rad(&self.start),
             slots: &self.slots[..self.cell_stepper.n_slots()],
             prices: self.prices(&order),
             task,
@@ -241,7 +253,7 @@ impl<M: Driven, S: StepCost, R: RolloutCost> Controller<M, S, R> {
             attitude_s: costs.attitude_s,
             lateral_max_mps2: limits.lateral_acceleration_max_mps2,
             lateral_s: costs.lateral_s,
-            reverse_s: if matches!(order, TaskOrder::Back(_)) { 0.0 } else { costs.reverse_s },
+            reverse_s: if matches!(order, TaskOrder::Back(..)) { 0.0 } else { costs.reverse_s },
         }
     }
 

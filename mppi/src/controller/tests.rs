@@ -150,6 +150,41 @@ fn the_rollouts_and_the_judge_agree_on_what_breaks_a_limit() {
     assert!(n_broken > 500 && n_broken < n_compared - 500 && n_leaving > 500, "{n_broken} {n_leaving}");
 }
 
+/// The vehicle stands in what blocks it, which reaches 1 m to either side; ahead of it the ground leans by 0.6 rad, beyond
+/// the limit of 0.5, behind it by 0.4. Nothing but the blocked poses is excused; where the ground under the start leans by
+/// 0.7 rad itself, 0.6 is less. Half a metre per second for 3 s lead beyond the edge.
+#[test]
+fn who_leaves_an_obstacle_keeps_off_steeper_ground() {
+    let mut map = RiskMap::constant(GridGeometry::centred(0.25, 160, 160, 0.0, 0.0), 1, Risk::NONE);
+    let geometry = *map.geometry();
+    for (lean_rad, expected) in [(0.0_f32, [true, false]), (0.7, [false, false])] {
+        map.fill(|risks, _| {
+            for (index, risk) in risks.iter_mut().enumerate() {
+                let [x_m, _] = geometry.centre_m(geometry.cell(index));
+                let lean = |roll_rad| Risk { roll_rad, ..Risk::NONE };
+                *risk = if x_m.abs() < 1.0 {
+                    lean(lean_rad).blocked()
+                } else {
+                    lean(if x_m > 0.0 { 0.6 } else { 0.4 })
+                };
+            }
+        });
+        let config = Config { n_rollouts: 64, ..Config::default() };
+        let mut controller = Controller::new(config, Model { effects: Vec::new(), ..model(0.0) }, 1).unwrap();
+        let objective =
+            Objective::Goal { goal_m: [19.0, 0.0], tolerance_m: 0.5, terminal: Terminal::StraightLine };
+        let input =
+            Input { state: State::default(), elapsed_s: STEP_S, cycle: 0, map: map.view(), objective };
+        controller.decide(&input);
+        let found = [0.5, -0.5].map(|speed_mps| {
+            let mut memory = controller.slots.map(f64::from);
+            let controls = std::iter::repeat_n([speed_mps, 0.0], 30);
+            controller.judge_over(map.view()).breaks_limits(&controller.start, controls, &mut memory)
+        });
+        assert_eq!(found, expected, "leaning by {lean_rad} rad in the obstacle");
+    }
+}
+
 /// A wall right ahead that costs next to nothing to drive through: mean and cheapest rollouts lead into it, many others
 /// do not. One of those is driven; whether it keeps clear is looked at with equations of this test's own.
 #[test]

@@ -1,10 +1,11 @@
 //! What the controller prices itself, beside the limits of attitude: the way to a goal or along a path, lateral
 //! acceleration, reverse.
 
-use super::GoalTask;
+use super::{GoalTask, Rest};
 use crate::cost::{Place, Step, StepCost};
 use crate::kernel::Kernel;
 use crate::objective::ReferenceStep;
+use bicycle::LaneState;
 use bicycle::lanes::{Lanes, Real};
 
 /// The task of the rollouts: a cost that knows when it is done, and where its end may be looked up in a table.
@@ -49,9 +50,11 @@ impl<K: Kernel> Stage<K> for GoalTask<'_> {
 
     #[inline(always)]
     fn finish(&self, end: &Place<'_, K>) -> Real<K> {
-        match &self.field {
-            None => self.end(end),
-            Some(field) => field.seconds(end.state.x, end.state.y),
+        let LaneState { x, y, turns, .. } = end.state;
+        match &self.rest {
+            Rest::Straight => self.end(end),
+            Rest::Field(field) => field.time_to_go(x, y, turns),
+            Rest::StraightFacing(field) => self.end(end) + field.time_to_turn(x, y, turns),
         }
     }
 }

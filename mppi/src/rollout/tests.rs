@@ -121,7 +121,7 @@ fn reference(map: &RiskMap, lane: usize, distance_s_per_m: f64) -> ([f64; CostTe
     (terms, margin)
 }
 
-fn goal<'a>(map: &RiskMap, distance_s_per_m: f64, field: Option<TerminalField<'a>>) -> GoalTask<'a> {
+fn goal<'a>(map: &RiskMap, distance_s_per_m: f64, rest: Rest<'a>) -> GoalTask<'a> {
     let corner_m = map.geometry().south_west_m();
     GoalTask {
         x_cells: (GOAL_M[0] - corner_m[0]) / 0.5,
@@ -130,7 +130,7 @@ fn goal<'a>(map: &RiskMap, distance_s_per_m: f64, field: Option<TerminalField<'a
         step_s: STEP_S,
         distance_s: 0.5 * distance_s_per_m,
         rest_s: 0.5 / 2.0,
-        field,
+        rest,
     }
 }
 
@@ -147,7 +147,7 @@ fn scene<'a>(map: &'a RiskMap, stepper: &'a Stepper, task: Task<'a>) -> Scene<'a
         stepper,
         grid: grid(map),
         start,
-        tilted_start: None,
+        leaning_start_rad: None,
         slots: &[],
         prices: PRICES,
         task,
@@ -162,7 +162,7 @@ fn scene<'a>(map: &'a RiskMap, stepper: &'a Stepper, task: Task<'a>) -> Scene<'a
 fn rollouts_cost_what_the_plain_loop_says() {
     let (map, stepper) = (map(), stepper(0.5));
     for distance_s_per_m in [0.0, 0.3] {
-        let task = Task::Goal(goal(&map, distance_s_per_m, None));
+        let task = Task::Goal(goal(&map, distance_s_per_m, Rest::Straight));
         let scene = scene(&map, &stepper, task);
         for machine in machines() {
             let mut chunk = chunk();
@@ -196,7 +196,7 @@ fn the_goal_latches() {
     let task = GoalTask {
         x_cells: (START[0] + 2.01 - corner_m[0]) / 0.5,
         y_cells: (START[1] - corner_m[1]) / 0.5,
-        ..goal(&map, 0.0, None)
+        ..goal(&map, 0.0, Rest::Straight)
     };
     let mut scene = scene(&map, &stepper, Task::Goal(task));
     scene.start.turns = 0.0;
@@ -209,7 +209,8 @@ fn the_goal_latches() {
     }
 }
 
-/// A field that is linear in x and y is interpolated exactly; the terminal cost is its value where the rollout ends.
+/// A field that is linear in x and y is interpolated exactly; the terminal cost is its value where the rollout ends, and
+/// R (e - sin e) for the angle e from its heading to where the field falls, [-0.3, 0.2].
 #[test]
 fn the_cost_to_go_field_is_interpolated_between_cells() {
     let map = RiskMap::constant(GridGeometry::centred(0.5, 60, 50, 1.0, -2.0), 13, Risk::NONE);
@@ -217,9 +218,11 @@ fn the_cost_to_go_field_is_interpolated_between_cells() {
     let linear = |[x_m, y_m]: [f64; 2]| 7.0 + 0.3 * x_m - 0.2 * y_m;
     let seconds: Vec<f32> =
         (0..geometry.n_cells()).map(|index| linear(geometry.centre_m(geometry.cell(index))) as f32).collect();
-    let field = TerminalField::new(CostToGoView { geometry, seconds: &seconds }, map.geometry());
+    const TURNING_S_PER_RAD: f64 = 2.5;
+    let view = CostToGoView { geometry, seconds: &seconds };
+    let field = TerminalField::new(view, map.geometry(), TURNING_S_PER_RAD).unwrap();
     let stepper = stepper(0.5);
-    let task = GoalTask { x_cells: 1e6, ..goal(&map, 0.0, field) };
+    let task = GoalTask { x_cells: 1e6, ..goal(&map, 0.0, Rest::Field(field)) };
     let scene = scene(&map, &stepper, Task::Goal(task));
     for machine in machines() {
         let mut chunk = chunk();
@@ -233,7 +236,9 @@ fn the_cost_to_go_field_is_interpolated_between_cells() {
                 yaw += STEP_S * v * delta.tan() / WHEELBASE_M;
             }
             let found = f64::from(chunk.terms[CostTerm::Terminal as usize].0[lane]);
-            assert!((found - linear([x, y])).abs() < 1e-3, "{found} {}", linear([x, y]));
+            let cosine = (-0.3 * yaw.cos() + 0.2 * yaw.sin()) / 0.3_f64.hypot(0.2);
+            let expected = linear([x, y]) + TURNING_S_PER_RAD * (cosine.acos() - cosine.acos().sin());
+            assert!((found - expected).abs() < 1.5e-3, "{found} {expected}");
         }
     }
 }
@@ -351,7 +356,7 @@ fn rollouts_of_a_whole_model_go_where_one_vehicle_goes() {
     let corner_m = map.geometry().south_west_m();
     for goal_m in [[START[0] + 20.0, START[1]], [START[0], START[1] + 20.0]] {
         let [x_cells, y_cells] = [0, 1].map(|axis| (goal_m[axis] - corner_m[axis]) / 0.5);
-        let task = Task::Goal(GoalTask { x_cells, y_cells, ..goal(&map, 0.0, None) });
+        let task = Task::Goal(GoalTask { x_cells, y_cells, ..goal(&map, 0.0, Rest::Straight) });
         let mut scene = scene(&map, &stepper, task);
         (scene.slots, scene.start.speed_mps, scene.start.turn) = (&slots, 0.8, 0.1);
         for machine in machines() {
@@ -415,7 +420,8 @@ fn reads_broken(stepper: &Stepper, slots: usize, lane: usize) -> (bool, f64) {
 }
 
 /// A number that is not finite makes the rollout that meets it cost no finite number, and no other, whatever the
-/// instruction set: none may round infinity to nothing, nor may a bound turn NaN into itself.
+/// instruction set: none may round infinity to nothing, nor may a bound turn NaN into itself. Less than the least traction is
+/// no such number: it counts as the least.
 #[test]
 fn a_rollout_that_meets_no_number_costs_none_on_every_instruction_set() {
     let friction = Effect::from_values("friction", [0.8, 1.0, 3.0, 0.0]).unwrap();
@@ -427,13 +433,12 @@ fn a_rollout_that_meets_no_number_costs_none_on_every_instruction_set() {
         (&plain, 0, f32::INFINITY),
         (&plain, 1, f32::NAN),
         (&plain, 1, f32::INFINITY),
-        (&plain, 1, f32::NEG_INFINITY),
         (&whole, 1, f32::INFINITY),
         (&whole, 2, f32::NAN),
     ] {
         let map = broken(field, number);
         let (stepper, reference) = (Stepper::new(model, STEP_S, 0.5), Stepper::new(model, STEP_S, 1.0));
-        let task = Task::Goal(GoalTask { x_cells: 1e3, ..goal(&map, 0.0, None) });
+        let task = Task::Goal(GoalTask { x_cells: 1e3, ..goal(&map, 0.0, Rest::Straight) });
         let slots = vec![0.0; stepper.n_slots()];
         let mut scene = scene(&map, &stepper, task);
         scene.slots = &slots;
