@@ -3,7 +3,8 @@
 //! The field solves the shortest-path problem on the grid, an edge costing the time that its length takes at the
 //! speed that the ground allows in that direction: `length / (speed x worst-case traction)`, the risk being that of
 //! the yaw bin along the edge. It drives forward only and ignores the turning circle: a car cannot follow every path
-//! that the field promises, so the field is a lower bound for the vehicle, and the rollouts before it keep it honest.
+//! that the field promises, so the field is a lower bound for the vehicle. The rollouts before it keep it honest, and
+//! where they end they pay for turning to it.
 
 mod buckets;
 mod stencil;
