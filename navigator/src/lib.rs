@@ -41,7 +41,7 @@ pub use message::{
 };
 pub use mission::{Instruction, Mission, Order, OrderRefusal, Said, Stage, Target};
 pub use navigator::{Navigator, NavigatorError, Setup, Surface};
-pub use pilot::{Chart, Destination, Pilot, PilotAges};
+pub use pilot::{Destination, Pilot, PilotAges};
 pub use risk::{Belief, RiskOracle, StuckPose};
 pub use route::{CORNERS_MAX, Route, RouteError};
 pub use surveyor::{ScanTally, Surveyor};

@@ -198,7 +198,7 @@ impl<M: Driven> Navigator<M> {
 
     /// Hands a scan to whoever maps.
     pub fn hear_scan(&mut self, message: ScanMessage) {
-        self.mail.scans.push(message);
+        self.mail.scan(message);
     }
 
     /// Directs the vehicle otherwise from now on; the first mission is that of [`Setup`].
@@ -229,13 +229,13 @@ impl<M: Driven> Navigator<M> {
     /// Maps what has come; returns whether anything new was seen. While nobody else judges, physics does.
     pub fn survey(&mut self, now_ns: u64) -> Result<bool, NavigatorError> {
         let mut has_seen = false;
-        for message in std::mem::take(&mut self.mail.to_surveyor) {
+        while let Some(message) = self.mail.to_surveyor.pop_front() {
             if let Some(header) = self.surveyor.hear_odometry(&message)? {
                 has_seen |= header.jump.is_none();
                 self.tell_surface(header, now_ns)?;
             }
         }
-        for scan in std::mem::take(&mut self.mail.scans) {
+        while let Some(scan) = self.mail.scans.pop_front() {
             self.surveyor.hear_scan(scan, now_ns);
         }
         while let Some(header) = self.surveyor.next_surface(now_ns)? {
@@ -256,7 +256,7 @@ impl<M: Driven> Navigator<M> {
         self.n_surfaces += 1;
         let id = MessageId { epoch_ns: EPOCH_NS, sequence: self.n_surfaces };
         let header = SurfaceHeader { id, ..header };
-        self.mail.surfaces.push(header);
+        self.mail.surface(header);
         let Some((physics, stand_in)) = &mut self.physics else { return Ok(()) };
         physics.hear_surface(&header);
         if stand_in.is_needed(now_ns) {

@@ -19,15 +19,15 @@ use crate::{
 
 /// What the pilot drives on.
 #[derive(Clone, Copy, Debug)]
-pub struct Chart<'a> {
+struct Chart<'a> {
     /// Risk around the vehicle.
-    pub map: RiskMapView<'a>,
+    map: RiskMapView<'a>,
     /// Least time to the goal over it.
-    pub time_to_goal: CostToGoView<'a>,
+    time_to_goal: CostToGoView<'a>,
     /// The goal that it leads to, as it was said [m]; to any other the straight line is taken.
-    pub goal_m: [f64; 2],
+    goal_m: [f64; 2],
     /// Time of the odometry in whose frame both lie [ns]; later jumps of the localisation have left them behind.
-    pub odometry_at_ns: u64,
+    odometry_at_ns: u64,
 }
 
 /// Where to go.
@@ -99,8 +99,9 @@ impl<M: Driven> Pilot<M> {
     /// decision.
     pub fn hear_odometry(&mut self, message: &OdometryMessage<M::Command>) {
         self.note_applied(&message.applied);
-        let admitted = self.ledger.take(message);
-        self.follow(admitted);
+        if let Ok(Admitted::ClockSetBack) = self.ledger.take(message) {
+            self.chart_at_ns = None;
+        }
     }
 
     /// Takes in what the vehicle is told to do. It counts until it is said again, or is too old.
@@ -132,6 +133,7 @@ impl<M: Driven> Pilot<M> {
             Instruction::Stand(_) => None,
         };
         let decision = self.decide(now_ns, used.map(|(.., chart)| chart), &instruction);
+        // On maps of before a jump the vehicle was carried to where it stands there; the pose is one of now.
         let odometry_at_ns = self.ledger.frame_at_ns();
         let id_of = |map: &Option<RiskMessage<'_>>| map.map_or_else(Default::default, |map| map.header.id);
         DecisionMessage {
@@ -168,23 +170,14 @@ impl<M: Driven> Pilot<M> {
         self.note_scan(if valid_at_ns == TIMELESS_NS { newest_ns } else { valid_at_ns });
     }
 
-    /// Takes in where the vehicle says it is, and corrects it by what the model believes of the sensors. What cannot be
-    /// used is remembered as the reason for the next decision. Returns the jump of the localisation that it made out;
-    /// on maps of before the vehicle is carried to where it stands from then on.
-    pub fn admit(&mut self, measured: &Odometry) -> Option<Jump> {
-        let admitted = self.ledger.admit(measured);
-        self.follow(admitted)
-    }
-
-    /// Notes when the scan was measured that the map knows of.
-    pub fn note_scan(&mut self, valid_at_ns: u64) {
+    fn note_scan(&mut self, valid_at_ns: u64) {
         self.ledger.note_scan(valid_at_ns);
     }
 
     /// The command for now, or the reason for none. `now_ns` is on the clock of the measurements.
     ///
     /// What is wrong with the measurements is the more urgent reason to stand, and a map that is missing the less urgent.
-    pub fn decide(
+    fn decide(
         &mut self,
         now_ns: u64,
         chart: Option<Chart<'_>>,
@@ -204,9 +197,9 @@ impl<M: Driven> Pilot<M> {
         decision
     }
 
-    /// The pose where the last decision found the vehicle stuck, once.
-    pub fn take_stuck(&mut self) -> Option<StuckPose> {
-        self.stuck.take()
+    /// Decisions so far.
+    pub fn cycle(&self) -> u64 {
+        self.cycle
     }
 
     /// From now on samples at most `n` futures a decision; see [`Controller::use_rollouts`].
@@ -229,30 +222,8 @@ impl<M: Driven> Pilot<M> {
         self.ledger.refused()
     }
 
-    /// Decisions so far.
-    pub fn cycle(&self) -> u64 {
-        self.cycle
-    }
-
-    /// Time from the decision before the last one to the last one [s].
-    pub fn elapsed_s(&self) -> f64 {
-        self.elapsed_s
-    }
-
-    fn follow(&mut self, admitted: Result<Admitted, StopReason>) -> Option<Jump> {
-        match admitted {
-            Ok(Admitted::Jumped(jump)) => Some(jump),
-            Ok(Admitted::ClockSetBack) => {
-                self.chart_at_ns = None;
-                None
-            }
-            Ok(Admitted::Onward | Admitted::Again) | Err(_) => None,
-        }
-    }
-
-    /// Takes in what the actuators were told last, as the vehicle says with the odometry that [`Pilot::admit`] is to be
-    /// shown next. Delays are replayed from it and the next plan starts from it, see [`Controller::note_sent`].
-    pub fn note_applied(&mut self, applied: &Applied<M::Command>) {
+    /// Takes in what the actuators were told last, as the vehicle says with its odometry. Delays are replayed from it and the next plan starts from it, see [`Controller::note_sent`].
+    fn note_applied(&mut self, applied: &Applied<M::Command>) {
         let Applied { command, since_ns, by } = *applied;
         let Some(decided_at_ns) = self.decided_at_ns else { return };
         let after_s = since_ns.wrapping_sub(decided_at_ns).cast_signed() as f64 * 1e-9;

@@ -17,7 +17,7 @@ use traversability::CvarLevel;
 use crate::convert::{decision_record, odometry_message, risk_message};
 use crate::mapping::PHYSICS;
 use crate::setup::{MachineSetup, SetupError};
-use bus::message::{CommandRecord, DecisionRecord, Source};
+use bus::message::{DecisionRecord, Source};
 use choice::Choice;
 use maps::{Maps, Unmade};
 pub use records::{Key, ReadError, Records, recorded_decision, recorded_stamp};

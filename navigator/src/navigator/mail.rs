@@ -6,6 +6,9 @@ use crate::{MissionMessage, OdometryMessage, ScanMessage, StuckMessage, SurfaceH
 
 /// Odometry that waits for a part at the most: as many as on the channel of processes; of more, the oldest is dropped.
 const ODOMETRY_MAX: usize = 32;
+/// The same of scans, and of maps of the ground.
+const SCANS_MAX: usize = 2;
+const SURFACES_MAX: usize = 2;
 
 /// What waits for an author of risk maps.
 #[derive(Debug, Default)]
@@ -20,8 +23,8 @@ pub(super) struct Mail<C> {
     pub to_leader: VecDeque<OdometryMessage<C>>,
     pub to_surveyor: VecDeque<OdometryMessage<C>>,
     pub to_pilot: VecDeque<OdometryMessage<C>>,
-    pub scans: Vec<ScanMessage>,
-    pub surfaces: Vec<SurfaceHeader>,
+    pub scans: VecDeque<ScanMessage>,
+    pub surfaces: VecDeque<SurfaceHeader>,
     pub learned: ToAuthor,
     /// `None` where nobody stands in.
     pub physics: Option<ToAuthor>,
@@ -37,8 +40,8 @@ impl<C> Default for Mail<C> {
             to_leader: queue(),
             to_surveyor: queue(),
             to_pilot: queue(),
-            scans: Vec::new(),
-            surfaces: Vec::new(),
+            scans: VecDeque::with_capacity(SCANS_MAX),
+            surfaces: VecDeque::with_capacity(SURFACES_MAX),
             learned: ToAuthor::default(),
             physics: None,
             mission_to_pilot: None,
@@ -50,11 +53,16 @@ impl<C> Default for Mail<C> {
 impl<C: Copy> Mail<C> {
     pub fn odometry(&mut self, message: &OdometryMessage<C>) {
         for queue in [&mut self.to_leader, &mut self.to_surveyor, &mut self.to_pilot] {
-            if queue.len() == ODOMETRY_MAX {
-                queue.pop_front();
-            }
-            queue.push_back(*message);
+            put(queue, *message, ODOMETRY_MAX);
         }
+    }
+
+    pub fn scan(&mut self, message: ScanMessage) {
+        put(&mut self.scans, message, SCANS_MAX);
+    }
+
+    pub fn surface(&mut self, header: SurfaceHeader) {
+        put(&mut self.surfaces, header, SURFACES_MAX);
     }
 
     pub fn mission(&mut self, message: &MissionMessage) {
@@ -73,4 +81,11 @@ impl<C: Copy> Mail<C> {
     pub fn has_stuck(&self) -> bool {
         !self.learned.stuck.is_empty()
     }
+}
+
+fn put<T>(queue: &mut VecDeque<T>, message: T, most: usize) {
+    if queue.len() == most {
+        queue.pop_front();
+    }
+    queue.push_back(message);
 }
