@@ -177,7 +177,7 @@ impl ClosedLoop {
     pub fn follow(&mut self, route: Route) -> Result<(), DriveError> {
         let now_ns = self.episode.observe().valid_at_ns;
         // Nothing speaks against an order of now.
-        self.navigator.order(Order::Drive(route), now_ns)?.ok();
+        self.navigator.order(Order::Drive(route), now_ns).ok();
         Ok(())
     }
 
@@ -185,9 +185,13 @@ impl ClosedLoop {
     pub fn cycle(&mut self) -> Result<Cycle, DriveError> {
         let observation = self.episode.observe();
         let began = Instant::now();
-        let is_renewed = self.navigator.observe(&observation.odometry, observation.scan.as_deref())?;
+        let is_renewed = self.navigator.observe(
+            observation.valid_at_ns,
+            &observation.odometry,
+            observation.scan.as_deref(),
+        )?;
         let mapped = Instant::now();
-        let decision = self.navigator.decide(observation.valid_at_ns);
+        let decision = self.navigator.decide(observation.valid_at_ns)?;
         let decided = Instant::now();
         if let Some(target) = self.navigator.mission().target() {
             let Destination { goal_m, tolerance_m } = target.end();

@@ -1,5 +1,8 @@
 //! The one clock of all processes: monotonic, in nanoseconds, the same for everybody on the machine.
 
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+
 use rustix::thread::{ClockId as SleepClock, clock_nanosleep_absolute};
 use rustix::time::{ClockId, Timespec, clock_gettime};
 
@@ -11,6 +14,26 @@ pub fn now_ns() -> u64 {
     let Timespec { tv_sec, tv_nsec } = clock_gettime(ClockId::Monotonic);
     // The monotonic clock counts up from the start of the machine.
     tv_sec.unsigned_abs() * SECOND_NS + tv_nsec.unsigned_abs()
+}
+
+/// The clock that a process goes by.
+#[derive(Clone, Debug, Default)]
+pub enum Clock {
+    /// The machine's.
+    #[default]
+    Monotonic,
+    /// One that stands still between two steps of whoever holds it: what happens is then a matter of order alone.
+    Stepped(Arc<AtomicU64>),
+}
+
+impl Clock {
+    /// The time now [ns].
+    pub fn now_ns(&self) -> u64 {
+        match self {
+            Self::Monotonic => now_ns(),
+            Self::Stepped(time_ns) => time_ns.load(Ordering::Relaxed),
+        }
+    }
 }
 
 /// The time of day now, nanoseconds of UTC since 1970. It may be set at will: nothing is decided by it.

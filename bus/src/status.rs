@@ -1,7 +1,7 @@
 //! What every process tells of itself.
 
 use crate::channel::{Bus, Channel, ChannelError, Counts, Outlet, status_channel};
-use crate::clock::{self, SECOND_NS};
+use crate::clock::SECOND_NS;
 use crate::message::{Stamp, StatusRecord};
 
 /// Time between two statuses [ns].
@@ -94,7 +94,7 @@ impl Meter {
     /// A meter that has measured nothing.
     pub fn new(bus: &Bus, role: Role) -> Result<Self, ChannelError> {
         let outlet = bus.outlet(&role.status(), 1)?;
-        Ok(Self { role, outlet, reported_at_ns: clock::now_ns(), lateness_s: Vec::with_capacity(64) })
+        Ok(Self { role, outlet, reported_at_ns: bus.clock().now_ns(), lateness_s: Vec::with_capacity(64) })
     }
 
     /// Notes a cycle that began so much after its time.

@@ -57,8 +57,8 @@ fn main() -> Result<(), Box<dyn Error>> {
             wheel_speed_mps: state.speed_mps,
             steering_rad: state.steering_rad,
         };
-        navigator.observe(&odometry, None)?;
-        let decision = navigator.decide(now_ns);
+        navigator.observe(now_ns, &odometry, None)?;
+        let decision = navigator.decide(now_ns)?;
         if n_cycles.is_multiple_of(10) {
             println!(
                 "{:4.1} s at ({:4.2}, {:5.2}) m: {decision:?}",

@@ -1,5 +1,7 @@
 //! The second part of the pipeline: the map of the ground becomes risk and time to the goal.
 
+mod change;
+
 use bicycle::lanes::Instructions;
 use bicycle::{Geometry, MotionLimits};
 use mppi::{CostToGo, CostToGoView};
@@ -7,15 +9,31 @@ use terrain::{CellRegion, DistantPosition, GridMap, SurfaceCell};
 use traversability::{CvarLevel, Risk, RiskMapView};
 
 use crate::areas::Barrier;
-use crate::risk::{Belief, RiskLayer, StuckPose};
-use crate::{Config, Jump, NavigatorError};
+use crate::frame::Frame;
+use crate::risk::{Belief, RiskLayer};
+use crate::{
+    Config, Jump, MessageId, MissionMessage, NavigatorError, RiskHeader, StuckMessage, SurfaceHeader,
+};
+use change::changed_region;
 
-/// Judges the ground and finds the least time over it to the goal.
+/// Judges the ground and finds the least time over it to the goal. Only what has changed since the map of the ground
+/// before is judged anew.
 pub struct Assessor {
     layer: RiskLayer,
     barrier: Barrier,
     recipe: Recipe,
     cost_to_go: CostToGo,
+    /// The map of the ground that was judged last.
+    surface: Option<GridMap<SurfaceCell>>,
+    /// What it said of itself.
+    judged: Option<SurfaceHeader>,
+    /// Life of the surveyor and all jumps that it has told of.
+    shift: (u64, Jump),
+    frame: Frame,
+    /// When the odometry was measured in whose frame the newest map lies that was told of [ns].
+    frame_at_ns: u64,
+    stuck: MessageId,
+    goal_m: Option<[f64; 2]>,
 }
 
 /// What the ground is judged with.
@@ -64,6 +82,13 @@ impl Assessor {
                 window.n_rows,
                 window.n_cols,
             )?,
+            surface: None,
+            judged: None,
+            shift: (0, Jump::NONE),
+            frame: Frame::default(),
+            frame_at_ns: 0,
+            stuck: MessageId::default(),
+            goal_m: None,
         })
     }
 
@@ -80,60 +105,111 @@ impl Assessor {
         }
         self.recipe.level = level;
         let mut layer = self.recipe.layer()?;
-        self.layer.stuck().iter().for_each(|pose| layer.note_stuck(*pose));
+        self.layer.stuck().iter().for_each(|(at_ns, pose)| layer.note_stuck(*pose, *at_ns));
         self.layer = layer;
         Ok(())
     }
 
-    /// Follows the vehicle and judges anew what changed of the surface. Where the vehicle may not be counts as obstacles.
-    pub fn update(
-        &mut self,
-        position_m: [f64; 2],
-        surface: &GridMap<SurfaceCell>,
-        changed: &CellRegion,
-    ) -> Result<(), NavigatorError> {
-        DistantPosition::check(position_m, self.layer.resolution_m())?;
-        Ok(self.layer.update(position_m, self.barrier.bar(surface), changed)?)
+    /// Judges as `other` does from now on, the next map as a whole. What driving has proved stays, and so does the share of
+    /// outcomes.
+    pub fn judge_like(&mut self, mut other: Self) -> Result<(), NavigatorError> {
+        other.judge_at(self.level())?;
+        self.layer.stuck().iter().for_each(|(at_ns, pose)| other.layer.note_stuck(*pose, *at_ns));
+        (self.layer, self.barrier, self.recipe) = (other.layer, other.barrier, other.recipe);
+        self.surface = None;
+        Ok(())
     }
 
-    /// What the ground is judged to be, before [`Assessor::amend`]; `None` until the first update.
+    /// Follows what was said of where to go, and for which share of outcomes to plan.
+    pub fn hear_mission(&mut self, mission: &MissionMessage) -> Result<(), NavigatorError> {
+        if let Some(destination) = mission.destination {
+            self.goal_m = Some(destination.goal_m);
+        }
+        mission.level.map_or(Ok(()), |level| self.judge_at(level))
+    }
+
+    /// Where the times to the goal shall lead from now on.
+    pub fn set_goal(&mut self, goal_m: [f64; 2]) {
+        self.goal_m = Some(goal_m);
+    }
+
+    /// Whether it has been said where to: before, no map of the ground is worth judging.
+    pub fn has_goal(&self) -> bool {
+        self.goal_m.is_some()
+    }
+
+    /// Remembers a pose that proved impassable, where it lies in the frame of the newest map that was told of; of very
+    /// many, the oldest is forgotten. One from a later frame moves with the jumps that come after it.
+    pub fn hear_stuck(&mut self, stuck: &StuckMessage) {
+        self.stuck = stuck.id;
+        let StuckMessage { valid_at_ns, pose, .. } = *stuck;
+        let late = Some(valid_at_ns).filter(|at_ns| *at_ns < self.frame_at_ns);
+        let moved = late.and_then(|at_ns| self.frame.shift(at_ns, self.frame_at_ns));
+        self.layer.note_stuck(moved.map_or(pose, |jump| pose.moved(&jump)), valid_at_ns);
+    }
+
+    /// Looks at what a map of the ground says of itself, in the order in which they were sent, whether or not it is judged:
+    /// poses that proved stuck move with the localisation. A surveyor that began anew has forgotten the frame of before.
+    pub fn hear_surface(&mut self, header: &SurfaceHeader) {
+        let (epoch_ns, last) = self.shift;
+        if epoch_ns != header.id.epoch_ns {
+            self.frame.forget();
+        } else if header.shift != last {
+            let jump = last.inverse().then(&header.shift);
+            self.frame.note(header.frame_at_ns, &jump);
+            self.layer.follow_jump(&jump, header.frame_at_ns);
+        }
+        self.shift = (header.id.epoch_ns, header.shift);
+        self.frame_at_ns = header.frame_at_ns;
+    }
+
+    /// Judges a map of the ground, of which what has changed since the last one is judged anew. Where the vehicle may not be
+    /// counts as obstacles.
+    pub fn judge(
+        &mut self,
+        header: &SurfaceHeader,
+        surface: GridMap<SurfaceCell>,
+    ) -> Result<(), NavigatorError> {
+        self.hear_surface(header);
+        let changed = self.surface.as_ref().map_or_else(
+            || CellRegion::whole(surface.geometry()),
+            |last| changed_region(last, &surface).unwrap_or(CellRegion { rows: 0..0, cols: 0..0 }),
+        );
+        let [x_m, y_m, _] = header.odometry.position_m;
+        DistantPosition::check([x_m, y_m], self.layer.resolution_m())?;
+        self.layer.update([x_m, y_m], self.barrier.bar(&surface), &changed)?;
+        (self.surface, self.judged) = (Some(surface), Some(*header));
+        Ok(())
+    }
+
+    /// What the ground is judged to be, before [`Assessor::correct`]; `None` until it was judged.
     pub fn known(&self) -> Option<RiskMapView<'_>> {
         self.layer.known()
     }
 
     /// Brings what driving has proved, and who knows better, into risks that were taken from
     /// [`Assessor::known`].
-    pub fn amend(&self, risks: &mut [Risk]) {
-        self.layer.amend(risks);
+    pub fn correct(&self, risks: &mut [Risk]) {
+        self.layer.correct(risks);
     }
 
-    /// The least time over an amended map to the goal.
-    pub fn time_to_goal(
-        &mut self,
-        map: RiskMapView<'_>,
-        goal_m: [f64; 2],
-    ) -> Result<CostToGoView<'_>, NavigatorError> {
-        self.cost_to_go.update(map, goal_m)?;
-        Ok(self.cost_to_go.view())
+    /// Finds the least time over the corrected map to the goal, and says what that map is, but for its name; `None` before
+    /// the ground was judged or without a goal.
+    pub fn finish(&mut self, corrected: RiskMapView<'_>) -> Result<Option<RiskHeader>, NavigatorError> {
+        let Some((judged, goal_m)) = self.judged.zip(self.goal_m) else { return Ok(None) };
+        self.cost_to_go.update(corrected, goal_m)?;
+        Ok(Some(RiskHeader {
+            id: MessageId::default(),
+            valid_at_ns: judged.valid_at_ns,
+            surface: judged.id,
+            frame_at_ns: judged.frame_at_ns,
+            stuck: self.stuck,
+            goal_m,
+        }))
     }
 
-    /// The times of the last [`Assessor::time_to_goal`].
-    pub fn last_time_to_goal(&self) -> CostToGoView<'_> {
+    /// The times of the last [`Assessor::finish`].
+    pub fn time_to_goal(&self) -> CostToGoView<'_> {
         self.cost_to_go.view()
-    }
-
-    /// Remembers a pose that proved impassable; of very many, the oldest is forgotten.
-    pub fn note_stuck(&mut self, pose: StuckPose) {
-        self.layer.note_stuck(pose);
-    }
-
-    /// The poses that are remembered, the oldest first.
-    pub fn stuck(&self) -> &[StuckPose] {
-        self.layer.stuck()
-    }
-
-    /// The localisation jumped, and what is remembered in its frame moves along.
-    pub fn follow_jump(&mut self, jump: &Jump) {
-        self.layer.follow_jump(jump);
     }
 }

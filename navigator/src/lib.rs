@@ -12,10 +12,14 @@
 mod areas;
 mod assessor;
 mod author;
+mod choice;
 mod config;
 mod frame;
 mod guard;
+mod input_ledger;
 mod jump;
+mod leader;
+mod message;
 mod mission;
 mod navigator;
 mod pilot;
@@ -26,12 +30,18 @@ mod track;
 
 pub use areas::Areas;
 pub use assessor::Assessor;
+pub use choice::{StandIn, is_learned};
 pub use config::{Config, RiskMapConfig};
 pub use guard::{Admitted, Guard, GuardConfig};
 pub use jump::Jump;
+pub use leader::Leader;
+pub use message::{
+    Activity, DecisionMessage, MessageId, MissionMessage, OdometryMessage, PathWindow, RiskAuthor,
+    RiskHeader, RiskMessage, RiskMessages, ScanMessage, StuckMessage, SurfaceHeader, TIMELESS_NS,
+};
 pub use mission::{Instruction, Mission, Order, OrderRefusal, Said, Stage, Target};
 pub use navigator::{Navigator, NavigatorError, Setup, Surface};
-pub use pilot::{Chart, Destination, Pilot};
+pub use pilot::{Destination, Pilot, PilotAges};
 pub use risk::{Belief, RiskOracle, StuckPose};
 pub use route::{CORNERS_MAX, Route, RouteError};
 pub use surveyor::{ScanTally, Surveyor};

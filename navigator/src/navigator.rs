@@ -1,16 +1,22 @@
-//! One cycle of the pipeline.
+//! The parts of the pipeline in one process: their messages lie in queues, and one part is at work at a time.
+
+mod author;
+mod mail;
 
 use std::collections::BTreeMap;
 
-use bicycle::{Decision, Geometry, Model, MotionCommand, Odometry, StopReason};
+use bicycle::{Applied, AppliedBy, Decision, Geometry, Model, Odometry, StopReason};
 use mppi::{Controller, Driven};
-use terrain::{GridGeometry, GridMap, Scan, SurfaceCell};
-use traversability::{CvarLevel, Risk, RiskMap, RiskMapView};
+use terrain::{GridMap, Scan, SurfaceCell};
+use traversability::{CvarLevel, RiskMapView};
 
 use crate::{
-    Assessor, Belief, Chart, Config, Mission, Order, OrderRefusal, Pilot, Route, RouteError, Said, ScanTally,
-    Surveyor, Whereabouts,
+    Assessor, Belief, Config, DecisionMessage, Leader, MessageId, Mission, OdometryMessage, Order,
+    OrderRefusal, Pilot, PilotAges, RiskMessage, RiskMessages, Route, RouteError, Said, ScanMessage,
+    ScanTally, StandIn, StuckMessage, SurfaceHeader, Surveyor,
 };
+use author::Author;
+use mail::{Mail, ToAuthor};
 
 /// Where the map of the ground comes from.
 #[derive(Clone)]
@@ -82,26 +88,34 @@ pub enum NavigatorError {
     Order(#[from] OrderRefusal),
 }
 
-/// The planner: its three parts, one after the other, behind two calls.
-pub struct Navigator<M: Driven = Model> {
-    surveyor: Surveyor,
-    assessor: Assessor,
-    pilot: Pilot<M>,
-    /// What is believed, less the poses that proved stuck; `None` before the first scan.
-    map: Option<RiskMap>,
-    /// Time of the odometry in whose frame the map lies [ns].
-    map_at_ns: u64,
-    /// Whether the localisation has jumped since.
-    is_map_behind: bool,
-    mission: Mission,
-    /// Orders so far.
-    n_orders: u64,
-    /// The goal that the times of the assessor lead to [m].
-    goal_m: [f64; 2],
-}
-
+/// Time between two messages of the mission [ns].
+const MISSION_PERIOD_NS: u64 = 1_000_000_000;
 /// Orders are given in the same process: they are of now.
 const ORDER_AGE_MAX_NS: u64 = 0;
+/// The life of whoever speaks in this process: there is one.
+const EPOCH_NS: u64 = 1;
+
+/// The planner: its parts, and the messages between them.
+///
+/// [`Navigator::observe`] and [`Navigator::decide`] have the parts work in a fixed order. Whoever has another order, as
+/// that of processes, hands over messages and steps each part by itself; when a part works is its business, what the part
+/// does then is the same.
+pub struct Navigator<M: Driven = Model> {
+    leader: Leader,
+    surveyor: Surveyor,
+    learned: Author,
+    physics: Option<(Author, StandIn)>,
+    pilot: Pilot<M>,
+    mail: Mail<M::Command>,
+    /// What went to the vehicle last.
+    sent: Applied<M::Command>,
+    /// Odometry so far.
+    n_observed: u64,
+    n_surfaces: u64,
+    n_missions: u64,
+    n_orders: u64,
+    n_stuck: u64,
+}
 
 impl<M: Driven> Navigator<M> {
     /// A pipeline that has seen nothing.
@@ -110,85 +124,202 @@ impl<M: Driven> Navigator<M> {
         let mut mission = Mission::new(ORDER_AGE_MAX_NS).within(config.areas.clone());
         let route = Route::goals(vec![goal_m], tolerance_m)?;
         mission.order(Order::Drive(route), Said { sequence: 1, ..Said::default() }, 0)?;
+        let sensors = model.sensors();
         Ok(Self {
+            leader: Leader::new(mission, &config.guard, sensors, MISSION_PERIOD_NS),
             surveyor: Surveyor::new(geometry, config.elevation, config.guard, surface)?
-                .with_sensors(model.sensors()),
-            assessor: Assessor::new(geometry, model.motion_limits(), &config, &belief, level)?,
+                .with_sensors(sensors)
+                .with_mounts(config.sensors.clone()),
+            learned: Author::new(Assessor::new(geometry, model.motion_limits(), &config, &belief, level)?),
+            physics: None,
             pilot: Pilot::new(model, &config, seed)?,
-            map: None,
-            map_at_ns: 0,
-            is_map_behind: false,
-            mission,
+            mail: Mail::default(),
+            sent: Applied { command: M::Command::default(), since_ns: 0, by: AppliedBy::Command },
+            n_observed: 0,
+            n_surfaces: 0,
+            n_missions: 0,
             n_orders: 1,
-            goal_m,
+            n_stuck: 0,
         })
     }
 
-    /// Directs the vehicle otherwise from now on; the first mission is that of [`Setup`].
-    ///
-    /// # Errors
-    /// The ground cannot be judged for that share of outcomes.
-    pub fn order(&mut self, order: Order, now_ns: u64) -> Result<Result<(), OrderRefusal>, NavigatorError> {
-        self.n_orders += 1;
-        let said = Said { at_ns: now_ns, sender_ns: 0, sequence: self.n_orders };
-        let taken = self.mission.order(order, said, now_ns);
-        self.assessor.judge_at(self.mission.level().unwrap_or(self.assessor.level()))?;
-        Ok(taken)
+    /// The same with somebody who judges by physics while nobody else does, as processes have; from `began_ns` on.
+    pub fn with_stand_in(self, physics: Assessor, silence_max_ns: u64, began_ns: u64) -> Self {
+        let stand_in = StandIn::new(began_ns, silence_max_ns);
+        let mail = Mail { physics: Some(ToAuthor::default()), ..self.mail };
+        Self { physics: Some((Author::new(physics), stand_in)), mail, ..self }
     }
 
-    /// What the vehicle is told to do.
-    pub fn mission(&self) -> &Mission {
-        &self.mission
+    /// The same for inputs that may be so old.
+    pub fn with_ages(self, ages: PilotAges) -> Self {
+        Self { pilot: self.pilot.with_ages(ages), ..self }
     }
 
     /// Takes in what was measured; returns whether the risk map was renewed. A scan is placed by its own time, which
     /// may be a little before or after that of the odometry.
     ///
     /// Input that cannot be used is remembered as the reason for the next decision and changes no map.
-    pub fn observe(&mut self, odometry: &Odometry, scan: Option<&Scan>) -> Result<bool, NavigatorError> {
-        self.pilot.admit(odometry);
-        let Ok(jump) = self.surveyor.admit(odometry) else { return Ok(false) };
-        if let Some(odometry) = self.pilot.odometry() {
-            self.mission.advance(odometry);
+    pub fn observe(
+        &mut self,
+        now_ns: u64,
+        odometry: &Odometry,
+        scan: Option<&Scan>,
+    ) -> Result<bool, NavigatorError> {
+        self.n_observed += 1;
+        let id = MessageId { epoch_ns: EPOCH_NS, sequence: self.n_observed };
+        self.hear_odometry(&OdometryMessage { id, odometry: *odometry, applied: self.sent });
+        if let Some(scan) = scan {
+            self.hear_scan(ScanMessage { id, sensor: 0, scan: scan.clone() });
         }
-        if let Some(jump) = jump {
-            self.assessor.follow_jump(&jump);
-            self.surveyor.follow_jump(odometry, &jump)?;
-            self.is_map_behind = true;
+        self.lead(now_ns);
+        // After a jump the map of before will do until the next scan.
+        let has_seen = self.survey(now_ns)?;
+        if has_seen { self.assess() } else { Ok(false) }
+    }
+
+    /// The command for now, or the reason for none. `now_ns` is on the clock of the measurements. Whoever asks hands it to
+    /// the vehicle.
+    pub fn decide(&mut self, now_ns: u64) -> Result<Decision<M::Command>, NavigatorError> {
+        let decision = self.answer(now_ns).decision;
+        let command = decision.command(self.sent.command);
+        if command != self.sent.command {
+            self.sent = Applied { command, since_ns: now_ns, by: AppliedBy::Command };
         }
-        if self.surveyor.is_given() {
-            // What was given whole never gets old.
-            self.pilot.note_scan(odometry.valid_at_ns);
+        if self.mail.has_stuck() {
+            self.assess()?;
         }
-        match scan {
-            Some(scan) if self.survey(odometry, scan)? => {
-                self.pilot.note_scan(scan.valid_at_ns);
-                self.renew(odometry)?;
-                Ok(true)
-            }
-            None if self.surveyor.is_given() && self.map.is_none() => self.renew(odometry).map(|()| true),
-            Some(_) | None => Ok(false),
+        Ok(decision)
+    }
+
+    /// Hands odometry to all parts.
+    pub fn hear_odometry(&mut self, message: &OdometryMessage<M::Command>) {
+        self.mail.odometry(message);
+    }
+
+    /// Hands a scan to whoever maps.
+    pub fn hear_scan(&mut self, message: ScanMessage) {
+        self.mail.scan(message);
+    }
+
+    /// Directs the vehicle otherwise from now on; the first mission is that of [`Setup`].
+    pub fn order(&mut self, order: Order, now_ns: u64) -> Result<(), OrderRefusal> {
+        self.n_orders += 1;
+        let said = Said { at_ns: now_ns, sender_ns: 0, sequence: self.n_orders };
+        let taken = self.leader.hear_order(Ok(order), said, now_ns);
+        self.tell_mission(now_ns);
+        taken
+    }
+
+    /// Follows the mission by the odometry that has come, and says what is to be done when that is due.
+    pub fn lead(&mut self, now_ns: u64) {
+        for message in self.mail.to_leader.drain(..) {
+            self.leader.hear_odometry(&message);
+        }
+        if self.leader.is_due(now_ns) {
+            self.tell_mission(now_ns);
         }
     }
 
-    /// The command for now, or the reason for none. `now_ns` is on the clock of the measurements.
-    pub fn decide(&mut self, now_ns: u64) -> Decision<M::Command> {
-        let time_to_goal = self.assessor.last_time_to_goal();
-        // What was given lies in the frame of the map, whatever the localisation says.
-        let odometry_at_ns = if self.surveyor.is_given() { u64::MAX } else { self.map_at_ns };
-        let goal_m = self.goal_m;
-        let chart =
-            self.map.as_ref().map(|map| Chart { map: map.view(), time_to_goal, goal_m, odometry_at_ns });
-        let decision = self.pilot.decide(now_ns, chart, &self.mission.instruction());
-        self.surveyor.note_command(decision.command(M::Command::default()).speed_mps());
-        if let Some(pose) = self.pilot.take_stuck() {
-            self.assessor.note_stuck(pose);
-            // The pose is of now; a map of before a jump takes it in when it is renewed.
-            if let Some(map) = self.map.as_mut().filter(|_| !self.is_map_behind) {
-                map.fill(|risks, _| self.assessor.amend(risks));
+    fn tell_mission(&mut self, now_ns: u64) {
+        self.n_missions += 1;
+        let id = MessageId { epoch_ns: EPOCH_NS, sequence: self.n_missions };
+        self.mail.mission(&self.leader.tell(id, now_ns));
+    }
+
+    /// Maps what has come; returns whether anything new was seen. While nobody else judges, physics does.
+    pub fn survey(&mut self, now_ns: u64) -> Result<bool, NavigatorError> {
+        let mut has_seen = false;
+        while let Some(message) = self.mail.to_surveyor.pop_front() {
+            if let Some(header) = self.surveyor.hear_odometry(&message)? {
+                has_seen |= header.jump.is_none();
+                self.tell_surface(header, now_ns)?;
             }
         }
-        decision
+        while let Some(scan) = self.mail.scans.pop_front() {
+            self.surveyor.hear_scan(scan, now_ns);
+        }
+        while let Some(header) = self.surveyor.next_surface(now_ns)? {
+            has_seen = true;
+            self.tell_surface(header, now_ns)?;
+        }
+        let Some((physics, stand_in)) = &mut self.physics else { return Ok(has_seen) };
+        if std::mem::take(&mut self.mail.has_learned) {
+            stand_in.note_heard(now_ns);
+        }
+        if let Some(mail) = &mut self.mail.physics {
+            physics.hear(mail)?;
+        }
+        Ok(has_seen)
+    }
+
+    fn tell_surface(&mut self, header: SurfaceHeader, now_ns: u64) -> Result<(), NavigatorError> {
+        self.n_surfaces += 1;
+        let id = MessageId { epoch_ns: EPOCH_NS, sequence: self.n_surfaces };
+        let header = SurfaceHeader { id, ..header };
+        self.mail.surface(header);
+        let Some((physics, stand_in)) = &mut self.physics else { return Ok(()) };
+        physics.hear_surface(&header);
+        if stand_in.is_needed(now_ns) {
+            physics.judge(&header, self.surveyor.surface())?;
+        }
+        Ok(())
+    }
+
+    /// Judges the newest map of the ground that has come, and at once a place where the vehicle got stuck; returns whether
+    /// there is another risk map now.
+    pub fn assess(&mut self) -> Result<bool, NavigatorError> {
+        for header in &self.mail.surfaces {
+            self.learned.hear_surface(header);
+        }
+        let newest = self.mail.surfaces.drain(..).next_back();
+        let is_stuck = self.learned.hear(&mut self.mail.learned)?;
+        let is_told = match newest {
+            Some(header) => self.learned.judge(&header, self.surveyor.surface())?,
+            None => is_stuck && self.learned.publish()?,
+        };
+        self.mail.has_learned |= is_told;
+        Ok(is_told)
+    }
+
+    /// Decides on what has come.
+    pub fn answer(&mut self, now_ns: u64) -> DecisionMessage<M::Command> {
+        for message in self.mail.to_pilot.drain(..) {
+            self.pilot.hear_odometry(&message);
+        }
+        if let Some(mission) = self.mail.mission_to_pilot.take() {
+            self.pilot.hear_mission(&mission);
+        }
+        let maps = RiskMessages {
+            learned: self.learned.message(),
+            physics: self.physics.as_ref().and_then(|(physics, _)| physics.message()),
+        };
+        let answer = self.pilot.answer(now_ns, &maps);
+        if let Some((valid_at_ns, pose)) = answer.stuck {
+            self.n_stuck += 1;
+            let id = MessageId { epoch_ns: EPOCH_NS, sequence: self.n_stuck };
+            self.mail.stuck(&StuckMessage { id, valid_at_ns, pose });
+        }
+        answer
+    }
+
+    /// From now on samples at most `n` futures a decision; see [`Controller::use_rollouts`].
+    pub fn use_rollouts(&mut self, n: usize) {
+        self.pilot.use_rollouts(n);
+    }
+
+    /// What the vehicle is told to do.
+    pub fn mission(&self) -> &Mission {
+        self.leader.mission()
+    }
+
+    /// Physics' risk map, where somebody stands in and has had to.
+    pub fn stand_in_map(&self) -> Option<RiskMessage<'_>> {
+        self.physics.as_ref().and_then(|(physics, _)| physics.message())
+    }
+
+    /// The risk map with what it says of itself and the least times to the goal.
+    pub fn risk(&self) -> Option<RiskMessage<'_>> {
+        self.learned.message()
     }
 
     /// The ground as it is known.
@@ -199,7 +330,7 @@ impl<M: Driven> Navigator<M> {
     /// The risk map as the controller reads it, once there is one. After a jump of the localisation it lies where it
     /// lay, until the next scan, and the controller drives on it as if there had been none.
     pub fn risk_map(&self) -> Option<RiskMapView<'_>> {
-        self.map.as_ref().map(RiskMap::view)
+        self.learned.view()
     }
 
     /// The controller, for its diagnostics and rollouts.
@@ -221,47 +352,4 @@ impl<M: Driven> Navigator<M> {
     pub fn refused(&self) -> &BTreeMap<StopReason, u64> {
         self.surveyor.refused()
     }
-
-    /// Fuses a scan where the vehicle was at its time; false when nobody knows where, or nothing in it is usable.
-    fn survey(&mut self, odometry: &Odometry, scan: &Scan) -> Result<bool, NavigatorError> {
-        if self.surveyor.is_given() {
-            return self.surveyor.fuse(odometry, scan);
-        }
-        match self.surveyor.place(scan.valid_at_ns) {
-            Ok(Whereabouts::Between(there) | Whereabouts::Ahead(Some(there))) => {
-                self.surveyor.fuse(&there, scan)
-            }
-            Ok(Whereabouts::Ahead(None) | Whereabouts::Unknown) => {
-                self.surveyor.note_unplaced();
-                Ok(false)
-            }
-            Err(_) => Ok(false),
-        }
-    }
-
-    /// Brings risk map and cost-to-go up to date with the surface.
-    fn renew(&mut self, odometry: &Odometry) -> Result<(), NavigatorError> {
-        self.surveyor.assume_ground(odometry)?;
-        (self.map_at_ns, self.is_map_behind) = (odometry.valid_at_ns, false);
-        let changed = self.surveyor.take_changed();
-        let position_m = [odometry.position_m[0], odometry.position_m[1]];
-        self.assessor.update(position_m, self.surveyor.surface(), &changed)?;
-        let Some(known) = self.assessor.known() else { return Ok(()) };
-        let map =
-            self.map.get_or_insert_with(|| RiskMap::constant(known.geometry, known.n_yaws, Risk::OUTSIDE));
-        take_over(map, &known);
-        map.fill(|risks, _| self.assessor.amend(risks));
-        self.goal_m = self.mission.target().map_or(self.goal_m, |target| target.end().goal_m);
-        self.assessor.time_to_goal(map.view(), self.goal_m)?;
-        Ok(())
-    }
-}
-
-fn take_over(map: &mut RiskMap, known: &RiskMapView<'_>) {
-    let GridGeometry { origin, .. } = known.geometry;
-    map.place_at(origin);
-    map.fill(|risks, ground| {
-        risks.copy_from_slice(known.risks);
-        ground.copy_from_slice(known.ground);
-    });
 }

@@ -2,30 +2,32 @@
 
 use std::collections::BTreeMap;
 
-use bicycle::{
-    Applied, AppliedBy, Decision, HoldReason, Model, MotionCommand, MotionState, Odometry, SensorModel,
-    StopReason,
-};
+use bicycle::{Applied, AppliedBy, Decision, HoldReason, Model, MotionState, Odometry, StopReason};
 use mppi::{Controller, CostToGoView, Driven, Input, Objective, ReferencePath, Terminal};
 use traversability::RiskMapView;
 
-use crate::frame::Frame;
-use crate::guard::{Admitted, Guard};
+use crate::choice::is_learned;
+use crate::guard::Admitted;
+use crate::input_ledger::InputLedger;
+use crate::message::TIMELESS_NS;
 use crate::risk::StuckPose;
 use crate::route::PATH_END_SHARE;
-use crate::{CORNERS_MAX, Config, Instruction, Jump, NavigatorError, Target};
+use crate::{
+    CORNERS_MAX, Config, DecisionMessage, Instruction, Jump, MissionMessage, NavigatorError, OdometryMessage,
+    RiskAuthor, RiskHeader, RiskMessage, RiskMessages, Target,
+};
 
 /// What the pilot drives on.
 #[derive(Clone, Copy, Debug)]
-pub struct Chart<'a> {
+struct Chart<'a> {
     /// Risk around the vehicle.
-    pub map: RiskMapView<'a>,
+    map: RiskMapView<'a>,
     /// Least time to the goal over it.
-    pub time_to_goal: CostToGoView<'a>,
+    time_to_goal: CostToGoView<'a>,
     /// The goal that it leads to, as it was said [m]; to any other the straight line is taken.
-    pub goal_m: [f64; 2],
+    goal_m: [f64; 2],
     /// Time of the odometry in whose frame both lie [ns]; later jumps of the localisation have left them behind.
-    pub odometry_at_ns: u64,
+    odometry_at_ns: u64,
 }
 
 /// Where to go.
@@ -37,18 +39,32 @@ pub struct Destination {
     pub tolerance_m: f64,
 }
 
+/// How old what a pilot is told may be [ns].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct PilotAges {
+    /// Scan of a learned map beyond which physics' map is driven on, if that knows of a younger one.
+    pub learned_ns: u64,
+    /// Mission that is not repeated.
+    pub mission_ns: u64,
+}
+
+impl Default for PilotAges {
+    /// Of scans five times a second, and a mission that is said again every second.
+    fn default() -> Self {
+        Self { learned_ns: 600_000_000, mission_ns: 2_500_000_000 }
+    }
+}
+
 /// Watches what comes in and asks the controller. The motion model decides what a command is.
 pub struct Pilot<M: Driven = Model> {
-    guard: Guard,
-    frame: Frame,
-    sensors: SensorModel,
+    ledger: InputLedger,
+    ages: PilotAges,
+    mission: Option<MissionMessage>,
     controller: Controller<M>,
     /// Of the chart that the controller was asked on last, in whose frame it remembers places [ns].
     chart_at_ns: Option<u64>,
     /// Corners of a path in the frame of the chart; their memory is kept.
     corners_m: Vec<[f64; 2]>,
-    odometry: Option<Odometry>,
-    fault: Option<StopReason>,
     decided_at_ns: Option<u64>,
     elapsed_s: f64,
     cycle: u64,
@@ -61,14 +77,12 @@ impl<M: Driven> Pilot<M> {
         config.validate()?;
         let model = model.with_attitude_share(config.attitude_share);
         Ok(Self {
-            guard: Guard::new(config.guard),
-            frame: Frame::default(),
-            sensors: model.sensors(),
+            ledger: InputLedger::new(&config.guard, model.sensors()),
+            ages: PilotAges::default(),
+            mission: None,
             controller: Controller::new(config.controller.clone(), model, seed)?,
             chart_at_ns: None,
             corners_m: Vec::with_capacity(CORNERS_MAX),
-            odometry: None,
-            fault: None,
             decided_at_ns: None,
             elapsed_s: 0.0,
             cycle: 0,
@@ -76,33 +90,94 @@ impl<M: Driven> Pilot<M> {
         })
     }
 
-    /// Takes in where the vehicle says it is, and corrects it by what the model believes of the sensors. What cannot be
-    /// used is remembered as the reason for the next decision. Returns the jump of the localisation that it made out;
-    /// on maps of before the vehicle is carried to where it stands from then on.
-    pub fn admit(&mut self, measured: &Odometry) -> Option<Jump> {
-        let odometry = self.sensors.corrected(measured);
-        match self.guard.admit_odometry(&odometry) {
-            Ok(admitted) => {
-                self.fault = None;
-                self.odometry = Some(odometry);
-                self.follow(odometry.valid_at_ns, admitted)
-            }
-            Err(reason) => {
-                self.fault = Some(reason);
-                None
-            }
+    /// The same for inputs that may be so old.
+    pub fn with_ages(self, ages: PilotAges) -> Self {
+        Self { ages, ..self }
+    }
+
+    /// Takes in where the vehicle is and what its actuators were told. What cannot be used is the reason for the next
+    /// decision.
+    pub fn hear_odometry(&mut self, message: &OdometryMessage<M::Command>) {
+        self.note_applied(&message.applied);
+        if let Ok(Admitted::ClockSetBack) = self.ledger.take(message) {
+            self.chart_at_ns = None;
         }
     }
 
-    /// Notes when the scan was measured that the map knows of.
-    pub fn note_scan(&mut self, valid_at_ns: u64) {
-        self.guard.note_scan(valid_at_ns);
+    /// Takes in what the vehicle is told to do. It counts until it is said again, or is too old.
+    pub fn hear_mission(&mut self, mission: &MissionMessage) {
+        self.mission = Some(*mission);
+    }
+
+    /// When the mission was said last [ns]; `None` before the first time.
+    pub fn mission_said_at_ns(&self) -> Option<u64> {
+        self.mission.map(|mission| mission.valid_at_ns)
+    }
+
+    /// The decision for now, on what has come in and one of the maps that there are.
+    pub fn answer(&mut self, now_ns: u64, maps: &RiskMessages<'_>) -> DecisionMessage<M::Command> {
+        let cycle = self.cycle;
+        let chosen = self.choose(now_ns, maps);
+        let used = chosen.and_then(|(author, map)| Some((author, map.header, chart(map)?)));
+        if let Some((_, header, _)) = used {
+            self.note_map(header.valid_at_ns);
+        }
+        // A copy, because deciding changes everything else.
+        let mission = self.mission;
+        let instruction =
+            mission.as_ref().map_or(Instruction::Stand(Decision::Hold(HoldReason::NoMission)), |mission| {
+                mission.instruction(now_ns, self.ages.mission_ns)
+            });
+        let destination = match &instruction {
+            Instruction::Drive(target) => Some(target.end()),
+            Instruction::Stand(_) => None,
+        };
+        let decision = self.decide(now_ns, used.map(|(.., chart)| chart), &instruction);
+        // On maps of before a jump the vehicle was carried to where it stands there; the pose is one of now.
+        let odometry_at_ns = self.ledger.frame_at_ns();
+        let id_of = |map: &Option<RiskMessage<'_>>| map.map_or_else(Default::default, |map| map.header.id);
+        DecisionMessage {
+            decision,
+            cycle,
+            decided_at_ns: now_ns,
+            odometry: self.ledger.take_count(),
+            odometry_at_ns,
+            risk: used.map(|(author, header, _)| (author, header)),
+            held: [id_of(&maps.learned), id_of(&maps.physics)],
+            mission: mission.map_or_else(Default::default, |mission| mission.id),
+            destination,
+            n_rollouts: self.controller.n_rollouts(),
+            elapsed_s: self.elapsed_s,
+            stuck: self.stuck.take().map(|pose| (odometry_at_ns, pose)),
+            state: self.ledger.odometry().map(Odometry::state).unwrap_or_default(),
+        }
+    }
+
+    /// The map to drive on: what was learned while it is fresh, else whatever knows of the younger scan.
+    fn choose<'a>(&self, now_ns: u64, maps: &RiskMessages<'a>) -> Option<(RiskAuthor, RiskMessage<'a>)> {
+        let [learned_at_ns, physics_at_ns] =
+            [maps.learned, maps.physics].map(|map| map.map(|map| map.header.valid_at_ns));
+        if is_learned(learned_at_ns, physics_at_ns, now_ns, self.ages.learned_ns) {
+            maps.learned.map(|map| (RiskAuthor::Learned, map))
+        } else {
+            maps.physics.map(|map| (RiskAuthor::Physics, map))
+        }
+    }
+
+    /// What was given whole never gets old.
+    fn note_map(&mut self, valid_at_ns: u64) {
+        let newest_ns = self.ledger.frame_at_ns();
+        self.note_scan(if valid_at_ns == TIMELESS_NS { newest_ns } else { valid_at_ns });
+    }
+
+    fn note_scan(&mut self, valid_at_ns: u64) {
+        self.ledger.note_scan(valid_at_ns);
     }
 
     /// The command for now, or the reason for none. `now_ns` is on the clock of the measurements.
     ///
     /// What is wrong with the measurements is the more urgent reason to stand, and a map that is missing the less urgent.
-    pub fn decide(
+    fn decide(
         &mut self,
         now_ns: u64,
         chart: Option<Chart<'_>>,
@@ -117,15 +192,14 @@ impl<M: Driven> Pilot<M> {
                 decision
             }
         };
-        self.guard.note_command(decision.command(M::Command::default()).speed_mps());
         self.decided_at_ns = Some(now_ns);
         self.cycle += 1;
         decision
     }
 
-    /// The pose where the last decision found the vehicle stuck, once.
-    pub fn take_stuck(&mut self) -> Option<StuckPose> {
-        self.stuck.take()
+    /// Decisions so far.
+    pub fn cycle(&self) -> u64 {
+        self.cycle
     }
 
     /// From now on samples at most `n` futures a decision; see [`Controller::use_rollouts`].
@@ -140,44 +214,17 @@ impl<M: Driven> Pilot<M> {
 
     /// The odometry, corrected, that the next decision would act on.
     pub fn odometry(&self) -> Option<&Odometry> {
-        self.odometry.as_ref()
+        self.ledger.odometry()
     }
 
     /// How many measurements were refused, by reason.
     pub fn refused(&self) -> &BTreeMap<StopReason, u64> {
-        self.guard.refused()
+        self.ledger.refused()
     }
 
-    /// Decisions so far.
-    pub fn cycle(&self) -> u64 {
-        self.cycle
-    }
-
-    /// Time from the decision before the last one to the last one [s].
-    pub fn elapsed_s(&self) -> f64 {
-        self.elapsed_s
-    }
-
-    fn follow(&mut self, at_ns: u64, admitted: Admitted) -> Option<Jump> {
-        match admitted {
-            Admitted::Jumped(jump) => {
-                self.frame.note(at_ns, &jump);
-                Some(jump)
-            }
-            Admitted::ClockSetBack => {
-                self.frame.forget();
-                self.chart_at_ns = None;
-                None
-            }
-            Admitted::Onward | Admitted::Again => None,
-        }
-    }
-
-    /// Takes in what the actuators were told last, as the vehicle says with the odometry that [`Pilot::admit`] is to be
-    /// shown next. Delays are replayed from it and the next plan starts from it, see [`Controller::note_sent`].
-    pub fn note_applied(&mut self, applied: &Applied<M::Command>) {
+    /// Takes in what the actuators were told last, as the vehicle says with its odometry. Delays are replayed from it and the next plan starts from it, see [`Controller::note_sent`].
+    fn note_applied(&mut self, applied: &Applied<M::Command>) {
         let Applied { command, since_ns, by } = *applied;
-        self.guard.note_command(command.speed_mps());
         let Some(decided_at_ns) = self.decided_at_ns else { return };
         let after_s = since_ns.wrapping_sub(decided_at_ns).cast_signed() as f64 * 1e-9;
         match by {
@@ -193,24 +240,26 @@ impl<M: Driven> Pilot<M> {
         chart: Option<Chart<'a>>,
         instruction: &Instruction<'b>,
     ) -> Result<(Chart<'a>, Odometry, Target<'b>), Decision<M::Command>> {
-        self.fault.map_or_else(|| self.guard.check(now_ns), Err).map_err(Decision::Stop)?;
+        self.ledger.check(now_ns).map_err(Decision::Stop)?;
         let target = match *instruction {
             Instruction::Drive(target) => target,
             Instruction::Stand(Decision::Hold(reason)) => return Err(Decision::Hold(reason)),
             Instruction::Stand(Decision::Stop(reason)) => return Err(Decision::Stop(reason)),
             Instruction::Stand(Decision::Drive(never)) => match never {},
         };
-        let (chart, odometry) = chart.zip(self.odometry).ok_or(Decision::Hold(HoldReason::NoMap))?;
+        let (chart, odometry) =
+            chart.zip(self.ledger.odometry().copied()).ok_or(Decision::Hold(HoldReason::NoMap))?;
         Ok((chart, odometry, target))
     }
 
     fn ask(&mut self, chart: &Chart<'_>, odometry: &Odometry, target: &Target<'_>) -> Decision<M::Command> {
         let before_ns = self.chart_at_ns.replace(chart.odometry_at_ns);
-        if let Some(jump) = before_ns.and_then(|at_ns| self.frame.shift(at_ns, chart.odometry_at_ns)) {
+        if let Some(jump) = before_ns.and_then(|at_ns| self.ledger.moved_between(at_ns, chart.odometry_at_ns))
+        {
             self.controller.carry(|pose| jump.pose(pose));
         }
         // A chart cannot be turned: until the next one, vehicle and target are carried back to where they stood on it.
-        let back = self.frame.since(chart.odometry_at_ns).map(|jump| jump.inverse());
+        let back = self.ledger.moved_since(chart.odometry_at_ns).map(|jump| jump.inverse());
         let was_recovering = self.controller.diagnostics().is_recovering;
         let Self { controller, corners_m, .. } = self;
         let decision = controller.decide(&Input {
@@ -226,6 +275,13 @@ impl<M: Driven> Pilot<M> {
         }
         decision
     }
+}
+
+/// A risk map's message as the controller is asked on it.
+fn chart(map: RiskMessage<'_>) -> Option<Chart<'_>> {
+    let (risk, time_to_goal) = map.content?;
+    let RiskHeader { goal_m, frame_at_ns, .. } = map.header;
+    Some(Chart { map: risk, time_to_goal, goal_m, odometry_at_ns: frame_at_ns })
 }
 
 fn on_chart<S: Into<MotionState> + From<MotionState>>(state: S, back: Option<&Jump>) -> S {

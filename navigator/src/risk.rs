@@ -45,6 +45,15 @@ pub struct StuckPose {
     pub yaw_rad: f64,
 }
 
+impl StuckPose {
+    /// Where it lies after a jump of the localisation.
+    pub fn moved(&self, jump: &Jump) -> Self {
+        let [x_m, y_m] = self.position_m;
+        let [x_m, y_m, yaw_rad] = jump.pose([x_m, y_m, self.yaw_rad]);
+        Self { position_m: [x_m, y_m], yaw_rad }
+    }
+}
+
 /// Poses around a [`StuckPose`] that count as blocked, over the vehicle's length: how far around a point ahead of it.
 const STUCK_AHEAD: f64 = 0.2;
 const STUCK_RADIUS: f64 = 0.25;
@@ -58,7 +67,8 @@ pub(crate) struct RiskLayer {
     author: Author,
     /// Who knows, and the answer for the present window.
     oracle: Option<(RiskOracle, Vec<Risk>)>,
-    stuck: Vec<StuckPose>,
+    /// With the time of the odometry in whose frame each was told [ns].
+    stuck: Vec<(u64, StuckPose)>,
     length_m: f64,
     recentre_cells: i64,
     is_filled: bool,
@@ -122,35 +132,33 @@ impl RiskLayer {
     }
 
     /// Takes who knows better, and the poses that proved stuck, into risks that were taken from the author.
-    pub fn amend(&self, risks: &mut [Risk]) {
+    pub fn correct(&self, risks: &mut [Risk]) {
         if let Some((_, answer)) = &self.oracle {
-            believe(answer, risks);
+            take_over_answer(answer, risks);
         }
         let known = self.author.risk_map().view();
-        for pose in &self.stuck {
+        for (_, pose) in &self.stuck {
             block(risks, &known, pose, self.length_m);
         }
     }
 
-    /// Remembers a pose that proved impassable; of very many, the oldest is forgotten.
-    pub fn note_stuck(&mut self, pose: StuckPose) {
+    /// Remembers a pose that proved impassable, in the frame of this time; of very many, the oldest is forgotten.
+    pub fn note_stuck(&mut self, pose: StuckPose, at_ns: u64) {
         if self.stuck.len() == STUCK_MAX {
             self.stuck.remove(0);
         }
-        self.stuck.push(pose);
+        self.stuck.push((at_ns, pose));
     }
 
     /// The poses that are remembered, the oldest first.
-    pub fn stuck(&self) -> &[StuckPose] {
+    pub fn stuck(&self) -> &[(u64, StuckPose)] {
         &self.stuck
     }
 
-    /// The localisation jumped, and what was remembered in its frame moves along.
-    pub fn follow_jump(&mut self, jump: &Jump) {
-        for pose in &mut self.stuck {
-            let [x_m, y_m] = pose.position_m;
-            let [x_m, y_m, yaw_rad] = jump.pose([x_m, y_m, pose.yaw_rad]);
-            *pose = StuckPose { position_m: [x_m, y_m], yaw_rad };
+    /// The localisation jumped, as odometry of this time showed: what is remembered of before moves along.
+    pub fn follow_jump(&mut self, jump: &Jump, jumped_at_ns: u64) {
+        for (at_ns, pose) in self.stuck.iter_mut().filter(|(at_ns, _)| *at_ns < jumped_at_ns) {
+            (*at_ns, *pose) = (jumped_at_ns, pose.moved(jump));
         }
     }
 
@@ -218,7 +226,7 @@ fn block(risks: &mut [Risk], view: &RiskMapView<'_>, stuck: &StuckPose, length_m
 }
 
 /// Takes over the answer wherever the map knows of neither obstacle nor border.
-fn believe(answer: &[Risk], risks: &mut [Risk]) {
+fn take_over_answer(answer: &[Risk], risks: &mut [Risk]) {
     risks.par_chunks_mut(4096).zip(answer.par_chunks(4096)).for_each(|(risks, answer)| {
         for (risk, answer) in risks.iter_mut().zip(answer).filter(|(risk, _)| **risk == Risk::NONE) {
             *risk = *answer;

@@ -1,18 +1,22 @@
 //! The first part of the pipeline: measurements become a map of the ground.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, VecDeque};
 
-use bicycle::{Geometry, Odometry, SensorModel, StopReason};
+use bicycle::{Geometry, MotionCommand, Odometry, SensorModel, StopReason};
 use terrain::{
-    AssumedGround, CellRegion, ElevationConfig, ElevationMap, Footprint, FuseError, FuseReport, GridMap,
-    Pose, Scan, SurfaceCell,
+    AssumedGround, ElevationConfig, ElevationMap, Footprint, FuseError, FuseReport, GridMap, Mount, Pose,
+    Scan, SurfaceCell,
 };
 
-use crate::guard::{Admitted, Guard, GuardConfig};
+use crate::guard::{Admitted, GuardConfig};
+use crate::input_ledger::InputLedger;
 use crate::jump::Jump;
-use crate::track::{Track, Whereabouts};
-use crate::{NavigatorError, Surface};
+use crate::message::TIMELESS_NS;
+use crate::track::Whereabouts;
+use crate::{MessageId, NavigatorError, OdometryMessage, ScanMessage, Surface, SurfaceHeader};
 
+/// Scans that wait for the odometry after them; of more, the oldest is given up.
+const WAITING_MAX: usize = 4;
 /// Standard deviation of the ground height assumed below a vehicle that has seen nothing yet [m].
 const ASSUMED_HEIGHT_STD_M: f64 = 0.05;
 
@@ -55,16 +59,29 @@ impl ScanTally {
 
 /// Keeps the map of the ground up to date and in the frame of the localisation.
 pub struct Surveyor {
-    guard: Guard,
-    track: Track,
-    sensors: SensorModel,
+    config: GuardConfig,
+    ledger: InputLedger,
+    mounts: Vec<Mount>,
+    waiting: VecDeque<Waiting>,
     elevation: ElevationMap,
     given: Option<GridMap<SurfaceCell>>,
     assumed: AssumedGround,
     has_ground: bool,
+    /// Whether the surface that was given has been told of.
+    has_told: bool,
+    /// The scan that was fused last, and when it was taken [ns].
+    last_scan: Option<(MessageId, u64)>,
     shift: Jump,
     n_jumps: u64,
+    n_unmapped: u64,
     tally: ScanTally,
+}
+
+/// A scan that has come before the odometry of after it.
+struct Waiting {
+    since_ns: u64,
+    id: MessageId,
+    scan: Scan,
 }
 
 impl Surveyor {
@@ -76,9 +93,10 @@ impl Surveyor {
         surface: Surface,
     ) -> Result<Self, NavigatorError> {
         Ok(Self {
-            guard: Guard::new(guard),
-            track: Track::new(&guard),
-            sensors: SensorModel::NEUTRAL,
+            config: guard,
+            ledger: InputLedger::new(&guard, SensorModel::NEUTRAL),
+            mounts: Vec::new(),
+            waiting: VecDeque::with_capacity(WAITING_MAX),
             elevation: ElevationMap::new(elevation)?,
             given: match surface {
                 Surface::Sensed => None,
@@ -86,54 +104,148 @@ impl Surveyor {
             },
             assumed: assumed_ground(vehicle.as_ref()),
             has_ground: false,
+            has_told: false,
+            last_scan: None,
             shift: Jump::NONE,
             n_jumps: 0,
+            n_unmapped: 0,
             tally: ScanTally::default(),
         })
     }
 
     /// The same for odometry that these sensors misstate: all that comes in is corrected first.
     pub fn with_sensors(self, sensors: SensorModel) -> Self {
-        Self { sensors, ..self }
+        Self { ledger: InputLedger::new(&self.config, sensors), ..self }
+    }
+
+    /// The same for scans that come in the frames of these sensors, numbered from 1.
+    pub fn with_mounts(self, mounts: Vec<Mount>) -> Self {
+        Self { mounts, ..self }
+    }
+
+    /// Takes in where the vehicle is. A jump of the localisation moves what was mapped, and makes a map of its own.
+    pub fn hear_odometry<C: MotionCommand>(
+        &mut self,
+        message: &OdometryMessage<C>,
+    ) -> Result<Option<SurfaceHeader>, NavigatorError> {
+        let OdometryMessage { odometry, .. } = message;
+        let Ok(jump) = self.take(message) else { return Ok(None) };
+        if let Some(jump) = jump {
+            self.follow_jump(odometry, &jump)?;
+        }
+        if !self.is_given() {
+            return Ok(jump.map(|jump| self.header(odometry, Some(jump))));
+        }
+        // What was given whole lies where it lies.
+        let is_news = !std::mem::replace(&mut self.has_told, true);
+        Ok(is_news.then(|| self.header(odometry, None)))
+    }
+
+    /// The same, without following the jump that it returns.
+    pub fn take<C: MotionCommand>(
+        &mut self,
+        message: &OdometryMessage<C>,
+    ) -> Result<Option<Jump>, StopReason> {
+        let admitted = self.ledger.take(message)?;
+        Ok(self.follow(admitted))
+    }
+
+    /// Takes in a scan, at this time; [`Surveyor::next_surface`] maps it once it is known where it was taken.
+    pub fn hear_scan(&mut self, message: ScanMessage, now_ns: u64) {
+        let ScanMessage { id, sensor, scan } = message;
+        let mount = (sensor as usize).checked_sub(1).map(|place| self.mounts.get(place));
+        let scan = match mount {
+            None => scan,
+            Some(Some(mount)) => mount.in_body_frame(&scan),
+            Some(None) => {
+                self.n_unmapped += 1;
+                return;
+            }
+        };
+        if self.waiting.len() == WAITING_MAX {
+            self.waiting.pop_front();
+            self.n_unmapped += 1;
+        }
+        self.waiting.push_back(Waiting { since_ns: now_ns, id, scan });
+    }
+
+    /// Maps the next scan of which it is known by now where it was taken, or of which nothing better will come to be known;
+    /// `None` once there is none.
+    pub fn next_surface(&mut self, now_ns: u64) -> Result<Option<SurfaceHeader>, NavigatorError> {
+        while let Some(Waiting { since_ns, id, scan }) = self.waiting.pop_front() {
+            let waited_s = now_ns.saturating_sub(since_ns) as f64 * 1e-9;
+            let there = match self.whereabouts(scan.valid_at_ns) {
+                Ok(Whereabouts::Ahead(_)) if waited_s < self.config.odometry_wait_max_s => {
+                    self.waiting.push_front(Waiting { since_ns, id, scan });
+                    return Ok(None);
+                }
+                Ok(Whereabouts::Between(there) | Whereabouts::Ahead(Some(there))) => Some(there),
+                Ok(Whereabouts::Ahead(None) | Whereabouts::Unknown) => {
+                    self.tally.unplaced += 1;
+                    None
+                }
+                Err(_) => None,
+            };
+            match there {
+                Some(there) if self.fuse(&there, &scan)? => {
+                    self.last_scan = Some((id, scan.valid_at_ns));
+                    return Ok(Some(self.header(&there, None)));
+                }
+                _ => self.n_unmapped += 1,
+            }
+        }
+        Ok(None)
+    }
+
+    /// Where a surface that was given is looked at from, a scan says only when.
+    fn whereabouts(&mut self, scan_at_ns: u64) -> Result<Whereabouts, StopReason> {
+        match self.ledger.measured() {
+            Some(measured) if self.given.is_some() => Ok(Whereabouts::Between(*measured)),
+            _ => self.place(scan_at_ns),
+        }
+    }
+
+    /// What the map as it is now says of itself, but for its name.
+    pub fn header(&mut self, odometry: &Odometry, jump: Option<Jump>) -> SurfaceHeader {
+        let (last_odometry, n_odometry) = self.ledger.take_count();
+        let (scan, scan_at_ns) = self.last_scan.unwrap_or((MessageId::default(), odometry.valid_at_ns));
+        let is_given = self.is_given();
+        SurfaceHeader {
+            id: MessageId::default(),
+            valid_at_ns: if is_given { TIMELESS_NS } else { scan_at_ns },
+            scan,
+            odometry: *odometry,
+            frame_at_ns: if is_given { TIMELESS_NS } else { self.ledger.frame_at_ns() },
+            last_odometry,
+            n_odometry,
+            jump,
+            // What was given lies where it lies, whatever the localisation says.
+            shift: if is_given { Jump::NONE } else { self.shift },
+        }
     }
 
     /// Takes in where the vehicle is; returns the jump of the localisation that it made out, which
     /// [`Surveyor::follow_jump`] then follows. Odometry that cannot be used has its reason.
     pub fn admit(&mut self, odometry: &Odometry) -> Result<Option<Jump>, StopReason> {
-        let admitted = self.guard.admit_odometry(&self.sensors.corrected(odometry))?;
-        let jump = match admitted {
-            Admitted::Onward => None,
-            Admitted::Again => return Ok(None),
-            Admitted::Jumped(jump) => {
-                // The sensors' errors are the vehicle's own: they turn and move with it.
-                self.track.follow(&jump);
-                Some(jump)
-            }
+        let admitted = self.ledger.admit(odometry)?;
+        Ok(self.follow(admitted))
+    }
+
+    fn follow(&mut self, admitted: Admitted) -> Option<Jump> {
+        match admitted {
+            Admitted::Jumped(jump) => Some(jump),
             Admitted::ClockSetBack => {
-                self.track.forget();
                 self.elevation.forget_time();
                 None
             }
-        };
-        self.track.note(odometry);
-        Ok(jump)
+            Admitted::Onward | Admitted::Again => None,
+        }
     }
 
     /// Where the vehicle was when a scan was taken, as its odometry tells. A scan that is older than the last usable
     /// one, or ahead of the odometry, has its reason.
     pub fn place(&mut self, scan_at_ns: u64) -> Result<Whereabouts, StopReason> {
-        self.guard.admit_scan(scan_at_ns)?;
-        Ok(self.track.at(scan_at_ns))
-    }
-
-    /// Notes a scan that came from a time at which nobody knows where the vehicle was.
-    pub fn note_unplaced(&mut self) {
-        self.tally.unplaced += 1;
-    }
-
-    /// Notes what the vehicle was told, so that standing still on purpose is not taken for frozen odometry.
-    pub fn note_command(&mut self, speed_mps: f32) {
-        self.guard.note_command(speed_mps);
+        self.ledger.place(scan_at_ns)
     }
 
     /// Fuses a scan that was taken at this odometry; returns whether there was anything usable in it. One that shows
@@ -151,7 +263,7 @@ impl Surveyor {
                 Err(error) => return Err(error.into()),
             }
         }
-        self.guard.note_scan(scan.valid_at_ns);
+        self.ledger.note_scan(scan.valid_at_ns);
         self.assume_ground(odometry)?;
         Ok(true)
     }
@@ -176,20 +288,14 @@ impl Surveyor {
         self.given.is_some()
     }
 
-    /// What changed of the surface since the last call.
-    pub fn take_changed(&mut self) -> CellRegion {
-        let changed = if self.is_given() { None } else { self.elevation.take_changed() };
-        changed.unwrap_or(CellRegion { rows: 0..0, cols: 0..0 })
-    }
-
     /// How often the localisation corrected itself by a jump.
     pub fn n_jumps(&self) -> u64 {
         self.n_jumps
     }
 
-    /// All jumps together: where a place of the first frame lies now.
-    pub fn shift(&self) -> Jump {
-        self.shift
+    /// Scans that made no map, those of unknown sensors among them.
+    pub fn n_unmapped(&self) -> u64 {
+        self.n_unmapped
     }
 
     /// What became of the scans so far.
@@ -199,11 +305,11 @@ impl Surveyor {
 
     /// How many measurements were refused, by reason.
     pub fn refused(&self) -> &BTreeMap<StopReason, u64> {
-        self.guard.refused()
+        self.ledger.refused()
     }
 
     /// Once, as soon as the place is known: the ground carries the vehicle.
-    pub(crate) fn assume_ground(&mut self, odometry: &Odometry) -> Result<(), NavigatorError> {
+    fn assume_ground(&mut self, odometry: &Odometry) -> Result<(), NavigatorError> {
         if !std::mem::replace(&mut self.has_ground, true) {
             self.elevation.assume_ground(&self.pose(odometry), &self.assumed)?;
         }
@@ -212,7 +318,7 @@ impl Surveyor {
 
     /// Where the vehicle is, once its sensors are corrected.
     fn pose(&self, odometry: &Odometry) -> Pose {
-        let Odometry { position_m, attitude_rad, .. } = self.sensors.corrected(odometry);
+        let Odometry { position_m, attitude_rad, .. } = self.ledger.corrected(odometry);
         let ([x_m, y_m, z_m], [roll_rad, pitch_rad, yaw_rad]) = (position_m, attitude_rad);
         Pose { x_m, y_m, z_m, roll_rad, pitch_rad, yaw_rad }
     }

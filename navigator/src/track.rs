@@ -31,11 +31,11 @@ pub(crate) struct Track {
 }
 
 impl Track {
-    /// Keeps as much as scans may be old.
+    /// Keeps as much as scans may be old, in memory that is taken once.
     pub fn new(config: &GuardConfig) -> Self {
         let nanoseconds = |time_s: f64| (time_s * 1e9) as u64;
         Self {
-            samples: VecDeque::new(),
+            samples: VecDeque::with_capacity(SAMPLES_MAX),
             kept_ns: nanoseconds(config.scan_age_max_s),
             gap_max_ns: nanoseconds(config.odometry_age_max_s),
             ahead_max_ns: nanoseconds(config.extrapolation_max_s),

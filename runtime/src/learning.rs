@@ -8,8 +8,8 @@ use crate::RuntimeError;
 use crate::mapping::{LEARNED, risk_elements, send_risk};
 use crate::online::{Judge, School, SchoolSetup, Told};
 use crate::risk_maker::RiskMaker;
-use bus::channel::{Bus, Inlet, MISSION, Outlet, RISK, STUCK, SURFACE};
-use bus::clock;
+use bus::channel::{Bus, Inlet, MISSION, Message, Outlet, RISK, STUCK, SURFACE};
+use bus::clock::{self, Clock};
 use bus::message::{MissionRecord, RiskHeader, Stamp, StuckRecord, SurfaceHeader};
 use bus::status::{Health, Meter, Role};
 
@@ -67,7 +67,9 @@ pub fn run_and_learn(
     Ok(())
 }
 
-struct Learning {
+/// The assessor and its channels, stepped by whoever has its clock.
+pub struct Learning {
+    clock: Clock,
     maker: RiskMaker,
     school: Option<School>,
     surfaces: Inlet<SurfaceHeader, [f32; 8]>,
@@ -81,10 +83,15 @@ struct Learning {
 }
 
 impl Learning {
-    fn new(bus: &Bus, setup: &LearningSetup<'_>) -> Result<Self, RuntimeError> {
+    /// Nothing has been judged yet.
+    ///
+    /// # Errors
+    /// A channel that cannot be used, settings that cannot be.
+    pub fn new(bus: &Bus, setup: &LearningSetup<'_>) -> Result<Self, RuntimeError> {
         let LearningSetup { vehicle, config, belief, checkpoint, level, limits } = setup;
         let assessor = Assessor::new(vehicle, limits, config, belief, *level)?;
         Ok(Self {
+            clock: bus.clock().clone(),
             maker: RiskMaker::new(assessor, LEARNED, *checkpoint),
             school: None,
             surfaces: bus.inlet(&SURFACE)?,
@@ -117,36 +124,46 @@ impl Learning {
         school.repeat()
     }
 
-    fn look(&mut self) -> Result<(), RuntimeError> {
+    /// Takes in what has come. What is judged is sent, so that whoever has the messages knows all that was judged; and where
+    /// the vehicle got stuck is told at once.
+    pub fn look(&mut self) -> Result<(), RuntimeError> {
         let maker = &mut self.maker;
-        let mut followed = Ok(());
-        self.missions.poll(|_, missions| {
-            missions.iter().for_each(|mission| {
-                followed = std::mem::replace(&mut followed, Ok(())).and_then(|()| maker.follow(mission));
-            });
+        let newest = self.surfaces.newest_of(|header| maker.hear_surface(header));
+        let mut is_stuck = false;
+        self.stuck.poll(|stamp, stuck| {
+            stuck.iter().for_each(|stuck| maker.note_stuck(stamp, stuck));
+            is_stuck = true;
         });
-        followed?;
-        // What is judged is sent, so that whoever has the messages knows all that was judged.
-        if let Some(surface) = self.surfaces.newest().filter(|_| maker.has_goal()) {
-            let began_ns = clock::now_ns();
-            let header = surface.header();
-            self.stuck.poll(|stamp, stuck| stuck.iter().for_each(|stuck| maker.note_stuck(stamp, stuck)));
-            match maker.update(header, surface.payload())? {
-                Ok(()) => send_risk(maker, &mut self.outlet, header.stamp.valid_at_ns)?,
-                Err(_) => self.n_malformed += 1,
+        maker.hear_missions(&mut self.missions)?;
+        match newest {
+            Some(surface) if maker.has_goal() => self.judge(&surface)?,
+            None if is_stuck => {
+                let valid_at_ns = self.last_surface.map_or(0, |stamp| stamp.valid_at_ns);
+                send_risk(maker, &mut self.outlet, valid_at_ns)?;
             }
-            if let Some(school) = &mut self.school {
-                school.note_surface(header, surface.payload());
-            }
-            self.last_surface = Some(header.stamp);
-            self.took_s = clock::age_s(clock::now_ns(), began_ns);
-            self.meter.count(began_ns.saturating_sub(header.stamp.published_at_ns));
+            Some(_) | None => {}
         }
         self.report()
     }
 
+    fn judge(&mut self, surface: &Message<SurfaceHeader, [f32; 8]>) -> Result<(), RuntimeError> {
+        let began_ns = self.clock.now_ns();
+        let header = surface.header();
+        match self.maker.update(header, surface.payload())? {
+            Ok(()) => send_risk(&mut self.maker, &mut self.outlet, header.stamp.valid_at_ns)?,
+            Err(_) => self.n_malformed += 1,
+        }
+        if let Some(school) = &mut self.school {
+            school.note_surface(header, surface.payload());
+        }
+        self.last_surface = Some(header.stamp);
+        self.took_s = clock::age_s(self.clock.now_ns(), began_ns);
+        self.meter.count(began_ns.saturating_sub(header.stamp.published_at_ns));
+        Ok(())
+    }
+
     fn report(&mut self) -> Result<(), RuntimeError> {
-        let now_ns = clock::now_ns();
+        let now_ns = self.clock.now_ns();
         let surface_s = self.last_surface.map_or(-1.0, |stamp| clock::age_s(now_ns, stamp.valid_at_ns));
         let (took_s, n_malformed) = (self.took_s, self.n_malformed);
         let counts = [self.surfaces.counts(), self.missions.counts(), self.stuck.counts()];

@@ -8,8 +8,8 @@
 
 pub mod ages;
 pub mod budget;
-mod choice;
 pub mod control;
+pub mod convert;
 mod error;
 mod intake;
 pub mod learning;

@@ -8,12 +8,11 @@ mod way;
 use bicycle::Decision;
 use formats::DriveTopics;
 use foxglove::{Context, WebSocketServer, WebSocketServerHandle};
-use navigator::Chart;
 use serde::Serialize;
 use terrain::Pose;
 
 use crate::RuntimeError;
-use crate::control::chart_of;
+use crate::convert::risk_message;
 use bus::channel::{Bus, COMMAND, Inlet, MISSION, ODOMETRY, RISK, RISK_PHYSICS, SURFACE};
 use bus::clock::{self, SECOND_NS};
 use bus::message::{
@@ -175,7 +174,7 @@ impl Seen {
 
     /// The risk of the present heading, and the way of least time over that map.
     fn risk(&mut self, topics: &DriveTopics, header: &RiskHeader, elements: &[[f32; 4]]) {
-        let Some(Chart { map, time_to_goal, .. }) = chart_of(header, elements) else { return };
+        let Some((map, time_to_goal)) = risk_message(header, elements).content else { return };
         let Some(odometry) = self.odometry else { return };
         if is_due(&mut self.risk_at_ns, header.stamp.published_at_ns, MAP_NS) {
             topics.risk(header.stamp.valid_at_ns, &map, odometry.attitude_rad[2]);

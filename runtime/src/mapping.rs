@@ -2,20 +2,19 @@
 
 use std::collections::VecDeque;
 
-use bicycle::{Model, Odometry, SensorModel, Vehicle};
-use navigator::{Assessor, Belief, Config, Jump, Surface, Surveyor, Whereabouts};
-use terrain::{Mount, Scan};
+use bicycle::{Model, SensorModel, Vehicle};
+use navigator::{Assessor, Belief, Config, MessageId, StandIn, Surface, Surveyor};
 use traversability::CvarLevel;
 
 use crate::RuntimeError;
+use crate::convert::{odometry_message, scan_message, surface_record};
 use crate::intake::Intake;
 use crate::risk_maker::RiskMaker;
 use bus::ages::AgeLimits;
 use bus::channel::{Bus, Inlet, MISSION, ODOMETRY, Outlet, RISK, RISK_PHYSICS, SCAN, STUCK, SURFACE};
-use bus::clock;
+use bus::clock::{self, Clock};
 use bus::message::{
-    Grid, MissionRecord, OdometryRecord, PointRecord, RiskHeader, ScanHeader, Source, Stamp, StuckRecord,
-    SurfaceHeader,
+    MissionRecord, OdometryRecord, PointRecord, RiskHeader, ScanHeader, Stamp, StuckRecord, SurfaceHeader,
 };
 use bus::payload::{self, RiskParts};
 use bus::status::{Health, Meter, Role};
@@ -31,8 +30,8 @@ pub const PHYSICS: u64 = 2;
 
 /// Time between two looks at the channels [ns].
 const POLL_NS: u64 = 2_000_000;
-/// Scans that wait for the odometry after them; of more, the oldest is given up.
-const WAITING_MAX: usize = 4;
+/// Scans whose time of sending is remembered: as many as may wait to be mapped.
+const SCANS_KEPT: usize = 4;
 
 /// What maps.
 pub struct MappingSetup<'a> {
@@ -58,172 +57,114 @@ pub fn run(bus: &Bus, setup: &MappingSetup<'_>, is_over: &dyn Fn() -> bool) -> R
     Ok(())
 }
 
-struct Mapping {
+/// The surveyor and its channels, stepped by whoever has its clock.
+pub struct Mapping {
+    clock: Clock,
     surveyor: Surveyor,
-    mounts: Vec<Mount>,
-    waiting: VecDeque<Waiting>,
-    wait_max_ns: u64,
     intake: Intake,
     odometry: Inlet<Stamp, OdometryRecord>,
     scans: Inlet<ScanHeader, PointRecord>,
     surfaces: Outlet<SurfaceHeader, [f32; 8]>,
     fallback: Fallback,
     meter: Meter,
-    last_scan: Option<Stamp>,
-    last_odometry: Option<Stamp>,
-    /// Scans that made no map, those of unknown sensors among them.
-    n_unmapped: u64,
-}
-
-/// A scan that has come before the odometry of after it.
-struct Waiting {
-    since_ns: u64,
-    stamp: Stamp,
-    scan: Scan,
+    /// When scans of late were sent [ns].
+    sent: VecDeque<(MessageId, u64)>,
+    /// When the newest scan was taken that was mapped, and the newest odometry [ns].
+    newest_ns: [Option<u64>; 2],
 }
 
 /// Physics' own risk map, made while nobody hears of learning.
 struct Fallback {
     maker: RiskMaker,
+    stand_in: StandIn,
     learned: Inlet<RiskHeader, [f32; 4]>,
     missions: Inlet<Stamp, MissionRecord>,
     stuck: Inlet<Stamp, StuckRecord>,
     outlet: Outlet<RiskHeader, [f32; 4]>,
-    silence_max_ns: u64,
-    began_ns: u64,
 }
 
 impl Mapping {
-    fn new(bus: &Bus, setup: &MappingSetup<'_>) -> Result<Self, RuntimeError> {
+    /// Nothing has been mapped yet.
+    ///
+    /// # Errors
+    /// A channel that cannot be used, settings that cannot be.
+    pub fn new(bus: &Bus, setup: &MappingSetup<'_>) -> Result<Self, RuntimeError> {
         let MappingSetup { vehicle, config, model, .. } = setup;
         let n_cells = config.elevation.n_rows * config.elevation.n_cols;
         Ok(Self {
+            clock: bus.clock().clone(),
             surveyor: Surveyor::new(vehicle, config.elevation, config.guard, Surface::Sensed)?
-                .with_sensors(SensorModel::of(&model.effects)),
-            mounts: config.sensors.clone(),
-            waiting: VecDeque::with_capacity(WAITING_MAX),
-            wait_max_ns: clock::nanoseconds(config.guard.odometry_wait_max_s),
+                .with_sensors(SensorModel::of(&model.effects))
+                .with_mounts(config.sensors.clone()),
             intake: Intake::default(),
             odometry: bus.inlet(&ODOMETRY)?,
             scans: bus.inlet(&SCAN)?,
             surfaces: bus.outlet(&SURFACE, n_cells)?,
             fallback: Fallback::new(bus, setup)?,
             meter: Meter::new(bus, Role::Mapping)?,
-            last_scan: None,
-            last_odometry: None,
-            n_unmapped: 0,
+            sent: VecDeque::with_capacity(SCANS_KEPT),
+            newest_ns: [None; 2],
         })
     }
 
     /// Takes in what has come, and tells what became of it.
-    fn look(&mut self) -> Result<(), RuntimeError> {
+    pub fn look(&mut self) -> Result<(), RuntimeError> {
+        let now_ns = self.clock.now_ns();
         let mut odometry = Vec::new();
         self.odometry.poll(|stamp, records| odometry.extend(records.first().map(|record| (*stamp, *record))));
         for (stamp, record) in odometry {
-            self.follow(&stamp, &record)?;
-        }
-        let (waiting, n_unmapped, mounts) = (&mut self.waiting, &mut self.n_unmapped, &self.mounts);
-        self.scans.poll(|header, points| {
-            let Some(scan) = header.scan(points, mounts) else {
-                *n_unmapped += 1;
-                return;
-            };
-            if waiting.len() == WAITING_MAX {
-                waiting.pop_front();
-                *n_unmapped += 1;
+            self.intake.note(&stamp, &record);
+            self.newest_ns[1] = Some(stamp.valid_at_ns);
+            if let Some(header) = self.surveyor.hear_odometry(&odometry_message(&stamp, &record))? {
+                self.tell(&header, now_ns)?;
             }
-            waiting.push_back(Waiting { since_ns: clock::now_ns(), stamp: header.stamp, scan });
+        }
+        let (surveyor, sent) = (&mut self.surveyor, &mut self.sent);
+        self.scans.poll(|header, points| {
+            let message = scan_message(header, points);
+            if sent.len() == SCANS_KEPT {
+                sent.pop_front();
+            }
+            sent.push_back((message.id, header.stamp.published_at_ns));
+            surveyor.hear_scan(message, now_ns);
         });
-        self.take_waiting()?;
-        self.fallback.listen()?;
+        while let Some(header) = self.surveyor.next_surface(now_ns)? {
+            self.newest_ns[0] = Some(header.valid_at_ns);
+            let sent_at_ns = self.sent.iter().find(|(id, _)| *id == header.scan).map(|(_, at_ns)| *at_ns);
+            self.meter.count(now_ns.saturating_sub(sent_at_ns.unwrap_or(now_ns)));
+            self.tell(&header, now_ns)?;
+        }
+        self.fallback.listen(now_ns)?;
         self.report()
     }
 
-    fn follow(&mut self, stamp: &Stamp, record: &OdometryRecord) -> Result<(), RuntimeError> {
-        self.last_odometry = Some(*stamp);
-        let Ok(Some(jump)) = self.intake.show(&mut self.surveyor, stamp, record) else { return Ok(()) };
-        let odometry = record.odometry(stamp.valid_at_ns);
-        self.surveyor.follow_jump(&odometry, &jump)?;
-        let scan = self.last_scan;
-        self.tell(&odometry, Event::Jumped(jump), scan)
-    }
-
-    /// Fuses the scans for which it is known by now where they were taken, or for which nothing better will come.
-    fn take_waiting(&mut self) -> Result<(), RuntimeError> {
-        while let Some(Waiting { since_ns, stamp, scan }) = self.waiting.pop_front() {
-            let is_over = clock::now_ns().saturating_sub(since_ns) >= self.wait_max_ns;
-            let there = match self.surveyor.place(scan.valid_at_ns) {
-                Ok(Whereabouts::Ahead(_)) if !is_over => {
-                    self.waiting.push_front(Waiting { since_ns, stamp, scan });
-                    break;
-                }
-                Ok(Whereabouts::Between(there) | Whereabouts::Ahead(Some(there))) => Some(there),
-                Ok(Whereabouts::Ahead(None) | Whereabouts::Unknown) => {
-                    self.surveyor.note_unplaced();
-                    None
-                }
-                Err(_) => None,
-            };
-            let is_mapped = there.map_or(Ok(false), |there| self.fuse(&there, &stamp, &scan))?;
-            self.n_unmapped += u64::from(!is_mapped);
-        }
-        Ok(())
-    }
-
-    /// Returns whether there was anything to map.
-    fn fuse(&mut self, there: &Odometry, stamp: &Stamp, scan: &Scan) -> Result<bool, RuntimeError> {
-        let began_ns = clock::now_ns();
-        if !self.surveyor.fuse(there, scan)? {
-            return Ok(false);
-        }
-        self.last_scan = Some(*stamp);
-        self.tell(there, Event::Fused, Some(*stamp))?;
-        self.meter.count(began_ns.saturating_sub(stamp.published_at_ns));
-        Ok(true)
-    }
-
     /// Writes the map as it is now where its readers will read it.
-    fn tell(&mut self, odometry: &Odometry, event: Event, scan: Option<Stamp>) -> Result<(), RuntimeError> {
+    fn tell(&mut self, header: &navigator::SurfaceHeader, now_ns: u64) -> Result<(), RuntimeError> {
         let surface = self.surveyor.surface();
         let cells = surface.values();
         let mut loan = self.surfaces.write(cells.len(), |place| payload::cell_numbers(&cells[place]))?;
-        let (event, jump) = match event {
-            Event::Fused => (FUSED, Jump::NONE),
-            Event::Jumped(jump) => (JUMPED, jump),
-        };
-        let mut header = SurfaceHeader {
-            grid: Grid::from(surface.geometry()),
-            scan: scan.map_or(Source::default(), |stamp| stamp.source()),
-            event,
+        let mut record = SurfaceHeader {
+            odometry_hash: self.intake.take_hash(),
             content_hash: payload::content_hash(loan.payload()),
-            ..SurfaceHeader::default()
+            ..surface_record(header, surface.geometry())
         };
-        self.intake.tell(&self.surveyor, odometry, &jump, &mut header);
-        *loan.header_mut() = header;
-        // A jump moves what was seen; it is no news of the ground.
-        let valid_at_ns = scan.map_or(odometry.valid_at_ns, |stamp| stamp.valid_at_ns);
-        let is_needed = self.fallback.is_needed();
-        let told = is_needed.then(|| loan.payload().to_vec());
-        header.stamp = self.surfaces.send(loan, valid_at_ns)?;
-        told.map_or(Ok(()), |told| self.fallback.speak(&header, &told))
+        *loan.header_mut() = record;
+        let told = self.fallback.is_needed(now_ns).then(|| loan.payload().to_vec());
+        record.stamp = self.surfaces.send(loan, header.valid_at_ns)?;
+        self.fallback.maker.hear_surface(&record);
+        told.map_or(Ok(()), |told| self.fallback.speak(&record, &told))
     }
 
     fn report(&mut self) -> Result<(), RuntimeError> {
-        let now_ns = clock::now_ns();
-        let age_s =
-            |stamp: &Option<Stamp>| stamp.map_or(-1.0, |stamp| clock::age_s(now_ns, stamp.valid_at_ns));
-        let age_s = [age_s(&self.last_odometry), age_s(&self.last_scan), -1.0, -1.0];
-        let (n_missed, figure) = (self.n_unmapped, self.surveyor.n_jumps() as f64);
+        let now_ns = self.clock.now_ns();
+        let [scan_s, odometry_s] =
+            self.newest_ns.map(|at_ns| at_ns.map_or(-1.0, |at_ns| clock::age_s(now_ns, at_ns)));
+        let age_s = [odometry_s, scan_s, -1.0, -1.0];
+        let (n_missed, figure) = (self.surveyor.n_unmapped(), self.surveyor.n_jumps() as f64);
         let counts = [self.odometry.counts(), self.scans.counts()];
         let health = Health { age_s, n_missed, figure, ..Health::default() };
         Ok(self.meter.report(now_ns, || counts.into_iter().fold(health, Health::with))?)
     }
-}
-
-/// What changed the map.
-enum Event {
-    Fused,
-    Jumped(Jump),
 }
 
 impl Fallback {
@@ -232,30 +173,24 @@ impl Fallback {
         let assessor = Assessor::new(vehicle, &model.limits, config, &Belief::Physics, *level)?;
         Ok(Self {
             maker: RiskMaker::new(assessor, PHYSICS, 0),
+            stand_in: StandIn::new(bus.clock().now_ns(), ages.learning_silence_ns),
             learned: bus.inlet(&RISK)?,
             missions: bus.inlet(&MISSION)?,
             stuck: bus.inlet(&STUCK)?,
             outlet: bus.outlet(&RISK_PHYSICS, risk_elements(config))?,
-            silence_max_ns: ages.learning_silence_ns,
-            began_ns: clock::now_ns(),
         })
     }
 
-    fn listen(&mut self) -> Result<(), RuntimeError> {
-        self.learned.poll(|_, _| ());
-        let (maker, mut followed) = (&mut self.maker, Ok(()));
-        self.missions.poll(|_, missions| {
-            missions.iter().for_each(|mission| {
-                followed = std::mem::replace(&mut followed, Ok(())).and_then(|()| maker.follow(mission));
-            });
-        });
+    fn listen(&mut self, now_ns: u64) -> Result<(), RuntimeError> {
+        let stand_in = &mut self.stand_in;
+        self.learned.poll(|_, _| stand_in.note_heard(now_ns));
+        let maker = &mut self.maker;
         self.stuck.poll(|stamp, stuck| stuck.iter().for_each(|stuck| maker.note_stuck(stamp, stuck)));
-        Ok(followed?)
+        Ok(maker.hear_missions(&mut self.missions)?)
     }
 
-    fn is_needed(&self) -> bool {
-        let heard_at_ns = self.learned.heard_at_ns().unwrap_or(self.began_ns);
-        self.maker.has_goal() && clock::now_ns().saturating_sub(heard_at_ns) > self.silence_max_ns
+    fn is_needed(&self, now_ns: u64) -> bool {
+        self.maker.has_goal() && self.stand_in.is_needed(now_ns)
     }
 
     fn speak(&mut self, header: &SurfaceHeader, cells: &[[f32; 8]]) -> Result<(), RuntimeError> {

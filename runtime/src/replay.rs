@@ -11,13 +11,13 @@ use std::sync::Arc;
 
 use bicycle::lanes::{Instructions, IsaAbsent};
 use evidential::Checkpoint;
-use navigator::{Belief, NavigatorError, Pilot};
+use navigator::{Belief, NavigatorError, Pilot, PilotAges, RiskMessages};
 use traversability::CvarLevel;
 
-use crate::control;
-use crate::mission::Heard;
+use crate::convert::{decision_record, odometry_message, risk_message};
+use crate::mapping::PHYSICS;
 use crate::setup::{MachineSetup, SetupError};
-use bus::message::{CommandRecord, DecisionRecord, Source};
+use bus::message::{DecisionRecord, Source};
 use choice::Choice;
 use maps::{Maps, Unmade};
 pub use records::{Key, ReadError, Records, recorded_decision, recorded_stamp};
@@ -149,8 +149,10 @@ pub fn replay(records: &Records, knowledge: &Knowledge) -> Result<ReplayReport, 
         if !goes_on {
             life = Some(Life {
                 epoch_ns: key.epoch_ns,
-                pilot: Pilot::new(machine.model.clone(), &machine.config, seed)?,
-                mission_age_max_ns: setup.ages.mission_ns,
+                pilot: Pilot::new(machine.model.clone(), &machine.config, seed)?.with_ages(PilotAges {
+                    learned_ns: setup.ages.learned_ns,
+                    mission_ns: setup.ages.mission_ns,
+                }),
                 choice: Choice::new(&records.risks, setup.ages.learned_ns, key.epoch_ns),
                 is_lost: false,
             });
@@ -171,7 +173,6 @@ pub fn replay(records: &Records, knowledge: &Knowledge) -> Result<ReplayReport, 
 struct Life<'a> {
     epoch_ns: u64,
     pilot: Pilot,
-    mission_age_max_ns: u64,
     choice: Choice<'a>,
     /// Something that a decision was made from is missing: what its memory holds from then on is not known.
     is_lost: bool,
@@ -206,29 +207,23 @@ impl Life<'_> {
                 }
             },
         };
-        let mission = match records.mission(record.mission) {
-            Ok(mission) => mission,
-            Err(missing) => {
-                self.lose(missing, report);
-                Heard::default()
-            }
-        };
+        match records.mission(record.mission) {
+            Ok(mission) => mission.iter().for_each(|mission| self.pilot.hear_mission(mission)),
+            Err(missing) => self.lose(missing, report),
+        }
         if self.is_lost {
             report.n_unmade += 1;
             return Ok(());
         }
-        let chart = made.and_then(|made| {
-            self.pilot.note_scan(made.header.stamp.valid_at_ns);
-            control::chart_of(&made.header, &made.payload)
-        });
-        let scan_at_ns = made.map_or(0, |made| made.header.stamp.valid_at_ns);
-        let instruction = mission.instruction(record.decided_at_ns, self.mission_age_max_ns);
+        // The one that was used: which of the two it had to be is judged by the choice.
+        let map = made.map(|made| risk_message(&made.header, &made.payload));
+        let maps = match record.author {
+            PHYSICS => RiskMessages { learned: None, physics: map },
+            _ => RiskMessages { learned: map, physics: None },
+        };
         self.pilot.use_rollouts(record.n_rollouts as usize);
-        let decision = self.pilot.decide(record.decided_at_ns, chart, &instruction);
-        // Learning was told by a message of its own, which was recorded.
-        self.pilot.take_stuck();
-        let odometry_at_ns = self.pilot.odometry().map_or(0, |odometry| odometry.valid_at_ns);
-        let made = CommandRecord::from(&decision).decided_on(odometry_at_ns, scan_at_ns);
+        // A stuck pose was told to learning by a message of its own, which was recorded.
+        let made = decision_record(&self.pilot.answer(record.decided_at_ns, &maps)).command;
         if bytemuck::bytes_of(&made) == bytemuck::bytes_of(&record.command) {
             report.n_identical += 1;
         } else {
@@ -253,7 +248,7 @@ impl Life<'_> {
             let Some((stamp, odometry)) = records.odometry.get(&Key { epoch_ns, sequence }) else {
                 return Some(format!("odometry {sequence}"));
             };
-            control::show(&mut self.pilot, stamp, odometry);
+            self.pilot.hear_odometry(&odometry_message(stamp, odometry));
         }
         None
     }

@@ -197,8 +197,8 @@ fn drive(isa: Isa) -> [u64; 3] {
     let mut commands = Vec::new();
     for cycle in 0..N_CYCLES {
         let (odometry, scan) = measured(cycle);
-        assert!(navigator.observe(&odometry, Some(&scan)).unwrap());
-        match navigator.decide(odometry.valid_at_ns + 20_000_000) {
+        assert!(navigator.observe(odometry.valid_at_ns, &odometry, Some(&scan)).unwrap());
+        match navigator.decide(odometry.valid_at_ns + 20_000_000).unwrap() {
             Decision::Drive(command) => commands.extend([command.speed_mps, command.steering_rad]),
             other => panic!("cycle {cycle}: expected a command, found {other:?}"),
         }

@@ -18,7 +18,7 @@ use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
 
 use super::failures::Failures;
 use super::{Channel, ChannelError, Element, Header, Inlet, Outlet, THIRD_PARTIES};
-use crate::clock::{self, SECOND_NS};
+use crate::clock::{self, Clock, SECOND_NS};
 
 /// Where shared memory lies.
 const SHARED_MEMORY: &str = "/dev/shm";
@@ -106,6 +106,7 @@ impl RunName {
 pub struct Bus {
     node: Node<ipc::Service>,
     manner: Manner,
+    clock: Clock,
 }
 
 /// What a process is among the others of a run.
@@ -160,7 +161,17 @@ impl Bus {
         let config = config(run).map_err(refused)?;
         let builder = NodeBuilder::new().config(&config).signal_handling_mode(SignalHandlingMode::Disabled);
         let node = builder.create::<ipc::Service>().map_err(|error| refused(error.to_string()))?;
-        Ok(Self { node, manner })
+        Ok(Self { node, manner, clock: Clock::Monotonic })
+    }
+
+    /// The same by another clock, which all processes of the run go by.
+    pub fn with_clock(self, clock: Clock) -> Self {
+        Self { clock, ..self }
+    }
+
+    /// The clock by which messages are stamped and judged.
+    pub fn clock(&self) -> &Clock {
+        &self.clock
     }
 
     /// The way into a channel, for messages of up to `n_max` elements. There is one at a time, whatever process has it;
@@ -190,7 +201,7 @@ impl Bus {
                 error => open_error(channel.name, error),
             })?;
         // Later than that of every publisher before: the place was free only then.
-        Ok(Outlet::new(channel.name, publisher, failures, (clock::now_ns(), n_max)))
+        Ok(Outlet::new(channel.name, publisher, failures, n_max, self.clock.clone()))
     }
 
     /// Waits for the place of a publisher that may just have died. What is left of one that cannot be cleared away keeps
@@ -226,7 +237,7 @@ impl Bus {
                     error => open_error(channel.name, error),
                 },
             )?;
-        Ok(Inlet::new(channel, service, subscriber, failures))
+        Ok(Inlet::new(channel, service, subscriber, failures, self.clock.clone()))
     }
 
     /// Clears away what dead processes of the run have left behind. What fails may be another process that does the same

@@ -10,7 +10,7 @@ use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
 
 use super::failures::Failures;
 use super::{Channel, Element, Header};
-use crate::clock;
+use crate::clock::Clock;
 use crate::message::{LAYOUT_VERSION, Stamp};
 
 /// Publishers whose memory is remembered: those of the present, and of late.
@@ -126,6 +126,7 @@ pub struct Inlet<H: Header, T: Element> {
     service: PortFactory<ipc::Service, [T], H>,
     subscriber: Subscriber<ipc::Service, [T], H>,
     failures: Failures,
+    clock: Clock,
     /// Most elements of a message of each publisher, as it said before it sent any.
     capacities: Vec<(UniquePublisherId, usize)>,
     check: fn(&H, &[T]) -> Result<(), Refusal>,
@@ -143,11 +144,13 @@ impl<H: Header, T: Element> Inlet<H, T> {
         service: PortFactory<ipc::Service, [T], H>,
         subscriber: Subscriber<ipc::Service, [T], H>,
         failures: Failures,
+        clock: Clock,
     ) -> Self {
         Self {
             service,
             subscriber,
             failures,
+            clock,
             capacities: Vec::with_capacity(CAPACITIES_KEPT),
             check: channel.check,
             heard: None,
@@ -178,7 +181,7 @@ impl<H: Header, T: Element> Inlet<H, T> {
             if self.is_within_memory(&message) {
                 copy.extend_from_slice(message.payload());
             }
-            if self.admit(&message, &copy, clock::now_ns()) {
+            if self.admit(&message, &copy, self.clock.now_ns()) {
                 take(&message.header, &copy);
             }
         }
@@ -187,12 +190,18 @@ impl<H: Header, T: Element> Inlet<H, T> {
 
     /// The newest waiting message that counts, to be read in place for as long as it is kept.
     pub fn newest(&mut self) -> Option<Message<H, T>> {
+        self.newest_of(|_| ())
+    }
+
+    /// The same, after a look at the header of every waiting message that counts, the oldest first.
+    pub fn newest_of(&mut self, mut look: impl FnMut(&H)) -> Option<Message<H, T>> {
         self.collect();
         let mut batch = std::mem::take(&mut self.batch);
         let mut newest = None;
         for message in batch.drain(..) {
             let payload = if self.is_within_memory(&message) { message.payload() } else { &[] };
-            if self.admit(&message, payload, clock::now_ns()) {
+            if self.admit(&message, payload, self.clock.now_ns()) {
+                look(&message.header);
                 newest = Some(message);
             }
         }

@@ -7,7 +7,7 @@ use iceoryx2::sample_mut::SampleMut;
 
 use super::failures::Failures;
 use super::{ChannelError, Element, Header};
-use crate::clock;
+use crate::clock::Clock;
 use crate::message::{LAYOUT_VERSION, Stamp};
 
 /// The way into a channel.
@@ -18,6 +18,7 @@ pub struct Outlet<H: Header, T: Element> {
     epoch_ns: u64,
     n_sent: u64,
     n_max: usize,
+    clock: Clock,
 }
 
 /// A message that lies in shared memory already and can still be changed.
@@ -45,9 +46,10 @@ impl<H: Header, T: Element> Outlet<H, T> {
         channel: &'static str,
         publisher: Publisher<ipc::Service, [T], H>,
         failures: Failures,
-        (epoch_ns, n_max): (u64, usize),
+        n_max: usize,
+        clock: Clock,
     ) -> Self {
-        Self { channel, publisher, failures, epoch_ns, n_sent: 0, n_max }
+        Self { channel, publisher, failures, epoch_ns: clock.now_ns(), n_sent: 0, n_max, clock }
     }
 
     /// Failures of the transport so far: readers that are there and could not be reached.
@@ -80,7 +82,7 @@ impl<H: Header, T: Element> Outlet<H, T> {
             epoch_ns: self.epoch_ns,
             sequence: self.n_sent,
             valid_at_ns,
-            published_at_ns: clock::now_ns(),
+            published_at_ns: self.clock.now_ns(),
         };
         *loan.0.user_header_mut().stamp_mut() = stamp;
         loan.0.send().map_err(|error| self.failed(error))?;

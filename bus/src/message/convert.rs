@@ -187,14 +187,19 @@ impl PointRecord {
 }
 
 impl ScanHeader {
-    /// The scan in the body frame, of the returns that are of a known class; `None` of a sensor that is not among
-    /// `mounts`.
-    pub fn scan(&self, points: &[PointRecord], mounts: &[Mount]) -> Option<Scan> {
-        let scan = Scan {
+    /// The scan in the frame of its sensor, of the returns that are of a known class.
+    pub fn sensor_scan(&self, points: &[PointRecord]) -> Scan {
+        Scan {
             valid_at_ns: self.stamp.valid_at_ns,
             origin_m: self.origin_m,
             points: points.iter().filter_map(PointRecord::point).collect(),
-        };
+        }
+    }
+
+    /// The scan in the body frame, of the returns that are of a known class; `None` of a sensor that is not among
+    /// `mounts`.
+    pub fn scan(&self, points: &[PointRecord], mounts: &[Mount]) -> Option<Scan> {
+        let scan = self.sensor_scan(points);
         match (self.sensor as usize).checked_sub(1) {
             None => Some(scan),
             Some(place) => mounts.get(place).map(|mount| mount.in_body_frame(&scan)),

@@ -72,6 +72,7 @@ fn run_mission(arguments: &UpArguments, machine: &Machine, ages: AgeLimits) -> a
         beginning,
         tolerance_m,
         model: &machine.model,
+        guard: machine.config.guard,
         periods: robot::periods(arguments),
         ages,
         areas: machine.config.areas.clone(),

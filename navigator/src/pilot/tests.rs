@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
 use super::*;
-use crate::{GuardConfig, RiskMapConfig};
+use crate::{GuardConfig, MessageId, RiskMapConfig};
 use bicycle::{Command, Geometry, Limits, State};
 use mppi::{CostToGo, CostToGoConfig};
 use physics_prior::PriorConfig;
@@ -58,6 +58,8 @@ struct Drive {
     field: CostToGo,
     goal_m: [f64; 2],
     state: State,
+    /// What it says that it was told last.
+    applied: Applied,
     cycle: u64,
 }
 
@@ -71,17 +73,20 @@ impl Drive {
         let goal_m = [18.0, 0.0];
         field.update(map.view(), goal_m).unwrap();
         let state = State { x_m: -15.0, speed_mps: SPEED_MPS, ..State::default() };
-        Self { pilot: Pilot::new(model, &config, 1).unwrap(), map, field, goal_m, state, cycle: 0 }
+        let applied = Applied { command: Command::default(), since_ns: 0, by: AppliedBy::Command };
+        Self { pilot: Pilot::new(model, &config, 1).unwrap(), map, field, goal_m, state, applied, cycle: 0 }
     }
 
     fn measure(&mut self) {
-        self.pilot.admit(&Odometry {
+        let odometry = Odometry {
             valid_at_ns: self.cycle * CYCLE_NS,
             position_m: [self.state.x_m, self.state.y_m, 0.0],
             velocity_mps: [self.state.speed_mps, 0.0],
             wheel_speed_mps: self.state.speed_mps,
             ..Odometry::default()
-        });
+        };
+        let id = MessageId { epoch_ns: 1, sequence: self.cycle + 1 };
+        self.pilot.hear_odometry(&OdometryMessage { id, odometry, applied: self.applied });
         self.pilot.note_scan(self.cycle * CYCLE_NS);
     }
 
@@ -95,8 +100,16 @@ impl Drive {
         let destination = Destination { goal_m: self.goal_m, tolerance_m: 0.5 };
         let instruction = Instruction::Drive(Target::Goal(destination));
         let decision = self.pilot.decide(self.cycle * CYCLE_NS, Some(chart), &instruction);
+        self.carry_out(&decision);
         self.cycle += 1;
         decision
+    }
+
+    fn carry_out(&mut self, decision: &Decision) {
+        let command = decision.command(self.applied.command);
+        if (command, AppliedBy::Command) != (self.applied.command, self.applied.by) {
+            self.applied = Applied { command, since_ns: self.cycle * CYCLE_NS, by: AppliedBy::Command };
+        }
     }
 
     /// A vehicle without slip or lag drives where it is told to, for so many cycles.
@@ -110,6 +123,7 @@ impl Drive {
                 odometry_at_ns: u64::MAX,
             };
             let decided = self.pilot.decide(self.cycle * CYCLE_NS, Some(chart), instruction);
+            self.carry_out(&decided);
             let command = decided.command(Command::default());
             let (speed_mps, steering_rad) = (f64::from(command.speed_mps), f64::from(command.steering_rad));
             self.state.x_m += CYCLE_S * speed_mps * self.state.yaw_rad.cos();
@@ -159,7 +173,7 @@ fn what_was_applied_instead_of_a_decision_is_what_the_next_plan_starts_from() {
     drive.state.speed_mps = 0.0;
     let standing = Applied { command: Command::default(), since_ns: 0, by: AppliedBy::Vehicle };
     for _ in 0..40 {
-        drive.pilot.note_applied(&standing);
+        drive.applied = standing;
         drive.measure();
         let Decision::Drive(command) = drive.decide() else { panic!("level ground") };
         let start = drive.planned_from();
@@ -168,7 +182,7 @@ fn what_was_applied_instead_of_a_decision_is_what_the_next_plan_starts_from() {
         assert!((0.0..=BRAKES_MPS2 * CYCLE_S + 1e-6).contains(&f64::from(command.speed_mps)), "{command:?}");
         assert!(!drive.pilot.controller().diagnostics().is_recovering);
     }
-    assert!(drive.pilot.take_stuck().is_none());
+    assert!(drive.pilot.stuck.is_none());
 }
 
 /// The watchdog stops it for half a second in which nothing is decided, and follows again what comes then.
@@ -185,7 +199,7 @@ fn a_stop_of_the_vehicles_own_is_known_with_its_time() {
     // It has been told to stop for 0.2 s: for the first tenth of what is on its way the last command is, then rest.
     let stop = Command { speed_mps: 0.0, ..last };
     let stopped_ns = drive.cycle * CYCLE_NS - 200_000_000;
-    drive.pilot.note_applied(&Applied { command: stop, since_ns: stopped_ns, by: AppliedBy::Vehicle });
+    drive.applied = Applied { command: stop, since_ns: stopped_ns, by: AppliedBy::Vehicle };
     drive.measure();
     drive.decide();
     let start = drive.planned_from();

@@ -1,9 +1,10 @@
 //! Between missions, orders and the messages that tell of them.
 
-use navigator::{Mission, Order, OrderRefusal, Route, Said, Stage, Target};
+use navigator::{Mission, MissionMessage, Order, OrderRefusal, Route, Said, Stage};
 use traversability::CvarLevel;
 
-use bus::message::mission::{CANCELLED, DRIVE, EMERGENCY_STOP, MANUAL, NONE, PAUSED, REACHED, UNDER_WAY};
+use crate::convert::mission_record;
+use bus::message::mission::{CANCELLED, REACHED, UNDER_WAY};
 use bus::message::{MissionRecord, OrderHeader};
 
 /// Numbers of [`OrderHeader::kind`].
@@ -20,46 +21,20 @@ const TOLERATE: u64 = 9;
 /// Of orders that lead nowhere.
 const NO_POINTS: &[[f64; 2]] = &[];
 
-/// What a mission is at. Its time, and what became of orders, are left out.
-pub fn record_of(mission: &Mission) -> MissionRecord {
+/// What a mission is at, as `told` of it. Its time, and what became of orders, are left out.
+pub fn record_of(mission: &Mission, told: &MissionMessage) -> MissionRecord {
     let (leg, n_legs) = mission.progress();
-    let record = MissionRecord {
+    MissionRecord {
         outcome: match mission.stage() {
             Stage::Idle | Stage::Driving | Stage::Paused => UNDER_WAY,
             Stage::Reached => REACHED,
             Stage::Cancelled => CANCELLED,
         },
-        state: state_of(mission),
         number: mission.number(),
         leg: leg as u64,
         n_legs: n_legs as u64,
-        alpha: mission.level().map_or(0.0, CvarLevel::get),
         n_refused: mission.refused().values().sum(),
-        ..MissionRecord::default()
-    };
-    mission.target().map_or(record, |target| with_target(record, &target))
-}
-
-fn with_target(mut record: MissionRecord, target: &Target<'_>) -> MissionRecord {
-    let end = target.end();
-    (record.goal_m, record.tolerance_m) = (end.goal_m, end.tolerance_m);
-    if let Target::Path(path) = target {
-        record.path_speed_mps = path.speed_mps;
-        record.n_corners = path.points_m.len() as u64;
-        for (place, [x_m, y_m]) in path.points_m.iter().enumerate() {
-            (record.corner_x_m[place], record.corner_y_m[place]) = (*x_m, *y_m);
-        }
-    }
-    record
-}
-
-fn state_of(mission: &Mission) -> u64 {
-    match (mission.is_latched(), mission.is_manual(), mission.stage()) {
-        (true, ..) => EMERGENCY_STOP,
-        (_, true, _) => MANUAL,
-        (.., Stage::Paused) => PAUSED,
-        (.., Stage::Driving) => DRIVE,
-        (.., Stage::Idle | Stage::Reached | Stage::Cancelled) => NONE,
+        ..mission_record(told)
     }
 }
 
@@ -131,6 +106,9 @@ mod tests {
     #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
     use super::*;
+    use crate::convert::mission_message;
+    use bus::message::Stamp;
+    use navigator::MessageId;
 
     fn orders() -> Vec<Order> {
         let points_m = vec![[1.0, 2.0], [30.0, 4.0]];
@@ -161,6 +139,19 @@ mod tests {
         assert_eq!(order_of(&nowhere, &[]), Err(OrderRefusal::Malformed));
         let reckless = OrderHeader { kind: TOLERATE, alpha: 0.0, ..OrderHeader::default() };
         assert_eq!(order_of(&reckless, &[]), Err(OrderRefusal::Malformed));
+    }
+
+    /// What control hears is what the mission says, whatever was ordered.
+    #[test]
+    fn every_mission_survives_the_way() {
+        let mut mission = Mission::new(0);
+        for (place, order) in orders().into_iter().enumerate() {
+            let said = Said { sequence: place as u64 + 1, ..Said::default() };
+            mission.order(order.clone(), said, 0).ok();
+            let stamp = Stamp { epoch_ns: 3, sequence: 4, valid_at_ns: 5, ..Stamp::default() };
+            let told = MissionMessage::of(&mission, MessageId { epoch_ns: 3, sequence: 4 }, 5);
+            assert_eq!(mission_message(&stamp, &record_of(&mission, &told)), told, "{order:?}");
+        }
     }
 
     #[test]

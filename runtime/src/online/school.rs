@@ -1,6 +1,6 @@
 //! The part of the learning process that listens to the drive and hears from the thread that learns.
 
-use crate::intake::shift_of;
+use crate::convert::shift_of;
 use std::sync::Arc;
 
 use bicycle::SensorModel;

@@ -4,10 +4,10 @@ use std::collections::BTreeMap;
 use std::ops::Bound;
 
 use super::records::Key;
-use crate::choice::is_learned;
 use crate::mapping::{LEARNED, PHYSICS};
 use bus::clock::SECOND_NS;
 use bus::message::{DecisionRecord, RiskHeader, Source};
+use navigator::is_learned;
 
 /// How long a map may be on its way: its sender may be interrupted between stamping and handing it over [ns].
 const ON_THE_WAY_NS: u64 = SECOND_NS / 4;

@@ -169,6 +169,9 @@ impl Author<'_> {
         machine: &MachineSetup,
     ) -> Result<(), NavigatorError> {
         let source = surface.stamp.source();
+        if let Some((_, maker)) = &mut self.maker {
+            maker.hear_surface(surface);
+        }
         let of_this: Vec<(Key, RiskHeader)> = self
             .headers
             .iter()

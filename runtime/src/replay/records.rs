@@ -7,8 +7,9 @@ use std::sync::Arc;
 
 use bytemuck::AnyBitPattern;
 use evidential::Checkpoint;
+use navigator::MissionMessage;
 
-use crate::mission::Heard;
+use crate::convert::mission_message;
 use crate::online::hash_of;
 use crate::recorder::topic;
 use crate::setup::RecordedSetup;
@@ -137,15 +138,14 @@ impl Records {
         Ok(records)
     }
 
-    /// What a decision knew of where to go; says which message is missing.
-    pub fn mission(&self, source: Source) -> Result<Heard, String> {
-        let mut mission = Heard::default();
-        if source != Source::default() {
-            let (stamp, record) =
-                self.missions.get(&source.into()).ok_or_else(|| format!("mission {}", source.sequence))?;
-            mission.note(stamp, record);
+    /// What a decision knew of where to go, if anything; says which message is missing.
+    pub fn mission(&self, source: Source) -> Result<Option<MissionMessage>, String> {
+        if source == Source::default() {
+            return Ok(None);
         }
-        Ok(mission)
+        let known = self.missions.get(&source.into());
+        let (stamp, record) = known.ok_or_else(|| format!("mission {}", source.sequence))?;
+        Ok(Some(mission_message(stamp, record)))
     }
 
     fn read_file(&mut self, path: &Path) -> Result<(), ReadError> {

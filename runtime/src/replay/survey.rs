@@ -8,7 +8,8 @@ use navigator::{Jump, NavigatorError, Surface, Surveyor, Whereabouts};
 
 use super::difference;
 use super::records::{Key, Records};
-use crate::intake::{Intake, hash_of, jump_of};
+use crate::convert::{jump_of, odometry_message, surface_record};
+use crate::intake::hash_of;
 use crate::mapping::JUMPED;
 use crate::setup::MachineSetup;
 use bus::message::{OdometryRecord, Stamp, SurfaceHeader};
@@ -31,7 +32,6 @@ pub(super) struct Localisation {
 pub(super) struct Survey {
     surveyor: Surveyor,
     mounts: Vec<Mount>,
-    intake: Intake,
     last_map: u64,
     last_odometry: Option<Key>,
     trust: Trust,
@@ -71,7 +71,6 @@ impl Survey {
         Ok(Self {
             surveyor,
             mounts: config.sensors.clone(),
-            intake: Intake::default(),
             last_map: 0,
             last_odometry: None,
             trust: Trust::From(0),
@@ -162,7 +161,7 @@ impl Survey {
     }
 
     fn show(&mut self, stamp: &Stamp, record: &OdometryRecord) -> Option<Jump> {
-        let jump = self.intake.show(&mut self.surveyor, stamp, record).ok()?;
+        let jump = self.surveyor.take(&odometry_message(stamp, record)).ok()?;
         if let Trust::Lost { before } = self.trust {
             let has_moved = before.is_some_and(|before| !is_same_place(&before, record));
             self.trust = if has_moved {
@@ -196,8 +195,8 @@ impl Survey {
         found: &mut Localisation,
     ) {
         let (there, jump) = place.unwrap_or_default();
-        let mut expected = *header;
-        self.intake.tell(&self.surveyor, &there, &jump, &mut expected);
+        let told = self.surveyor.header(&there, (header.event == JUMPED).then_some(jump));
+        let mut expected = surface_record(&told, self.surveyor.surface().geometry());
         if !self.is_shift_known {
             (expected.shift_m, expected.shift_yaw_rad) = (header.shift_m, header.shift_yaw_rad);
         }

@@ -27,7 +27,7 @@ fn on_a_slope_the_vehicle_stops_within_its_time_and_is_held() {
             let speed_mps = closed.episode.motion().velocity_mps[0];
             assert!(speed_mps > 0.5, "{name}: {speed_mps} m/s");
             let (ordered_s, now_ns) = (closed.episode.time_s(), closed.episode.observe().valid_at_ns);
-            closed.navigator.order(order.clone(), now_ns).unwrap().unwrap();
+            closed.navigator.order(order.clone(), now_ns).unwrap();
             let mut stood_s = None;
             let mut stood_m = [0.0; 2];
             while closed.episode.time_s() < ordered_s + 15.0 {

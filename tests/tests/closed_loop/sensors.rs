@@ -1,8 +1,8 @@
 //! What the model knows of its sensors corrects the state that is decided on, and the map.
 
 use bicycle::effect::{OdomScale, PoseLatency, YawMisalign};
-use bicycle::{Effect, Model, Odometry, SensorModel, Vehicle};
-use navigator::{Config, Pilot, Surface, Surveyor};
+use bicycle::{Applied, AppliedBy, Command, Effect, Model, Odometry, SensorModel, Vehicle};
+use navigator::{Config, MessageId, OdometryMessage, Pilot, Surface, Surveyor};
 use scenarios::Deviation;
 use terrain::{RangePoint, Scan, TerrainClass};
 
@@ -50,7 +50,8 @@ fn pilot_decides_on_the_corrected_state() {
     let vehicle = vehicle();
     let model = Model { effects: effects(), ..Model::of(&vehicle) };
     let mut pilot = Pilot::new(model, &Config::for_vehicle(&vehicle), 1).unwrap();
-    pilot.admit(&misstated(3));
+    let applied = Applied { command: Command::default(), since_ns: 0, by: AppliedBy::Command };
+    pilot.hear_odometry(&OdometryMessage { id: MessageId::default(), odometry: misstated(3), applied });
     let (found, expected) = (pilot.odometry().unwrap(), truth(3));
     for axis in 0..3 {
         assert!((found.position_m[axis] - expected.position_m[axis]).abs() < 1e-9, "{found:?}");

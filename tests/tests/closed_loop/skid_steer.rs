@@ -210,8 +210,8 @@ fn drive(world: World, [x_m, y_m, yaw_rad]: [f64; 3], goal_m: [f64; 2], limit_s:
     for cycle in 0..(limit_s / CYCLE_S) as u64 {
         let now_ns = cycle * 100_000_000;
         let scan = eyes.scan(&plant.pose(), cycle, now_ns);
-        navigator.observe(&plant.odometry(now_ns), Some(&scan)).unwrap();
-        let decision = navigator.decide(now_ns);
+        navigator.observe(now_ns, &plant.odometry(now_ns), Some(&scan)).unwrap();
+        let decision = navigator.decide(now_ns).unwrap();
         driven.time_s = cycle as f64 * CYCLE_S;
         driven.is_there = decision == bicycle::Decision::Hold(HoldReason::AtGoal);
         if driven.is_there {

@@ -5,14 +5,14 @@ use std::sync::LazyLock;
 use bicycle::{Command, Decision, Model, Odometry};
 use bus::message::{
     CommandRecord, DecisionRecord, Grid, LAYOUT_VERSION, OdometryRecord, PointRecord, RiskHeader, ScanHeader,
-    Source, Stamp, SurfaceHeader,
+    Stamp, SurfaceHeader,
 };
 use bus::payload::{cell_numbers, content_hash};
 use navigator::{
-    Assessor, Belief, Chart, Config, Destination, Instruction, NavigatorError, Pilot, Surface, Surveyor,
-    Target,
+    Activity, Assessor, Belief, Config, Destination, MissionMessage, NavigatorError, Pilot, PilotAges,
+    RiskMessage, RiskMessages, Surface, Surveyor,
 };
-use runtime::control::chart_of;
+use runtime::convert::{decision_record, id_of, odometry_message, risk_message};
 use runtime::mapping::{FUSED, PHYSICS};
 use runtime::risk_maker::RiskMaker;
 use runtime::setup::MachineSetup;
@@ -62,14 +62,31 @@ pub fn goal() -> Destination {
     Destination { goal_m: [2.0, 1.0], tolerance_m: 0.3 }
 }
 
-/// To drive there.
-pub fn to_goal() -> Instruction<'static> {
-    Instruction::Drive(Target::Goal(goal()))
+/// A controller that has seen nothing and is told, once and for all, to drive there.
+pub fn pilot() -> Pilot {
+    let ages = PilotAges { mission_ns: u64::MAX, ..PilotAges::default() };
+    let mut pilot = Pilot::new(MACHINE.model.clone(), &MACHINE.config, SEED).unwrap().with_ages(ages);
+    pilot.hear_mission(&MissionMessage {
+        id: id_of(stamped(0).source()),
+        valid_at_ns: at_ns(0),
+        activity: Activity::Drive,
+        is_over: false,
+        destination: Some(goal()),
+        path: None,
+        level: None,
+    });
+    pilot
 }
 
-/// A controller that has seen nothing.
-pub fn pilot() -> Pilot {
-    Pilot::new(MACHINE.model.clone(), &MACHINE.config, SEED).unwrap()
+/// Shows a pilot where the machine is.
+pub fn show(pilot: &mut Pilot, odometry: &Odometry) {
+    let stamp = Stamp { valid_at_ns: odometry.valid_at_ns, ..stamped(0) };
+    pilot.hear_odometry(&odometry_message(&stamp, &OdometryRecord::from(odometry)));
+}
+
+/// The only map that there is: one of physics.
+pub fn only(map: RiskMessage<'_>) -> RiskMessages<'_> {
+    RiskMessages { learned: None, physics: Some(map) }
 }
 
 /// What judges the ground, before it has seen any.
@@ -118,8 +135,8 @@ impl Drive {
     }
 
     /// What the controller drives on.
-    pub fn chart(&self) -> Chart<'_> {
-        chart_of(&self.risk.0, &self.risk.1).unwrap()
+    pub fn map(&self) -> RiskMessage<'_> {
+        risk_message(&self.risk.0, &self.risk.1)
     }
 
     /// A risk map as its maker writes it into a message.
@@ -147,35 +164,12 @@ impl Drive {
     /// Two decisions: on the map, and without one.
     fn decided(&self) -> Vec<(Stamp, DecisionRecord)> {
         let mut pilot = pilot();
-        let header = &self.risk.0;
         let mut decide = |cycle: u64, has_map: bool| {
-            pilot.admit(&Self::odometry(cycle));
-            if has_map {
-                pilot.note_scan(header.stamp.valid_at_ns);
-            }
+            let record = OdometryRecord::from(&Self::odometry(cycle));
+            pilot.hear_odometry(&odometry_message(&stamped(cycle), &record));
             pilot.use_rollouts(64);
-            let decision = pilot.decide(at_ns(cycle), has_map.then(|| self.chart()), &to_goal());
-            let used = Some(header).filter(|_| has_map);
-            let record = DecisionRecord {
-                command: CommandRecord {
-                    odometry_at_ns: at_ns(cycle),
-                    scan_at_ns: used.map_or(0, |header| header.stamp.valid_at_ns),
-                    ..CommandRecord::from(&decision)
-                },
-                cycle: cycle - 1,
-                decided_at_ns: at_ns(cycle),
-                odometry: Source { epoch_ns: EPOCH_NS, sequence: cycle + 1 },
-                n_odometry: 1,
-                risk: used.map_or(Source::default(), |header| header.stamp.source()),
-                author: used.map_or(0, |header| header.author),
-                mission: stamped(0).source(),
-                physics: used.map_or(Source::default(), |header| header.stamp.source()),
-                goal_m: goal().goal_m,
-                tolerance_m: goal().tolerance_m,
-                n_rollouts: 64,
-                ..DecisionRecord::default()
-            };
-            (stamped(cycle), record)
+            let maps = if has_map { only(self.map()) } else { RiskMessages::default() };
+            (stamped(cycle), decision_record(&pilot.answer(at_ns(cycle), &maps)))
         };
         vec![decide(1, true), decide(2, false)]
     }

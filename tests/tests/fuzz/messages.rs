@@ -17,16 +17,19 @@ use bytemuck::{AnyBitPattern, NoUninit};
 use evidential::Checkpoint;
 use formats::DriveTopics;
 use foxglove::Context;
-use navigator::{Chart, Guard, GuardConfig, Instruction, Mission, Order, Route, Said, Surface, Surveyor};
+use navigator::{
+    Guard, GuardConfig, Instruction, MessageId, Mission, MissionMessage, Order, Route, Said, Surface,
+    Surveyor,
+};
 use rand::RngExt;
 use runtime::ages::{self, AskedAges};
-use runtime::control::chart_of;
-use runtime::mission::{Heard, order_of, record_of, said_by};
+use runtime::convert::{mission_message, risk_message};
+use runtime::mission::{order_of, record_of, said_by};
 use runtime::timing::Timing;
 use terrain::{Mount, Pose};
 
 use crate::harness::{Fate, Reader, Rng};
-use crate::machine::{Drive, MACHINE, at_ns, goal, judge, pilot, stamped, to_goal};
+use crate::machine::{Drive, MACHINE, at_ns, goal, judge, only, pilot, show, stamped};
 use crate::mutate::{self, once_in};
 use crate::networks;
 
@@ -149,15 +152,17 @@ pub fn read_odometry() -> Reader {
         let mut pilot = pilot();
         for odometry in [Drive::odometry(0), odometry, Drive::odometry(2)] {
             guard.admit_odometry(&odometry).ok();
-            pilot.admit(&odometry);
+            show(&mut pilot, &odometry);
         }
         guard.check(at_ns(2)).ok();
-        let chart = drive.chart();
-        pilot.decide(at_ns(3), Some(Chart { odometry_at_ns: at_ns(1), ..chart }), &to_goal());
+        let mut message = drive.map();
+        message.header.frame_at_ns = at_ns(1);
+        let (map, _) = message.content.unwrap();
+        pilot.answer(at_ns(3), &only(message));
         let [x_m, y_m, z_m] = odometry.position_m;
         let [roll_rad, pitch_rad, yaw_rad] = odometry.attitude_rad;
         topics.pose(stamp.valid_at_ns, &Pose { x_m, y_m, z_m, roll_rad, pitch_rad, yaw_rad });
-        topics.risk(stamp.valid_at_ns, &chart.map, yaw_rad);
+        topics.risk(stamp.valid_at_ns, &map, yaw_rad);
     })
 }
 
@@ -269,13 +274,12 @@ pub fn risk(rng: &mut Rng) -> Vec<u8> {
 pub fn read_risk() -> Reader {
     let topics = DriveTopics::new(&Context::new());
     reader(channel::RISK, move |header: &RiskHeader, elements| {
-        let chart = chart_of(header, elements).unwrap();
-        topics.risk(header.stamp.valid_at_ns, &chart.map, 0.5);
+        let message = risk_message(header, elements);
+        topics.risk(header.stamp.valid_at_ns, &message.content.unwrap().0, 0.5);
         let mut pilot = pilot();
         for k in 0..3 {
-            pilot.admit(&Drive::odometry(k));
-            pilot.note_scan(header.stamp.valid_at_ns);
-            pilot.decide(at_ns(k), Some(chart), &to_goal());
+            show(&mut pilot, &Drive::odometry(k));
+            pilot.answer(at_ns(k), &only(message));
         }
     })
 }
@@ -357,17 +361,16 @@ pub fn read_mission() -> Reader {
     reader(channel::MISSION, move |stamp, records: &[MissionRecord]| {
         let mut maker = judge();
         maker.set_goal(goal().goal_m);
-        maker.follow(&records[0]).unwrap();
+        maker.follow(stamp, &records[0]).unwrap();
         let (header, cells) = drive.surface();
         maker.update(header, cells).unwrap().unwrap();
         let (header, elements) = Drive::risk_of(&mut maker).unwrap();
-        let Some(chart) = chart_of(&header, &elements) else { return };
-        let (mut pilot, mut heard) = (pilot(), Heard::default());
-        pilot.admit(&Drive::odometry(1));
-        heard.note(stamp, &records[0]);
+        let mut pilot = pilot();
+        show(&mut pilot, &Drive::odometry(1));
+        pilot.hear_mission(&mission_message(stamp, &records[0]));
         // To drive and to stand are both told in words.
         assert!(!records[0].to_string().is_empty());
-        pilot.decide(at_ns(1), Some(chart), &heard.instruction(at_ns(1), u64::MAX));
+        pilot.answer(at_ns(1), &only(risk_message(&header, &elements)));
     })
 }
 
@@ -396,7 +399,8 @@ pub fn read_order() -> Reader {
         mission.order(Order::Drive(first), said(1), at_ns(1)).unwrap();
         mission.order(order, said_by(header), at_ns(2)).ok();
         mission.advance(&Drive::odometry(1));
-        assert!(!record_of(&mission).to_string().is_empty());
+        let told = MissionMessage::of(&mission, MessageId::default(), at_ns(2));
+        assert!(!record_of(&mission, &told).to_string().is_empty());
         mission.order(Order::EmergencyStop, said(2), u64::MAX).ok();
         assert!(!matches!(mission.instruction(), Instruction::Drive(_)));
     })

@@ -266,6 +266,7 @@ fn be(role: Role, run: &RunName, folder: &Path, is_over: &dyn Fn() -> bool) {
                 beginning: Beginning::Driving(route),
                 tolerance_m: task.goal_tolerance_m,
                 model: &model,
+                guard: config.guard,
                 periods: Periods::default(),
                 ages: ages(),
                 areas: Areas::default(),

@@ -14,6 +14,7 @@ mod localisation;
 mod measurements;
 mod missions;
 mod onlookers;
+mod pipeline;
 mod recordings;
 mod rewritten;
 mod supervision;
