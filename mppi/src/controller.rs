@@ -350,7 +350,7 @@ impl<M: Driven, S: StepCost, R: RolloutCost> Controller<M, S, R> {
             n_feasible: totals.n_feasible as usize,
             n_non_finite: summary.n_non_finite,
             is_recovering: mode != Mode::Onward,
-            was_held: matches!(mode, Mode::BackUp { was_held: true, .. }),
+            is_no_way: matches!(mode, Mode::BackUp { is_no_way: true, .. }),
             is_best_alone: false,
         };
     }

@@ -64,8 +64,9 @@ pub struct Diagnostics {
     pub n_non_finite: usize,
     /// Whether the vehicle is backing up because it was stuck.
     pub is_recovering: bool,
-    /// Whether it was the ground that held it there: it was told to drive and moved less than half as far.
-    pub was_held: bool,
+    /// Whether there is no way where it was stuck: the ground held it, which then moved less than half as far as it was
+    /// told, or it was stuck about there the time before.
+    pub is_no_way: bool,
     /// Whether the plan is a single rollout, because the mean of all broke a limit.
     pub is_best_alone: bool,
 }
@@ -84,7 +85,7 @@ impl Diagnostics {
             n_feasible: 0,
             n_non_finite: 0,
             is_recovering: false,
-            was_held: false,
+            is_no_way: false,
             is_best_alone: false,
         }
     }

@@ -13,8 +13,9 @@ pub(crate) enum Mode {
     /// Drive backwards, towards this point [m].
     BackUp {
         target_m: [f64; 2],
-        /// Whether the ground held it: it moved less than half of what it was told. Else there was nowhere to go.
-        was_held: bool,
+        /// Whether there is no way where it stood: the ground held it, so that it moved less than half of what it was
+        /// told, or it found no way from about there the time before.
+        is_no_way: bool,
     },
 }
 
@@ -27,7 +28,9 @@ pub(crate) struct Watch {
     anchor_m: Option<[f64; 2]>,
     /// Where it was at the last look [m].
     last_m: [f64; 2],
-    /// Way since then, to and fro, and what was told [m].
+    /// Where backing up began the last time [m].
+    backed_m: Option<[f64; 2]>,
+    /// Way since the anchor, to and fro, and what was told [m].
     driven_m: f64,
     told_m: f64,
     /// Since then [s].
@@ -41,6 +44,7 @@ impl Watch {
             mode: Mode::Onward,
             anchor_m: None,
             last_m: [0.0; 2],
+            backed_m: None,
             driven_m: 0.0,
             told_m: 0.0,
             waited_s: 0.0,
@@ -62,6 +66,7 @@ impl Watch {
     pub(crate) fn carry(&mut self, carry: impl Fn([f64; 2]) -> [f64; 2]) {
         self.anchor_m = self.anchor_m.map(&carry);
         self.last_m = carry(self.last_m);
+        self.backed_m = self.backed_m.map(&carry);
         if let Mode::BackUp { target_m, .. } = &mut self.mode {
             *target_m = carry(*target_m);
         }
@@ -87,8 +92,11 @@ impl Watch {
                 let back_m = self.config.distance_m;
                 let (sine, cosine) = libm::sincos(state.yaw_rad);
                 let target_m = [here_m[0] - back_m * cosine, here_m[1] - back_m * sine];
-                let was_held = self.told_m > 2.0 * self.driven_m + self.config.progress_m;
-                self.begin(Mode::BackUp { target_m, was_held }, here_m);
+                let is_held = self.told_m > 2.0 * self.driven_m + self.config.progress_m;
+                let near_m = 0.5 * self.config.distance_m;
+                let is_again = self.backed_m.is_some_and(|before_m| distance_m(here_m, before_m) < near_m);
+                self.backed_m = Some(here_m);
+                self.begin(Mode::BackUp { target_m, is_no_way: is_held || is_again }, here_m);
             }
             Mode::BackUp { .. }
                 if moved_m >= self.config.distance_m || self.waited_s >= self.config.duration_s =>
@@ -172,6 +180,22 @@ mod tests {
         assert_eq!(watch.observe(&moved, 1.0, 0.1), Mode::Onward);
     }
 
+    /// Backing up ends, and 0.4 m from where it began the vehicle finds nothing better again; 0.6 m away it would be another
+    /// place.
+    #[test]
+    fn who_finds_no_way_twice_from_about_the_same_place_has_none_there() {
+        for (again_m, expected) in [(0.4, true), (0.6, false)] {
+            let mut watch = Watch::new(CONFIG);
+            let mut modes =
+                (0..100).map(|k| watch.observe(&at(if k < 40 { 0.0 } else { again_m }), 0.1, 0.1));
+            assert!(
+                modes.by_ref().take(40).any(|mode| matches!(mode, Mode::BackUp { is_no_way: false, .. }))
+            );
+            let again = modes.find(|mode| matches!(mode, Mode::BackUp { is_no_way: true, .. }));
+            assert_eq!(again.is_some(), expected, "{again_m}");
+        }
+    }
+
     /// Told to drive at 1 m/s it stood for 3 s: 3 m are more than none and the half metre of progress. Told to drive at
     /// 0.1 m/s, where nothing better was to be had, it was not held: 0.3 m are less.
     #[test]
@@ -183,7 +207,7 @@ mod tests {
                 mode = watch.observe(&at(0.0), told_mps, 0.1);
             }
             assert!(
-                matches!(mode, Mode::BackUp { was_held, .. } if was_held == expected),
+                matches!(mode, Mode::BackUp { is_no_way, .. } if is_no_way == expected),
                 "{told_mps}: {mode:?}"
             );
         }

@@ -269,7 +269,7 @@ impl<M: Driven> Pilot<M> {
             objective: objective_on_chart(chart, target, back.as_ref(), corners_m),
             cycle: self.cycle,
         });
-        if self.controller.diagnostics().was_held && !was_recovering {
+        if self.controller.diagnostics().is_no_way && !was_recovering {
             let [x_m, y_m, _] = odometry.position_m;
             self.stuck = Some(StuckPose { position_m: [x_m, y_m], yaw_rad: odometry.attitude_rad[2] });
         }
