@@ -2,12 +2,10 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::effect::STANDARD_GRAVITY_MPS2;
-use crate::{Differential, Vehicle};
+use crate::Vehicle;
 
 /// What a slope along the heading asks of the friction where an axle's part of the pull and its part of the weight come
-/// apart: `share t / (1 - unloading t - twisting w)` on a slope of tangent t whose tangents across, under the front and the
-/// rear axle, differ by w [-].
+/// apart: `share t / (1 - unloading t)` on a slope of tangent t [-].
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct AxleDemand {
@@ -15,19 +13,15 @@ pub struct AxleDemand {
     pub share: f64,
     /// Its loss of weight over that weight, per tangent of the slope.
     pub unloading: f64,
-    /// What of the weight on its lighter wheel is lost, over that weight, per difference of the tangents across: without
-    /// a lock between them no wheel of an axle pulls more than the lighter one holds.
-    pub twisting: f64,
 }
 
 impl AxleDemand {
     /// All wheels hold alike on every slope.
-    pub const EVEN: Self = Self { share: 1.0, unloading: 0.0, twisting: 0.0 };
+    pub const EVEN: Self = Self { share: 1.0, unloading: 0.0 };
 
-    /// Friction that a slope of this tangent asks for, on ground of this difference of the tangents across; infinite where
-    /// a wheel is off the ground [-].
-    pub fn friction(&self, tangent: f64, twist: f64) -> f64 {
-        let left = 1.0 - self.unloading * tangent - self.twisting * twist;
+    /// Friction that a slope of this tangent asks for; infinite where the axle is off the ground [-].
+    pub fn friction(&self, tangent: f64) -> f64 {
+        let left = 1.0 - self.unloading * tangent;
         if left > 0.0 { self.share * tangent / left } else { f64::INFINITY }
     }
 }
@@ -40,12 +34,7 @@ impl Vehicle {
     ///
     /// A slope of tangent t moves h / L t of the weight to the lower axle (Wong, Theory of Ground Vehicles, section 3.1),
     /// h being the height of the centre of gravity and L the wheelbase. Motors pull by the shares of the drivetrain,
-    /// brakes by the weights at rest; differentials between the axles are left out, which help, and what a limited slip
-    /// carries over from a wheel that spins.
-    ///
-    /// Ground that lies across by w more under the front axle than under the rear turns a stiff body to where the axles'
-    /// moments balance, `K_f K_r / (K_f + K_r) w` with the roll stiffnesses K, and an axle's wheels share that moment over
-    /// the track (Gillespie, Fundamentals of Vehicle Dynamics, chapter 6). Brakes work on every wheel by itself.
+    /// brakes by the weights at rest; differentials between the axles are left out, which help.
     pub fn axle_demand(&self) -> AxleDemand {
         let wheels_kg = 4.0 * self.wheel.mass_kg;
         let mass_kg = self.body.mass_kg + wheels_kg;
@@ -56,28 +45,11 @@ impl Vehicle {
         let (front, rear) = (ahead_m / wheelbase_m, 1.0 - ahead_m / wheelbase_m);
         let moved = height_m / wheelbase_m;
         let rear_share = self.drivetrain.rear_share;
-        let lost_n = self.wheel_load_lost_to_twist_n();
-        let twisting = |share_of_weight: f64| match self.drivetrain.differential {
-            Differential::Locked => 0.0,
-            _ => lost_n / (0.5 * share_of_weight * mass_kg * STANDARD_GRAVITY_MPS2),
-        };
-        let climbing_front = AxleDemand {
-            share: (1.0 - rear_share) / front,
-            unloading: moved / front,
-            twisting: twisting(front),
-        };
-        let climbing_rear =
-            AxleDemand { share: rear_share / rear, unloading: -moved / rear, twisting: twisting(rear) };
-        let braking_rear = AxleDemand { share: 1.0, unloading: moved / rear, twisting: 0.0 };
+        let climbing_front = AxleDemand { share: (1.0 - rear_share) / front, unloading: moved / front };
+        let climbing_rear = AxleDemand { share: rear_share / rear, unloading: -moved / rear };
+        let braking_rear = AxleDemand { share: 1.0, unloading: moved / rear };
         [climbing_rear, braking_rear].into_iter().fold(climbing_front, |worst, axle| {
-            let asked = |axle: AxleDemand| axle.friction(COMPARED_SLOPE, 0.0);
-            if asked(axle) > asked(worst) { axle } else { worst }
+            if axle.friction(COMPARED_SLOPE) > worst.friction(COMPARED_SLOPE) { axle } else { worst }
         })
-    }
-
-    /// Load that the lighter wheel of an axle loses per difference of the tangents across [N].
-    fn wheel_load_lost_to_twist_n(&self) -> f64 {
-        let [front, rear] = self.roll_stiffness_nm_per_rad();
-        front * rear / (front + rear) / self.geometry.track_m
     }
 }

@@ -285,36 +285,23 @@ impl Vehicle {
     /// and tyres of the angular stiffness K hold it with K (L - 1) t: L = K / (K - m g h) (Gillespie, Fundamentals of
     /// Vehicle Dynamics, chapter 6, with the roll axis on the ground).
     pub fn lean(&self) -> [f64; 2] {
+        let track_m = self.geometry.track_m;
+        let tyre_n_per_m = self.tyre.radial_stiffness_n_per_m;
+        let in_series = |strut_n_per_m: f64| strut_n_per_m * tyre_n_per_m / (strut_n_per_m + tyre_n_per_m);
         let ahead_m = [self.geometry.wheelbase_m - self.body.cog_ahead_m, -self.body.cog_ahead_m];
-        let pitch_nm_per_rad: f64 = [&self.front, &self.rear]
-            .into_iter()
-            .zip(ahead_m)
-            .map(|(axle, ahead_m)| {
-                2.0 * ahead_m * ahead_m * self.on_tyre_n_per_m(axle.suspension.stiffness_n_per_m)
-            })
-            .sum();
-        let roll_nm_per_rad: f64 = self.roll_stiffness_nm_per_rad().iter().sum();
+        let mut stiffness_nm_per_rad = [0.0; 2];
+        for (axle, ahead_m) in [&self.front, &self.rear].into_iter().zip(ahead_m) {
+            let spring_n_per_m = axle.suspension.stiffness_n_per_m;
+            let bar_n_per_m = 2.0 * axle.anti_roll_nm_per_rad / (track_m * track_m);
+            let roll_n_per_m = in_series(spring_n_per_m + bar_n_per_m);
+            stiffness_nm_per_rad[0] += 0.5 * track_m * track_m * roll_n_per_m;
+            stiffness_nm_per_rad[1] += 2.0 * ahead_m * ahead_m * in_series(spring_n_per_m);
+        }
         let overturning_nm_per_rad = self.body.mass_kg * STANDARD_GRAVITY_MPS2 * self.body.cog_height_m;
-        [roll_nm_per_rad, pitch_nm_per_rad].map(|stiffness| {
+        stiffness_nm_per_rad.map(|stiffness| {
             let left = stiffness - overturning_nm_per_rad;
             if left * LEAN_MOST < stiffness { LEAN_MOST } else { stiffness / left }
         })
-    }
-
-    /// Moment per roll of the body against the ground that the front and the rear axle hold against it [Nm/rad].
-    pub(crate) fn roll_stiffness_nm_per_rad(&self) -> [f64; 2] {
-        let track_m = self.geometry.track_m;
-        [&self.front, &self.rear].map(|axle| {
-            let bar_n_per_m = 2.0 * axle.anti_roll_nm_per_rad / (track_m * track_m);
-            let strut_n_per_m = axle.suspension.stiffness_n_per_m + bar_n_per_m;
-            0.5 * track_m * track_m * self.on_tyre_n_per_m(strut_n_per_m)
-        })
-    }
-
-    /// Stiffness of a strut on its tyre [N/m].
-    fn on_tyre_n_per_m(&self, strut_n_per_m: f64) -> f64 {
-        let tyre_n_per_m = self.tyre.radial_stiffness_n_per_m;
-        strut_n_per_m * tyre_n_per_m / (strut_n_per_m + tyre_n_per_m)
     }
 }
 

@@ -151,7 +151,6 @@ impl PriorConfig {
                 [("slope_law.slip_stiffness", slip_stiffness), ("slope_law.axle.share", axle.share)];
             check(&positive, "a finite number > 0", |v| v > 0.0)?;
             check(&[("slope_law.axle.unloading", axle.unloading)], "a finite number", |_| true)?;
-            check(&[("slope_law.axle.twisting", axle.twisting)], "a finite number >= 0", |v| v >= 0.0)?;
         }
         let [least, most] = self.friction;
         check(&[("friction[0]", least)], "a finite number > 0", |v| v > 0.0)?;
@@ -179,10 +178,8 @@ mod tests {
         assert_eq!(PriorConfig::default().validate(), Ok(()));
     }
 
-    fn with_law(slip_stiffness: f64, axle: [f64; 3]) -> PriorConfig {
-        let [share, unloading, twisting] = axle;
-        let slope_law =
-            SlopeLaw::Friction { slip_stiffness, axle: AxleDemand { share, unloading, twisting } };
+    fn with_law(slip_stiffness: f64, share: f64, unloading: f64) -> PriorConfig {
+        let slope_law = SlopeLaw::Friction { slip_stiffness, axle: AxleDemand { share, unloading } };
         PriorConfig { slope_law, ..PriorConfig::default() }
     }
 
@@ -205,10 +202,9 @@ mod tests {
             (PriorConfig { friction: [f64::NAN, 0.8], ..default }, "friction[0]"),
             (PriorConfig { friction: [0.6, 0.6], ..default }, "friction[1]"),
             (PriorConfig { friction: [0.6, f64::INFINITY], ..default }, "friction[1]"),
-            (with_law(0.0, [1.0, 0.5, 2.0]), "slope_law.slip_stiffness"),
-            (with_law(12.0, [f64::INFINITY, 0.5, 2.0]), "slope_law.axle.share"),
-            (with_law(12.0, [1.0, f64::NAN, 2.0]), "slope_law.axle.unloading"),
-            (with_law(12.0, [1.0, 0.5, -0.1]), "slope_law.axle.twisting"),
+            (with_law(0.0, 1.0, 0.5), "slope_law.slip_stiffness"),
+            (with_law(12.0, f64::INFINITY, 0.5), "slope_law.axle.share"),
+            (with_law(12.0, 1.0, f64::NAN), "slope_law.axle.unloading"),
         ];
         for (config, field) in wrong {
             assert_eq!(config.validate().unwrap_err().field, field);

@@ -12,7 +12,7 @@
 //! What of it lies below t does not hold the vehicle, which slides; what lies above stands for its mean.
 //!
 //! That is the law of [`SlopeLaw::Linear`]. By [`SlopeLaw::Friction`] a slope s along the heading asks for the friction a(s)
-//! of the axle that slides first, on ground that lies across differently under both axles the more ([`bicycle::AxleDemand`]), together with t for `d = sqrt(a^2 + t^2)`, and that is what
+//! of the axle that slides first ([`bicycle::AxleDemand`]), together with t for `d = sqrt(a^2 + t^2)`, and that is what
 //! holds or slides. A wheel that holds slips by `3 mu / C (1 - cbrt(1 - d / mu))`, of which a / d lies along the heading,
 //! and the way up counts by its level part: `linear = (1 - slip) / sqrt(1 + s^2)`. A plane under all wheels turns nobody:
 //! what equation 15 takes of a turn, or gives to it, is the slope under a wheel less the mean of all.
@@ -74,7 +74,7 @@ pub(crate) struct Equations {
 #[derive(Clone, Copy, Debug)]
 enum Law {
     Linear { per_slope: f32 },
-    Friction { per_stiffness: f32, share: f32, unloading: f32, twisting: f32 },
+    Friction { per_stiffness: f32, share: f32, unloading: f32 },
 }
 
 /// How a vehicle holds on a slope.
@@ -196,11 +196,9 @@ impl Equations {
                 let lost = slope * (lanes.real_single(per_slope) * per_share);
                 Rolling { hold: across, speed: (one - lost).max(zero), bump: slope }
             }
-            Law::Friction { per_stiffness, share, unloading, twisting } => {
-                let lost =
-                    lanes.real_single(twisting).mul_add(pose.twist, lanes.real_single(unloading) * slope);
-                let along =
-                    lanes.real_single(share) * slope / (one - lost).max(lanes.real_single(SHARE_LEAST));
+            Law::Friction { per_stiffness, share, unloading } => {
+                let left = (one - lanes.real_single(unloading) * slope).max(lanes.real_single(SHARE_LEAST));
+                let along = lanes.real_single(share) * slope / left;
                 let asked = (along * along + pose.across * pose.across).sqrt();
                 let hold = self.hold(lanes, asked, pose.across);
                 let kept = cube_root(lanes, (one - asked / hold.friction).max(zero));
@@ -280,7 +278,6 @@ impl Law {
                 per_stiffness: (1.0 / slip_stiffness) as f32,
                 share: axle.share as f32,
                 unloading: axle.unloading as f32,
-                twisting: axle.twisting as f32,
             },
         }
     }

@@ -39,8 +39,6 @@ pub(crate) struct PoseGround<L: Lanes> {
     pub along: Real<L>,
     /// |slope| across the heading, the mean under the wheels: the axles hold together [-].
     pub across: Real<L>,
-    /// |difference| of the slopes from wheel to wheel of the front and of the rear axle [-].
-    pub twist: Real<L>,
     /// How far the ground between the axles would reach into the body, 0 where it does not [m].
     pub belly_depth_m: Real<L>,
 }
@@ -85,21 +83,8 @@ impl<L: Lanes> Placed<'_, L> {
             unknown_share: n_unknown / n_cells,
             along: self.lanes.real_single(0.25) * forward_slopes,
             across: (self.lanes.real_single(0.25) * left_slopes).abs(),
-            twist: self.twist(&wheels, lengths),
             belly_depth_m: self.belly_depth_m(&wheels, lengths),
         }
-    }
-
-    /// A wheel over unknown ground has no height that an axle could stand on: nothing is said of the twist there.
-    #[inline(always)]
-    fn twist(&self, wheels: &[WheelGround<L>; 4], lengths: &Lengths) -> Real<L> {
-        let [front_left, rear_left, rear_right, front_right] = wheels;
-        let zero = self.lanes.real(0.0);
-        let unknown = front_left.unknown + rear_left.unknown + rear_right.unknown + front_right.unknown;
-        let front_m = front_left.height_m - front_right.height_m;
-        let rear_m = rear_left.height_m - rear_right.height_m;
-        let per_track = self.lanes.real_single((1.0 / lengths.wheels.track_m) as f32);
-        zero.or_else(zero.less(unknown), (front_m - rear_m).abs() * per_track)
     }
 
     #[inline(always)]

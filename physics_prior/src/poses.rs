@@ -357,7 +357,7 @@ mod tests {
 
     #[test]
     fn every_instruction_set_gives_the_same_bits() {
-        let axle = AxleDemand { share: 1.0, unloading: 0.6, twisting: 2.0 };
+        let axle = AxleDemand { share: 1.0, unloading: 0.6 };
         let by_friction = SlopeLaw::Friction { slip_stiffness: 12.0, axle };
         for slope_law in [SlopeLaw::Linear {}, by_friction] {
             same_bits_on_every_instruction_set(PriorConfig { slope_law, ..PriorConfig::default() });

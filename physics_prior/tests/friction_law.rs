@@ -87,74 +87,26 @@ fn it_holds_with_the_probability_of_enough_friction() {
 fn the_axle_that_a_slope_unloads_slides_first() {
     // 1360 kg at 0.75 m and 140 kg at 0.45 m: 0.722 m over half of 2.5 m = 0.5776. On tan 25 = 0.4663 the front axle,
     // which pulls half, asks for 0.4663 / (1 - 0.5776 0.4663) = 0.6382.
-    let AxleDemand { share, unloading, .. } = full_size().axle_demand();
+    let AxleDemand { share, unloading } = full_size().axle_demand();
     assert!((share - 1.0).abs() < 1e-9 && (unloading - 0.5776).abs() < 1e-4, "{share} {unloading}");
-    let asked = full_size().axle_demand().friction(25f64.to_radians().tan(), 0.0);
+    let asked = full_size().axle_demand().friction(25f64.to_radians().tan());
     assert!((asked - 0.6382).abs() < 1e-4, "{asked}");
-    assert_eq!(AxleDemand { share: 1.0, unloading: 0.5, twisting: 0.0 }.friction(2.0, 0.0), f64::INFINITY);
+    assert_eq!(AxleDemand { share: 1.0, unloading: 0.5 }.friction(2.0), f64::INFINITY);
     // A sedan of 2303.1 kg, its centre of gravity 0.5408 m high and 1.4992 m ahead of the rear axle of 3.02 m, pulls with
     // the rear axle alone, which carries 0.5036 of it: 1 / 0.5036 and -0.5408 / 3.02 / 0.5036.
-    let AxleDemand { share, unloading, .. } = rear_driven().axle_demand();
+    let AxleDemand { share, unloading } = rear_driven().axle_demand();
     assert!((share - 1.9857).abs() < 1e-3 && (unloading + 0.3556).abs() < 1e-3, "{share} {unloading}");
 }
 
 #[test]
 fn the_law_asks_for_what_the_axle_needs() {
     // The axle's 0.4 / (1 - 0.5 0.4) = 0.5 is all of a friction that is known: beyond, and not before, it slides.
-    let axle = AxleDemand { share: 1.0, unloading: 0.5, twisting: 0.0 };
+    let axle = AxleDemand { share: 1.0, unloading: 0.5 };
     let law = SlopeLaw::Friction { slip_stiffness: 12.0, axle };
     let known = [0.5 - 1e-6, 0.5];
     assert_eq!(on_plane(0.398, 0.0, law, known).linear.probabilities()[0], 0.0);
     assert_eq!(on_plane(0.402, 0.0, law, known).linear.probabilities()[0], 1.0);
     assert_eq!(on_plane(0.402, 0.0, EVEN, known).linear.probabilities()[0], 0.0);
-}
-
-/// The ground rises by 0.2 ahead and turns by w = 0.15 from the rear axle to the front one, to the left and to the right of
-/// the middle alike. Of the lighter wheels' load 2 w = 0.3 is lost: 0.2 / (1 - 0.3) = 0.2857 is asked for, of a friction of
-/// 0.6 the slip 3 0.6 / 12 (1 - cbrt(1 - 0.2857 / 0.6)) = 0.0291. Under each wheel the slope ahead is 0.2 plus or minus
-/// w track / 2 L, which asks for a little more on one side and less on the other.
-#[test]
-fn twisted_ground_asks_for_more_friction() {
-    let (known, twist) = ([0.6 - 1e-6, 0.6], 0.15);
-    let law = |twisting: f64| {
-        let axle = AxleDemand { share: 1.0, unloading: 0.0, twisting };
-        SlopeLaw::Friction { slip_stiffness: 12.0, axle }
-    };
-    let (cell_m, wheelbase_m) = (CAR.length_m / 17.0, CAR.wheelbase_m);
-    let (rear_m, middle_m) = (60.0 * cell_m, 60.0 * cell_m);
-    let ground = |x_m: f64, y_m: f64| 0.2 * x_m + twist * (x_m - rear_m) / wheelbase_m * (y_m - middle_m);
-    let of_slope = |slope: f64| {
-        let slip = 0.15 * (1.0 - (1.0 - slope / (1.0 - 2.0 * twist) / 0.6).cbrt());
-        (1.0 - slip) / (1.0 + slope * slope).sqrt()
-    };
-    let beside = twist * 0.5 * CAR.track_m / wheelbase_m;
-    let expected = 0.5 * (of_slope(0.2 + beside) + of_slope(0.2 - beside));
-    let found = mean(&belief_on(ground, &CAR, law(2.0), known).linear);
-    assert!((found - expected).abs() < 2e-3, "{expected} {found}");
-    // 0.2 / (1 - 5.5 0.15) = 1.14 is more than there is.
-    assert_eq!(belief_on(ground, &CAR, law(5.5), known).linear.probabilities()[0], 1.0);
-    let untwisted = mean(&belief_on(ground, &CAR, law(0.0), known).linear);
-    assert!(untwisted > found + 0.005, "{untwisted} {found}");
-}
-
-/// On ground whose tangent across changes by 0.1 from axle to axle the plant's light wheels, which know springs, tyres and
-/// no formula, lose the share of their load that the demand says.
-#[test]
-fn twisted_ground_takes_the_load_of_the_plants_light_wheels() {
-    let vehicle = full_size();
-    let (twist, wheelbase_m) = (0.1, vehicle.geometry.wheelbase_m);
-    let loads_n = |twist: f64| {
-        let geometry = GridGeometry::centred(0.05, 400, 400, 0.0, 0.0);
-        let height_m = |x_m: f64, y_m: f64| twist * (x_m / wheelbase_m - 0.5) * y_m;
-        let world =
-            World::from_fn("twist", geometry, height_m, |_, _| Patch::open(Stribeck::ASPHALT)).unwrap();
-        let plant = Plant::new(&vehicle, Arc::new(world), [0.0; 3]).unwrap();
-        plant.wheels().map(|wheel| wheel.load_n)
-    };
-    let (level_n, twisted_n) = (loads_n(0.0), loads_n(twist));
-    let lost = 1.0 - twisted_n[1].min(twisted_n[0]) / level_n[0];
-    let said = vehicle.axle_demand().twisting * twist;
-    assert!((0.15..0.9).contains(&said) && (lost - said).abs() < 0.1 * said, "lost {lost}, said {said}");
 }
 
 #[test]
@@ -207,7 +159,7 @@ fn the_plant_climbs_as_the_law_says() {
             for eighth in 0..8 {
                 let yaw_rad = f64::from(eighth) * TAU / 8.0;
                 let (along, across) = (slope * yaw_rad.sin(), slope * yaw_rad.cos());
-                if axle.friction(along.abs(), 0.0).hypot(across) > 0.85 * friction {
+                if axle.friction(along.abs()).hypot(across) > 0.85 * friction {
                     continue;
                 }
                 let ground = |x: f64, y: f64| along * x + across * y;
