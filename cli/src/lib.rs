@@ -16,9 +16,9 @@
 //! | distributions | the worst that is likely enough to matter, for every cell and heading: the [risk map](traversability::RiskMap) | [`traversability`] |
 //! | risk map, goal | 1024 futures of the [model](bicycle::Model), and out of them one [decision](bicycle::Decision) | [`mppi`], [`bicycle`] |
 //!
-//! [`navigator`] is this chain as one object with two calls, [`observe`](navigator::Navigator::observe) and
-//! [`decide`](navigator::Navigator::decide). The controller does not know who made its map: a constant one drives it as
-//! well.
+//! [`navigator`] is this chain as parts that tell one another messages, and as one object with two calls,
+//! [`observe`](navigator::Navigator::observe) and [`decide`](navigator::Navigator::decide). The controller does not know
+//! who made its map: a constant one drives it as well.
 //!
 //! Around it:
 //!

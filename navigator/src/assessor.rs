@@ -213,3 +213,6 @@ impl Assessor {
         self.cost_to_go.view()
     }
 }
+
+#[cfg(test)]
+mod tests;

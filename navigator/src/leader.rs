@@ -105,3 +105,6 @@ impl Stopwatch {
         self.until_ns.saturating_sub(self.began_ns) as f64 * 1e-9
     }
 }
+
+#[cfg(test)]
+mod tests;

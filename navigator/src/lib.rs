@@ -1,17 +1,17 @@
 //! The pipeline as one pure object: observation to map to risk map to decision. No clock, no file, no process.
 //! A part of [Surefoot](../cli/index.html).
 //!
-//! It has three parts, which a robot may run in processes of their own: [`Surveyor`] maps the ground, [`Assessor`]
-//! turns the map into risk and time to the goal, [`Pilot`] decides. [`Navigator`] is the three in one, for a closed
-//! loop: [`Navigator::observe`] takes in what was measured and keeps the maps, [`Navigator::decide`] asks the
-//! controller.
+//! It has parts, which a robot may run in processes of their own and which take and return stamped messages: [`Leader`]
+//! makes orders into what is to be done, [`Surveyor`] maps the ground, [`Assessor`] turns the map into risk and time to the
+//! goal, [`Pilot`] decides. Every rule is one of theirs; whoever carries the messages has none. [`Navigator`] carries them
+//! in queues, for a closed loop: [`Navigator::observe`] takes in what was measured and keeps the maps,
+//! [`Navigator::decide`] asks the controller.
 //!
 //! [`Config::for_vehicle`] fits all settings to a machine, a [`Belief`] says how the ground is judged, a [`Guard`] what
 //! may enter. `examples/own_surface.rs` drives the three on a map of one's own.
 
 mod areas;
 mod assessor;
-mod author;
 mod choice;
 mod config;
 mod frame;
@@ -24,6 +24,7 @@ mod mission;
 mod navigator;
 mod pilot;
 mod risk;
+mod risk_estimator;
 mod route;
 mod surveyor;
 mod track;

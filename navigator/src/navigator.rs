@@ -1,7 +1,7 @@
 //! The parts of the pipeline in one process: their messages lie in queues, and one part is at work at a time.
 
-mod author;
 mod mail;
+mod risk_publisher;
 
 use std::collections::BTreeMap;
 
@@ -15,8 +15,8 @@ use crate::{
     OrderRefusal, Pilot, PilotAges, RiskMessage, RiskMessages, Route, RouteError, Said, ScanMessage,
     ScanTally, StandIn, StuckMessage, SurfaceHeader, Surveyor,
 };
-use author::Author;
-use mail::{Mail, ToAuthor};
+use mail::{Mail, ToAssessor};
+use risk_publisher::RiskPublisher;
 
 /// Where the map of the ground comes from.
 #[derive(Clone)]
@@ -103,8 +103,8 @@ const EPOCH_NS: u64 = 1;
 pub struct Navigator<M: Driven = Model> {
     leader: Leader,
     surveyor: Surveyor,
-    learned: Author,
-    physics: Option<(Author, StandIn)>,
+    learned: RiskPublisher,
+    physics: Option<(RiskPublisher, StandIn)>,
     pilot: Pilot<M>,
     mail: Mail<M::Command>,
     /// What went to the vehicle last.
@@ -130,7 +130,13 @@ impl<M: Driven> Navigator<M> {
             surveyor: Surveyor::new(geometry, config.elevation, config.guard, surface)?
                 .with_sensors(sensors)
                 .with_mounts(config.sensors.clone()),
-            learned: Author::new(Assessor::new(geometry, model.motion_limits(), &config, &belief, level)?),
+            learned: RiskPublisher::new(Assessor::new(
+                geometry,
+                model.motion_limits(),
+                &config,
+                &belief,
+                level,
+            )?),
             physics: None,
             pilot: Pilot::new(model, &config, seed)?,
             mail: Mail::default(),
@@ -146,8 +152,8 @@ impl<M: Driven> Navigator<M> {
     /// The same with somebody who judges by physics while nobody else does, as processes have; from `began_ns` on.
     pub fn with_stand_in(self, physics: Assessor, silence_max_ns: u64, began_ns: u64) -> Self {
         let stand_in = StandIn::new(began_ns, silence_max_ns);
-        let mail = Mail { physics: Some(ToAuthor::default()), ..self.mail };
-        Self { physics: Some((Author::new(physics), stand_in)), mail, ..self }
+        let mail = Mail { physics: Some(ToAssessor::default()), ..self.mail };
+        Self { physics: Some((RiskPublisher::new(physics), stand_in)), mail, ..self }
     }
 
     /// The same for inputs that may be so old.

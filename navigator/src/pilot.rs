@@ -19,7 +19,7 @@ use crate::{
 
 /// What the pilot drives on.
 #[derive(Clone, Copy, Debug)]
-struct Chart<'a> {
+struct RiskInput<'a> {
     /// Risk around the vehicle.
     map: RiskMapView<'a>,
     /// Least time to the goal over it.
@@ -61,9 +61,9 @@ pub struct Pilot<M: Driven = Model> {
     ages: PilotAges,
     mission: Option<MissionMessage>,
     controller: Controller<M>,
-    /// Of the chart that the controller was asked on last, in whose frame it remembers places [ns].
-    chart_at_ns: Option<u64>,
-    /// Corners of a path in the frame of the chart; their memory is kept.
+    /// Of the map that the controller was asked on last, in whose frame it remembers places [ns].
+    map_frame_at_ns: Option<u64>,
+    /// Corners of a path in the frame of the map; their memory is kept.
     corners_m: Vec<[f64; 2]>,
     decided_at_ns: Option<u64>,
     elapsed_s: f64,
@@ -81,7 +81,7 @@ impl<M: Driven> Pilot<M> {
             ages: PilotAges::default(),
             mission: None,
             controller: Controller::new(config.controller.clone(), model, seed)?,
-            chart_at_ns: None,
+            map_frame_at_ns: None,
             corners_m: Vec::with_capacity(CORNERS_MAX),
             decided_at_ns: None,
             elapsed_s: 0.0,
@@ -100,7 +100,7 @@ impl<M: Driven> Pilot<M> {
     pub fn hear_odometry(&mut self, message: &OdometryMessage<M::Command>) {
         self.note_applied(&message.applied);
         if let Ok(Admitted::ClockSetBack) = self.ledger.take(message) {
-            self.chart_at_ns = None;
+            self.map_frame_at_ns = None;
         }
     }
 
@@ -118,7 +118,7 @@ impl<M: Driven> Pilot<M> {
     pub fn answer(&mut self, now_ns: u64, maps: &RiskMessages<'_>) -> DecisionMessage<M::Command> {
         let cycle = self.cycle;
         let chosen = self.choose(now_ns, maps);
-        let used = chosen.and_then(|(author, map)| Some((author, map.header, chart(map)?)));
+        let used = chosen.and_then(|(author, map)| Some((author, map.header, risk_input(map)?)));
         if let Some((_, header, _)) = used {
             self.note_map(header.valid_at_ns);
         }
@@ -132,7 +132,7 @@ impl<M: Driven> Pilot<M> {
             Instruction::Drive(target) => Some(target.end()),
             Instruction::Stand(_) => None,
         };
-        let decision = self.decide(now_ns, used.map(|(.., chart)| chart), &instruction);
+        let decision = self.decide(now_ns, used.map(|(.., risk)| risk), &instruction);
         // On maps of before a jump the vehicle was carried to where it stands there; the pose is one of now.
         let odometry_at_ns = self.ledger.frame_at_ns();
         let id_of = |map: &Option<RiskMessage<'_>>| map.map_or_else(Default::default, |map| map.header.id);
@@ -180,13 +180,13 @@ impl<M: Driven> Pilot<M> {
     fn decide(
         &mut self,
         now_ns: u64,
-        chart: Option<Chart<'_>>,
+        risk: Option<RiskInput<'_>>,
         instruction: &Instruction<'_>,
     ) -> Decision<M::Command> {
         self.elapsed_s =
             self.decided_at_ns.map_or(0.0, |then_ns| now_ns.saturating_sub(then_ns) as f64 * 1e-9);
-        let decision = match self.ready(now_ns, chart, instruction) {
-            Ok((chart, odometry, target)) => self.ask(&chart, &odometry, &target),
+        let decision = match self.ready(now_ns, risk, instruction) {
+            Ok((risk, odometry, target)) => self.ask(&risk, &odometry, &target),
             Err(decision) => {
                 self.controller.stand_by(&decision, self.elapsed_s);
                 decision
@@ -237,9 +237,9 @@ impl<M: Driven> Pilot<M> {
     fn ready<'a, 'b>(
         &self,
         now_ns: u64,
-        chart: Option<Chart<'a>>,
+        risk: Option<RiskInput<'a>>,
         instruction: &Instruction<'b>,
-    ) -> Result<(Chart<'a>, Odometry, Target<'b>), Decision<M::Command>> {
+    ) -> Result<(RiskInput<'a>, Odometry, Target<'b>), Decision<M::Command>> {
         self.ledger.check(now_ns).map_err(Decision::Stop)?;
         let target = match *instruction {
             Instruction::Drive(target) => target,
@@ -247,26 +247,31 @@ impl<M: Driven> Pilot<M> {
             Instruction::Stand(Decision::Stop(reason)) => return Err(Decision::Stop(reason)),
             Instruction::Stand(Decision::Drive(never)) => match never {},
         };
-        let (chart, odometry) =
-            chart.zip(self.ledger.odometry().copied()).ok_or(Decision::Hold(HoldReason::NoMap))?;
-        Ok((chart, odometry, target))
+        let (risk, odometry) =
+            risk.zip(self.ledger.odometry().copied()).ok_or(Decision::Hold(HoldReason::NoMap))?;
+        Ok((risk, odometry, target))
     }
 
-    fn ask(&mut self, chart: &Chart<'_>, odometry: &Odometry, target: &Target<'_>) -> Decision<M::Command> {
-        let before_ns = self.chart_at_ns.replace(chart.odometry_at_ns);
-        if let Some(jump) = before_ns.and_then(|at_ns| self.ledger.moved_between(at_ns, chart.odometry_at_ns))
+    fn ask(
+        &mut self,
+        risk: &RiskInput<'_>,
+        odometry: &Odometry,
+        target: &Target<'_>,
+    ) -> Decision<M::Command> {
+        let before_ns = self.map_frame_at_ns.replace(risk.odometry_at_ns);
+        if let Some(jump) = before_ns.and_then(|at_ns| self.ledger.moved_between(at_ns, risk.odometry_at_ns))
         {
             self.controller.carry(|pose| jump.pose(pose));
         }
-        // A chart cannot be turned: until the next one, vehicle and target are carried back to where they stood on it.
-        let back = self.ledger.moved_since(chart.odometry_at_ns).map(|jump| jump.inverse());
+        // A map cannot be turned: until the next one, vehicle and target are carried back to where they stood on it.
+        let back = self.ledger.moved_since(risk.odometry_at_ns).map(|jump| jump.inverse());
         let was_recovering = self.controller.diagnostics().is_recovering;
         let Self { controller, corners_m, .. } = self;
         let decision = controller.decide(&Input {
-            state: on_chart(controller.model().measured_state(odometry), back.as_ref()),
+            state: in_map_frame(controller.model().measured_state(odometry), back.as_ref()),
             elapsed_s: self.elapsed_s,
-            map: chart.map,
-            objective: objective_on_chart(chart, target, back.as_ref(), corners_m),
+            map: risk.map,
+            objective: objective_in_map_frame(risk, target, back.as_ref(), corners_m),
             cycle: self.cycle,
         });
         if self.controller.diagnostics().is_no_way && !was_recovering {
@@ -278,23 +283,23 @@ impl<M: Driven> Pilot<M> {
 }
 
 /// A risk map's message as the controller is asked on it.
-fn chart(map: RiskMessage<'_>) -> Option<Chart<'_>> {
+fn risk_input(map: RiskMessage<'_>) -> Option<RiskInput<'_>> {
     let (risk, time_to_goal) = map.content?;
     let RiskHeader { goal_m, frame_at_ns, .. } = map.header;
-    Some(Chart { map: risk, time_to_goal, goal_m, odometry_at_ns: frame_at_ns })
+    Some(RiskInput { map: risk, time_to_goal, goal_m, odometry_at_ns: frame_at_ns })
 }
 
-fn on_chart<S: Into<MotionState> + From<MotionState>>(state: S, back: Option<&Jump>) -> S {
+fn in_map_frame<S: Into<MotionState> + From<MotionState>>(state: S, back: Option<&Jump>) -> S {
     let Some(back) = back else { return state };
     let state: MotionState = state.into();
     let [x_m, y_m, yaw_rad] = back.pose([state.x_m, state.y_m, state.yaw_rad]);
     MotionState { x_m, y_m, yaw_rad, ..state }.into()
 }
 
-/// The target in the frame of a chart. What that tells of the time to the goal leads to where the goal was until the next
+/// The target in the frame of a map. What that tells of the time to the goal leads to where the goal was until the next
 /// one comes; if it leads to another goal, it is not asked.
-fn objective_on_chart<'a>(
-    chart: &Chart<'a>,
+fn objective_in_map_frame<'a>(
+    risk: &RiskInput<'a>,
     target: &Target<'a>,
     back: Option<&Jump>,
     corners_m: &'a mut Vec<[f64; 2]>,
@@ -305,9 +310,9 @@ fn objective_on_chart<'a>(
     };
     match target {
         Target::Goal(Destination { goal_m, tolerance_m }) => {
-            let is_known = *goal_m == chart.goal_m;
+            let is_known = *goal_m == risk.goal_m;
             let terminal =
-                if is_known { Terminal::CostToGo(chart.time_to_goal) } else { Terminal::StraightLine };
+                if is_known { Terminal::CostToGo(risk.time_to_goal) } else { Terminal::StraightLine };
             Objective::Goal { goal_m: carried(*goal_m), tolerance_m: *tolerance_m, terminal }
         }
         Target::Path(path) => {

@@ -12,7 +12,7 @@ use terrain::{CellRegion, GridGeometry, GridMap, SurfaceCell};
 use traversability::{CvarLevel, Risk, RiskMapView};
 
 use crate::Jump;
-use crate::author::Author;
+use crate::risk_estimator::RiskEstimator;
 
 /// Fills a window, shape [row, col, yaw], with the risk of the poses of the body frame that a [`RiskMap`] of this
 /// geometry and number of yaws stands for.
@@ -64,7 +64,7 @@ const STUCK_YAW_RAD: f64 = std::f64::consts::FRAC_PI_4;
 
 /// A risk map and what it is made with.
 pub(crate) struct RiskLayer {
-    author: Author,
+    estimator: RiskEstimator,
     /// Who knows, and the answer for the present window.
     oracle: Option<(RiskOracle, Vec<Risk>)>,
     /// With the time of the odometry in whose frame each was told [ns].
@@ -88,9 +88,9 @@ impl RiskLayer {
         let grid = GridGeometry::centred(resolution_m, window.n_rows, window.n_cols, 0.0, 0.0);
         let surface_m = config.elevation.resolution_m;
         let by_prior = |assumption: Assumption| {
-            Author::prior(geometry, &assumption, surface_m, grid, window.n_yaws, instructions)
+            RiskEstimator::prior(geometry, &assumption, surface_m, grid, window.n_yaws, instructions)
         };
-        let author = match belief {
+        let estimator = match belief {
             Belief::Physics => by_prior(Assumption::Physics { prior: *prior, level })?,
             Belief::Learned { checkpoint, unfamiliar } => {
                 let learned = Learned {
@@ -99,7 +99,7 @@ impl RiskLayer {
                     obstacle_margin_m: prior.obstacle_margin_m,
                     level,
                 };
-                Author::networks(geometry, &learned, surface_m, grid, window.n_yaws, instructions)?
+                RiskEstimator::networks(geometry, &learned, surface_m, grid, window.n_yaws, instructions)?
             }
             Belief::Nominal | Belief::Given(_) => {
                 by_prior(Assumption::Nominal { obstacle_margin_m: prior.obstacle_margin_m })?
@@ -112,7 +112,7 @@ impl RiskLayer {
             Belief::Physics | Belief::Learned { .. } | Belief::Nominal => None,
         };
         Ok(Self {
-            author,
+            estimator,
             oracle,
             stuck: Vec::with_capacity(STUCK_MAX),
             length_m: geometry.length_m,
@@ -123,20 +123,20 @@ impl RiskLayer {
 
     /// Edge of a cell [m].
     pub fn resolution_m(&self) -> f64 {
-        self.author.risk_map().geometry().resolution_m
+        self.estimator.risk_map().geometry().resolution_m
     }
 
-    /// What the author says, once there was an update.
+    /// What the estimator says, once there was an update.
     pub fn known(&self) -> Option<RiskMapView<'_>> {
-        self.is_filled.then(|| self.author.risk_map().view())
+        self.is_filled.then(|| self.estimator.risk_map().view())
     }
 
-    /// Takes who knows better, and the poses that proved stuck, into risks that were taken from the author.
+    /// Takes who knows better, and the poses that proved stuck, into risks that were taken from the estimator.
     pub fn correct(&self, risks: &mut [Risk]) {
         if let Some((_, answer)) = &self.oracle {
             take_over_answer(answer, risks);
         }
-        let known = self.author.risk_map().view();
+        let known = self.estimator.risk_map().view();
         for (_, pose) in &self.stuck {
             block(risks, &known, pose, self.length_m);
         }
@@ -171,12 +171,12 @@ impl RiskLayer {
     ) -> Result<(), BeliefMapError> {
         let is_moved = self.follow(position_m);
         if self.is_filled {
-            self.author.update_dirty(surface, changed)?;
+            self.estimator.update_dirty(surface, changed)?;
         } else {
-            self.author.update_all(surface)?;
+            self.estimator.update_all(surface)?;
         }
         if let Some((oracle, answer)) = self.oracle.as_mut().filter(|_| is_moved) {
-            let known = self.author.risk_map().view();
+            let known = self.estimator.risk_map().view();
             oracle(&known.geometry, known.n_yaws, answer);
         }
         self.is_filled = true;
@@ -185,13 +185,13 @@ impl RiskLayer {
 
     /// Returns whether the window moved.
     fn follow(&mut self, position_m: [f64; 2]) -> bool {
-        let now = *self.author.risk_map().geometry();
+        let now = *self.estimator.risk_map().geometry();
         let [x_m, y_m] = position_m;
         let wanted = GridGeometry::centred(now.resolution_m, now.n_rows, now.n_cols, x_m, y_m);
         let is_far = |axis: usize| (wanted.origin[axis] - now.origin[axis]).abs() >= self.recentre_cells;
         let moves = !self.is_filled || is_far(0) || is_far(1);
         if moves {
-            self.author.place_at(wanted.origin);
+            self.estimator.place_at(wanted.origin);
         }
         moves
     }

@@ -337,3 +337,6 @@ fn assumed_ground(geometry: &Geometry) -> AssumedGround {
         height_std_m: ASSUMED_HEIGHT_STD_M,
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -114,7 +114,6 @@ impl Counts {
 struct Heard {
     origin: UniquePublisherId,
     stamp: Stamp,
-    at_ns: u64,
 }
 
 /// The way out of a channel.
@@ -164,11 +163,6 @@ impl<H: Header, T: Element> Inlet<H, T> {
     /// What became of the messages so far.
     pub fn counts(&self) -> &Counts {
         &self.counts
-    }
-
-    /// When the last message that counted came in [ns]; `None` before the first.
-    pub fn heard_at_ns(&self) -> Option<u64> {
-        self.heard.map(|heard| heard.at_ns)
     }
 
     /// Takes every waiting message that counts, the oldest first, as copies that were checked. What arrives meanwhile
@@ -280,7 +274,7 @@ impl<H: Header, T: Element> Inlet<H, T> {
             let missing = stamp.sequence.saturating_sub(last.stamp.sequence.saturating_add(1));
             self.counts.lost = self.counts.lost.saturating_add(missing);
         }
-        self.heard = Some(Heard { origin, stamp, at_ns: now_ns });
+        self.heard = Some(Heard { origin, stamp });
         Ok(())
     }
 }

@@ -10,9 +10,9 @@ const ODOMETRY_MAX: usize = 32;
 const SCANS_MAX: usize = 2;
 const SURFACES_MAX: usize = 2;
 
-/// What waits for an author of risk maps.
+/// What waits for an assessor.
 #[derive(Debug, Default)]
-pub(super) struct ToAuthor {
+pub(super) struct ToAssessor {
     pub missions: Vec<MissionMessage>,
     pub stuck: Vec<StuckMessage>,
 }
@@ -25,9 +25,9 @@ pub(super) struct Mail<C> {
     pub to_pilot: VecDeque<OdometryMessage<C>>,
     pub scans: VecDeque<ScanMessage>,
     pub surfaces: VecDeque<SurfaceHeader>,
-    pub learned: ToAuthor,
+    pub learned: ToAssessor,
     /// `None` where nobody stands in.
-    pub physics: Option<ToAuthor>,
+    pub physics: Option<ToAssessor>,
     pub mission_to_pilot: Option<MissionMessage>,
     /// A learned map has come that whoever stands in has not heard of.
     pub has_learned: bool,
@@ -42,7 +42,7 @@ impl<C> Default for Mail<C> {
             to_pilot: queue(),
             scans: VecDeque::with_capacity(SCANS_MAX),
             surfaces: VecDeque::with_capacity(SURFACES_MAX),
-            learned: ToAuthor::default(),
+            learned: ToAssessor::default(),
             physics: None,
             mission_to_pilot: None,
             has_learned: false,
@@ -67,14 +67,14 @@ impl<C: Copy> Mail<C> {
 
     pub fn mission(&mut self, message: &MissionMessage) {
         self.mission_to_pilot = Some(*message);
-        self.authors().for_each(|mail| mail.missions.push(*message));
+        self.assessors().for_each(|mail| mail.missions.push(*message));
     }
 
     pub fn stuck(&mut self, message: &StuckMessage) {
-        self.authors().for_each(|mail| mail.stuck.push(*message));
+        self.assessors().for_each(|mail| mail.stuck.push(*message));
     }
 
-    fn authors(&mut self) -> impl Iterator<Item = &mut ToAuthor> {
+    fn assessors(&mut self) -> impl Iterator<Item = &mut ToAssessor> {
         std::iter::once(&mut self.learned).chain(&mut self.physics)
     }
 

@@ -91,15 +91,15 @@ impl Drive {
     }
 
     fn decide(&mut self) -> Decision {
-        self.decide_on_chart_of(u64::MAX)
+        self.decide_on_map_of(u64::MAX)
     }
 
-    fn decide_on_chart_of(&mut self, odometry_at_ns: u64) -> Decision {
+    fn decide_on_map_of(&mut self, odometry_at_ns: u64) -> Decision {
         let (map, time_to_goal) = (self.map.view(), self.field.view());
-        let chart = Chart { map, time_to_goal, goal_m: self.goal_m, odometry_at_ns };
+        let risk = RiskInput { map, time_to_goal, goal_m: self.goal_m, odometry_at_ns };
         let destination = Destination { goal_m: self.goal_m, tolerance_m: 0.5 };
         let instruction = Instruction::Drive(Target::Goal(destination));
-        let decision = self.pilot.decide(self.cycle * CYCLE_NS, Some(chart), &instruction);
+        let decision = self.pilot.decide(self.cycle * CYCLE_NS, Some(risk), &instruction);
         self.carry_out(&decision);
         self.cycle += 1;
         decision
@@ -116,13 +116,13 @@ impl Drive {
     fn follow(&mut self, instruction: &Instruction<'_>, n_cycles: usize) {
         for _ in 0..n_cycles {
             self.measure();
-            let chart = Chart {
+            let risk = RiskInput {
                 map: self.map.view(),
                 time_to_goal: self.field.view(),
                 goal_m: self.goal_m,
                 odometry_at_ns: u64::MAX,
             };
-            let decided = self.pilot.decide(self.cycle * CYCLE_NS, Some(chart), instruction);
+            let decided = self.pilot.decide(self.cycle * CYCLE_NS, Some(risk), instruction);
             self.carry_out(&decided);
             let command = decided.command(Command::default());
             let (speed_mps, steering_rad) = (f64::from(command.speed_mps), f64::from(command.steering_rad));
@@ -216,11 +216,11 @@ fn a_stop_of_the_vehicles_own_is_known_with_its_time() {
 fn backing_up_goes_on_after_a_jump_of_the_localisation() {
     let mut drive = Drive::new();
     drive.state.speed_mps = 0.0;
-    let decide = |drive: &mut Drive, chart_at_ns: u64| {
+    let decide = |drive: &mut Drive, map_frame_at_ns: u64| {
         // As sensors see it: never twice at the same place.
         drive.state.y_m += if drive.cycle.is_multiple_of(2) { 1e-3 } else { -1e-3 };
         drive.measure();
-        drive.decide_on_chart_of(chart_at_ns);
+        drive.decide_on_map_of(map_frame_at_ns);
         drive.pilot.controller().diagnostics().is_recovering
     };
     let n_cycles = (0..100).find(|_| decide(&mut drive, 0)).unwrap();

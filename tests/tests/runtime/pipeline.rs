@@ -490,7 +490,29 @@ fn processes_decide_and_map_to_the_bit_as_the_parts_in_one_object() {
     assert_eq!(first_difference(schedule, ages(), made), None);
 }
 
-/// The witness for the test above: another limit on an age, or another order of two steps, shows.
+/// Whatever happens, deciding takes no memory that it did not have; a place where the vehicle is stuck is told of by a
+/// message, which does.
+#[test]
+fn deciding_takes_no_memory() {
+    let (schedule, _) = &*RECORDED;
+    let mut parts = InProcess::new();
+    let mut n_measured = 0;
+    for (at_ns, step) in schedule {
+        let is_warm = *at_ns > BEGAN_NS + 2000 * MILLISECOND_NS;
+        if !(is_warm && matches!(step, Step::Decide)) {
+            parts.step(*at_ns, step);
+            continue;
+        }
+        let mut is_stuck = false;
+        let counted =
+            allocation_counter::measure(|| is_stuck = parts.navigator.answer(*at_ns).stuck.is_some());
+        assert!(is_stuck || counted.count_total == 0, "{counted:?} at {at_ns} ns");
+        n_measured += 1;
+    }
+    assert!(n_measured > 100, "{n_measured}");
+}
+
+/// The witness for the bits: another limit on an age, or another order of two steps, shows.
 #[test]
 fn another_age_limit_or_another_order_makes_other_decisions() {
     let (schedule, made) = &*RECORDED;

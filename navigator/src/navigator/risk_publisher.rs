@@ -4,21 +4,21 @@ use terrain::{GridGeometry, GridMap, SurfaceCell};
 use traversability::{Risk, RiskMap, RiskMapView};
 
 use super::EPOCH_NS;
-use super::mail::ToAuthor;
+use super::mail::ToAssessor;
 use crate::{Assessor, MessageId, NavigatorError, RiskHeader, RiskMessage, SurfaceHeader};
 
-pub(super) struct Author {
+pub(super) struct RiskPublisher {
     assessor: Assessor,
     map: Option<(RiskHeader, RiskMap)>,
 }
 
-impl Author {
+impl RiskPublisher {
     pub fn new(assessor: Assessor) -> Self {
         Self { assessor, map: None }
     }
 
     /// Returns whether the vehicle got stuck somewhere.
-    pub fn hear(&mut self, mail: &mut ToAuthor) -> Result<bool, NavigatorError> {
+    pub fn hear(&mut self, mail: &mut ToAssessor) -> Result<bool, NavigatorError> {
         let is_stuck = !mail.stuck.is_empty();
         mail.stuck.drain(..).for_each(|stuck| self.assessor.hear_stuck(&stuck));
         mail.missions.drain(..).try_for_each(|mission| self.assessor.hear_mission(&mission))?;

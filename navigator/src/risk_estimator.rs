@@ -8,14 +8,14 @@ use terrain::{CellRegion, GridGeometry, GridMap, SurfaceCell};
 use traversability::RiskMap;
 
 /// Makes a risk map of the surface and keeps it up to date.
-pub(crate) enum Author {
+pub(crate) enum RiskEstimator {
     /// The physics prior, or none.
     Prior(Box<PriorMap>),
     /// Networks, fused with a prior.
     Networks(Box<BeliefMap>),
 }
 
-impl Author {
+impl RiskEstimator {
     /// See [`PriorMap::new`].
     pub fn prior(
         geometry: &Geometry,
