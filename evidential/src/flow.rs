@@ -106,7 +106,9 @@ impl RadialFlow {
         }
         let end = &scratch.path[self.shapes.len() * width..];
         let square: f64 = end.iter().map(|z| z * z).sum();
-        -0.5 * (width as f64 * LOG_TWO_PI + square) + (width as f64 - 1.0) * libm::log(across) + libm::log(along)
+        -0.5 * (width as f64 * LOG_TWO_PI + square)
+            + (width as f64 - 1.0) * libm::log(across)
+            + libm::log(along)
     }
 
     /// Adds `by_density` times the gradient at the latent that `scratch` has just seen to `gradient`, and leaves the

@@ -90,7 +90,11 @@ pub enum CheckpointError {
     },
 }
 
-fn require<T: PartialEq + std::fmt::Debug>(what: &str, expected: &T, found: &T) -> Result<(), CheckpointError> {
+fn require<T: PartialEq + std::fmt::Debug>(
+    what: &str,
+    expected: &T,
+    found: &T,
+) -> Result<(), CheckpointError> {
     if expected == found {
         return Ok(());
     }
@@ -188,7 +192,11 @@ impl Checkpoint {
         for ((name, shape), tensor) in expected.iter().zip(self.tensors.values()) {
             require(&format!("shape of {name}"), shape, &tensor.shape)?;
             require(&format!("number of values of {name}"), &shape.iter().product(), &tensor.values.len())?;
-            require(&format!("finite values of {name}"), &true, &tensor.values.iter().all(|v| v.is_finite()))?;
+            require(
+                &format!("finite values of {name}"),
+                &true,
+                &tensor.values.iter().all(|v| v.is_finite()),
+            )?;
         }
         let Standardisation { mean, deviation } = self.sidecar.standardisation;
         let is_sound = mean.iter().all(|mean| mean.is_finite())
@@ -238,7 +246,8 @@ impl Checkpoint {
     pub(crate) fn familiarity(&self) -> Result<Familiarity, CheckpointError> {
         let (alpha, beta) = self.values("flow.shape")?.split_at(LAYERS);
         let flow = RadialFlow::new(self.values("flow.centre")?, alpha, beta);
-        let (means, deviations) = (self.values("flow.mean")?.to_vec(), self.values("flow.deviation")?.to_vec());
+        let (means, deviations) =
+            (self.values("flow.mean")?.to_vec(), self.values("flow.deviation")?.to_vec());
         Ok(Familiarity::new(means, deviations, flow, self.sidecar.fade))
     }
 }

@@ -1,7 +1,7 @@
 //! A model between planner and vehicle: bounded, faded, counted.
 
-use bicycle::{Command, ImuSample};
 use bicycle::lanes::Instructions;
+use bicycle::{Command, ImuSample};
 use serde::{Deserialize, Serialize};
 
 use crate::architecture::SPEED_MAX_MPS;
@@ -205,8 +205,7 @@ impl Corrector {
         if speed_mps < self.config.speed_min_mps {
             return Err(Uncorrected::Slow);
         }
-        let desired =
-            Desired { speed_mps, curvature_per_m: libm::tanf(steering_rad) / self.wheelbase_m };
+        let desired = Desired { speed_mps, curvature_per_m: libm::tanf(steering_rad) / self.wheelbase_m };
         if self.model.senses() {
             let samples = self.history.window(now_ns, self.config.age_max_ns).map_err(Uncorrected::Imu)?;
             self.model.sense(samples);

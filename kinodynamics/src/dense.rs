@@ -41,7 +41,8 @@ impl Dense {
         let n_tiles = n_outputs.div_ceil(TILE);
         let mut packed = Vec::with_capacity(n_tiles * n_inputs);
         for index in 0..n_tiles {
-            packed.extend((0..n_inputs).map(|input| tile(index, &|output| weights[output * n_inputs + input])));
+            packed
+                .extend((0..n_inputs).map(|input| tile(index, &|output| weights[output * n_inputs + input])));
         }
         let biases = (0..n_tiles).map(|index| tile(index, &|output| biases[output])).collect();
         Self { n_inputs, n_outputs, weights: packed, biases, activation }

@@ -209,8 +209,8 @@ fn check_readings(samples: &[[f32; AXES]; WINDOW], range: &ImuRange) -> Result<(
     if found > SATURATED_MAX {
         return Err(ImuFault::Saturated { found });
     }
-    let mean_mps2 = [3, 4, 5]
-        .map(|axis| samples.iter().map(|sample| sample[axis]).sum::<f32>() / WINDOW as f32);
+    let mean_mps2 =
+        [3, 4, 5].map(|axis| samples.iter().map(|sample| sample[axis]).sum::<f32>() / WINDOW as f32);
     let [least, most] = UPWARD_MPS2;
     if (least..=most).contains(&mean_mps2[2]) { Ok(()) } else { Err(ImuFault::Gravity { mean_mps2 }) }
 }

@@ -109,7 +109,8 @@ pub fn label(recording: &Recording, config: &LabelConfig) -> (Vec<Example>, Labe
     for (run, recorded) in recording.runs.iter().enumerate() {
         for (index, tick) in recorded.ticks.iter().enumerate() {
             counts.ticks += 1;
-            let Some(driven_radps) = driven_rate_radps(recorded, index, recording.tick_s, config.latency_s) else {
+            let Some(driven_radps) = driven_rate_radps(recorded, index, recording.tick_s, config.latency_s)
+            else {
                 counts.no_samples += 1;
                 continue;
             };

@@ -24,7 +24,9 @@ pub struct Latency {
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum LatencyError {
     /// The vehicle does not turn as commanded, whatever the latency.
-    #[error("latency: expected a yaw rate that follows the commands (correlation above {CORRELATION_MIN}), found {found:.2} at best")]
+    #[error(
+        "latency: expected a yaw rate that follows the commands (correlation above {CORRELATION_MIN}), found {found:.2} at best"
+    )]
     Unrelated {
         /// Largest correlation found.
         found: f64,
@@ -83,7 +85,8 @@ fn add(run: &RecordedRun, shift: u64, sums: &mut [f64; 3]) {
         }
         let commanded = f64::from(tick.speed_mps * tick.curvature_per_m);
         let measured = f64::from(sample.angular_rate_radps[2]);
-        for (sum, term) in sums.iter_mut().zip([commanded * measured, commanded * commanded, measured * measured])
+        for (sum, term) in
+            sums.iter_mut().zip([commanded * measured, commanded * commanded, measured * measured])
         {
             *sum += term;
         }

@@ -120,7 +120,9 @@ pub enum TrainError {
     #[error(transparent)]
     Latency(#[from] LatencyError),
     /// Not enough is left behind the filters.
-    #[error("training data: expected at least {EXAMPLES_MIN} examples in both halves behind the filters, found {found:?} of {ticks} commands")]
+    #[error(
+        "training data: expected at least {EXAMPLES_MIN} examples in both halves behind the filters, found {found:?} of {ticks} commands"
+    )]
     TooFew {
         /// Examples to learn from and to choose by.
         found: [usize; 2],
@@ -128,7 +130,9 @@ pub enum TrainError {
         ticks: usize,
     },
     /// Drives on one ground cannot teach how grounds differ.
-    #[error("training data: expected drives on at least two grounds for a model that senses them, found {found} alone")]
+    #[error(
+        "training data: expected drives on at least two grounds for a model that senses them, found {found} alone"
+    )]
     OneGround {
         /// The ground.
         found: String,
@@ -238,7 +242,9 @@ fn identity_rmse_per_m(examples: &[Example], places: &[usize]) -> f64 {
 fn standardisation(examples: &[Example], places: &[usize]) -> Standardisation {
     let values = |axis: usize| {
         let column = axis * WINDOW..(axis + 1) * WINDOW;
-        places.iter().flat_map(move |place| examples[*place].window[column.clone()].iter().map(|v| f64::from(*v)))
+        places
+            .iter()
+            .flat_map(move |place| examples[*place].window[column.clone()].iter().map(|v| f64::from(*v)))
     };
     let n = (places.len() * WINDOW) as f64;
     let mean: [f64; AXES] = std::array::from_fn(|axis| values(axis).sum::<f64>() / n);
@@ -309,7 +315,8 @@ impl Half {
             inputs(Desired { speed_mps, curvature_per_m })
         };
         let scales = architecture.answer_scales();
-        let target = |place: &usize| scales.iter().zip(example(place).commanded).map(|(scale, value)| value / scale);
+        let target =
+            |place: &usize| scales.iter().zip(example(place).commanded).map(|(scale, value)| value / scale);
         Ok(Self {
             windows: Tensor::from_vec(windows, (n, n_window), &Device::Cpu)?,
             desired: Tensor::from_vec(places.iter().flat_map(desired).collect(), (n, 2), &Device::Cpu)?,
@@ -379,7 +386,11 @@ fn pass(
 }
 
 /// Of the curvature, the first of the answers.
-fn validation_rmse_per_m(network: &Network, half: &Half, architecture: Architecture) -> Result<f64, TrainError> {
+fn validation_rmse_per_m(
+    network: &Network,
+    half: &Half,
+    architecture: Architecture,
+) -> Result<f64, TrainError> {
     let mut sum = 0.0;
     for begin in (0..half.n).step_by(VALIDATION_BATCH) {
         let rows: Vec<u32> = (begin..half.n.min(begin + VALIDATION_BATCH)).map(|row| row as u32).collect();

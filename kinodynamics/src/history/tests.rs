@@ -104,7 +104,8 @@ fn axes_in_another_order_and_other_units_are_told_by_gravity() {
     let swapped = filled(0..100, |_, sample| sample.acceleration_mps2.rotate_right(1));
     let told = fault(&swapped, 99).unwrap().to_string();
     assert!(told.contains("found a mean of 9.8, 0.1, 0.0 m/s2"), "{told}");
-    let in_g = filled(0..100, |_, sample| sample.acceleration_mps2 = sample.acceleration_mps2.map(|a| a / 9.81));
+    let in_g =
+        filled(0..100, |_, sample| sample.acceleration_mps2 = sample.acceleration_mps2.map(|a| a / 9.81));
     assert!(matches!(fault(&in_g, 99), Some(ImuFault::Gravity { .. })));
     let upside_down = filled(0..100, |_, sample| sample.acceleration_mps2[2] *= -1.0);
     assert!(matches!(fault(&upside_down, 99), Some(ImuFault::Gravity { .. })));

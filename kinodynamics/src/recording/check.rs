@@ -19,7 +19,9 @@ const TURNING_RADPS: f64 = 0.05;
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ImuCheckError {
     /// Nothing to judge by.
-    #[error("IMU: expected a drive with samples and turns, found {n_samples} samples and a yaw rate of {yaw_rate_radps:.3} rad/s (root mean square)")]
+    #[error(
+        "IMU: expected a drive with samples and turns, found {n_samples} samples and a yaw rate of {yaw_rate_radps:.3} rad/s (root mean square)"
+    )]
     Nothing {
         /// Samples.
         n_samples: usize,

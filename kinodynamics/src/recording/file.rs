@@ -62,14 +62,18 @@ impl Recording {
         let samples = || self.runs.iter().flat_map(|run| &run.imu);
         let (n_ticks, n_samples) = (self.n_ticks(), samples().count());
         let counts = self.runs.iter().flat_map(|run| [run.ticks.len() as u32, run.imu.len() as u32]);
-        let tick = |tick: &Tick| {
-            [tick.speed_mps, tick.curvature_per_m, tick.wheel_speed_mps, tick.yaw_rate_radps]
-        };
+        let tick =
+            |tick: &Tick| [tick.speed_mps, tick.curvature_per_m, tick.wheel_speed_mps, tick.yaw_rate_radps];
         let grounds = ticks().map(|tick| tick.ground.unwrap_or(UNKNOWN));
         let columns: [(&str, Dtype, Vec<usize>, Vec<u8>); 6] = [
             ("runs", Dtype::U32, vec![self.runs.len(), 2], counts.flat_map(u32::to_le_bytes).collect()),
             ("tick_time", Dtype::U64, vec![n_ticks], ticks().flat_map(|t| t.time_ns.to_le_bytes()).collect()),
-            ("tick", Dtype::F32, vec![n_ticks, 4], ticks().flat_map(tick).flat_map(f32::to_le_bytes).collect()),
+            (
+                "tick",
+                Dtype::F32,
+                vec![n_ticks, 4],
+                ticks().flat_map(tick).flat_map(f32::to_le_bytes).collect(),
+            ),
             ("ground", Dtype::U32, vec![n_ticks], grounds.flat_map(u32::to_le_bytes).collect()),
             (
                 "imu_time",
@@ -127,9 +131,11 @@ impl Recording {
 
 fn runs(tensors: &SafeTensors<'_>) -> Result<Vec<RecordedRun>, RecordingFileError> {
     let counts: Vec<u32> = column(tensors, "runs", Dtype::U32, 2)?.as_chunks().0.iter().map(u32_of).collect();
-    let times: Vec<u64> = column(tensors, "tick_time", Dtype::U64, 1)?.as_chunks().0.iter().map(u64_of).collect();
+    let times: Vec<u64> =
+        column(tensors, "tick_time", Dtype::U64, 1)?.as_chunks().0.iter().map(u64_of).collect();
     let values: Vec<f32> = column(tensors, "tick", Dtype::F32, 4)?.as_chunks().0.iter().map(f32_of).collect();
-    let grounds: Vec<u32> = column(tensors, "ground", Dtype::U32, 1)?.as_chunks().0.iter().map(u32_of).collect();
+    let grounds: Vec<u32> =
+        column(tensors, "ground", Dtype::U32, 1)?.as_chunks().0.iter().map(u32_of).collect();
     let imu_times: Vec<u64> =
         column(tensors, "imu_time", Dtype::U64, 1)?.as_chunks().0.iter().map(u64_of).collect();
     let imu: Vec<f32> = column(tensors, "imu", Dtype::F32, 6)?.as_chunks().0.iter().map(f32_of).collect();
@@ -253,9 +259,12 @@ mod tests {
         assert_eq!(told, "recording, tick: expected finite numbers, found inf");
         // The first count of the first run is a 4 at the end of the header: the tensor `runs` is named there.
         let header_end = 8 + u64::from_le_bytes(bytes[..8].try_into().unwrap()) as usize;
-        let place = (header_end..bytes.len() - 4).find(|k| bytes[*k..*k + 8] == [4, 0, 0, 0, 12, 0, 0, 0]).unwrap();
+        let place =
+            (header_end..bytes.len() - 4).find(|k| bytes[*k..*k + 8] == [4, 0, 0, 0, 12, 0, 0, 0]).unwrap();
         let mut other = bytes.clone();
         other[place] = 5;
-        assert!(Recording::from_bytes(&other).unwrap_err().to_string().starts_with("recording, runs: expected"));
+        assert!(
+            Recording::from_bytes(&other).unwrap_err().to_string().starts_with("recording, runs: expected")
+        );
     }
 }

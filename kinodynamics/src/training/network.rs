@@ -23,9 +23,15 @@ impl Layer {
     fn new(shape: LayerShape, rng: &mut Xoshiro256PlusPlus) -> Result<Self> {
         let LayerShape { name, n_inputs, n_outputs, activation } = shape;
         let bound = 1.0 / (n_inputs as f32).sqrt();
-        let mut uniform = |n: usize| -> Vec<f32> { (0..n).map(|_| rng.random_range(-bound..bound)).collect() };
+        let mut uniform =
+            |n: usize| -> Vec<f32> { (0..n).map(|_| rng.random_range(-bound..bound)).collect() };
         let weights = Var::from_vec(uniform(n_outputs * n_inputs), (n_outputs, n_inputs), &Device::Cpu)?;
-        Ok(Self { name, weights, biases: Var::from_vec(uniform(n_outputs), n_outputs, &Device::Cpu)?, activation })
+        Ok(Self {
+            name,
+            weights,
+            biases: Var::from_vec(uniform(n_outputs), n_outputs, &Device::Cpu)?,
+            activation,
+        })
     }
 
     fn forward(&self, inputs: &Tensor) -> Result<Tensor> {

@@ -77,17 +77,18 @@ fn history_tells_the_grounds_apart_and_a_shuffled_one_does_not() {
 #[test]
 fn flat_weights_answer_as_candle_does() {
     let recording = two_grounds(2);
-    for (embedding, answer) in [(2, Answer::Curvature), (16, Answer::SpeedAndCurvature), (0, Answer::Curvature)] {
+    for (embedding, answer) in
+        [(2, Answer::Curvature), (16, Answer::SpeedAndCurvature), (0, Answer::Curvature)]
+    {
         let sensing = if embedding == 0 { Sensing::Blind } else { Sensing::Imu { embedding } };
-        let settings = Settings {
-            architecture: Architecture { sensing, answer },
-            ..settings(sensing, 2)
-        };
+        let settings = Settings { architecture: Architecture { sensing, answer }, ..settings(sensing, 2) };
         let outcome = train(&recording, &settings, "test", &mut |_| ControlFlow::Continue(())).unwrap();
         let network = Network::new(&settings.architecture, 5).unwrap();
         for (variable, (name, _)) in named(&network) {
             let tensor = &outcome.checkpoint.tensors()[&name];
-            variable.set(&Tensor::from_slice(&tensor.values, tensor.shape.clone(), &Device::Cpu).unwrap()).unwrap();
+            variable
+                .set(&Tensor::from_slice(&tensor.values, tensor.shape.clone(), &Device::Cpu).unwrap())
+                .unwrap();
         }
         let labels = outcome.checkpoint.sidecar().labels;
         let (examples, _) = label(&recording, &labels);
@@ -133,17 +134,22 @@ fn named(network: &Network) -> Vec<(Var, (String, Vec<usize>))> {
 #[test]
 fn familiarity_is_whole_on_what_was_learned_and_none_far_from_it() {
     let recording = two_grounds(3);
-    let outcome =
-        train(&recording, &settings(Sensing::Imu { embedding: 2 }, 2), "test", &mut |_| ControlFlow::Continue(()))
-            .unwrap();
+    let outcome = train(&recording, &settings(Sensing::Imu { embedding: 2 }, 2), "test", &mut |_| {
+        ControlFlow::Continue(())
+    })
+    .unwrap();
     let mut model = InverseModel::new(&outcome.checkpoint, Instructions::widest()).unwrap();
     let (examples, _) = label(&recording, &outcome.checkpoint.sidecar().labels);
     let share = |model: &mut InverseModel, gain: f32| {
-        let shares = examples.iter().step_by(10).map(|example| {
-            let shaken: Vec<f32> = example.window.iter().map(|value| gain * value).collect();
-            model.sense_columns(&shaken);
-            f64::from(model.familiarity(Desired { speed_mps: example.driven[0], curvature_per_m: example.driven[1] }))
-        });
+        let shares =
+            examples.iter().step_by(10).map(|example| {
+                let shaken: Vec<f32> = example.window.iter().map(|value| gain * value).collect();
+                model.sense_columns(&shaken);
+                f64::from(model.familiarity(Desired {
+                    speed_mps: example.driven[0],
+                    curvature_per_m: example.driven[1],
+                }))
+            });
         let shares: Vec<f64> = shares.collect();
         shares.iter().sum::<f64>() / shares.len() as f64
     };

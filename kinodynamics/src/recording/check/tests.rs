@@ -46,7 +46,10 @@ fn other_axes_signs_and_units_are_told_by_what_they_look_like() {
         sample.acceleration_mps2.rotate_right(1);
         sample.angular_rate_radps.rotate_right(1);
     });
-    assert!(message.ends_with("9.81 forward, 0.20 left, 0.50 up; the axis called forward points up"), "{message}");
+    assert!(
+        message.ends_with("9.81 forward, 0.20 left, 0.50 up; the axis called forward points up"),
+        "{message}"
+    );
     let message = told(|sample| sample.acceleration_mps2[2] *= -1.0);
     assert!(message.ends_with("the upward axis points down"), "{message}");
     let message = told(|sample| sample.acceleration_mps2 = sample.acceleration_mps2.map(|a| a / 9.81));
