@@ -8,11 +8,13 @@
 mod lap;
 mod machine;
 mod probe;
+mod recorded;
 mod report;
 mod surfaces;
 mod teleoperation;
 mod track;
 mod verdict;
+mod walls;
 
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -31,13 +33,14 @@ pub use lap::{DrivenLap, Failure};
 use lap::{Driver, Lap, Told, drive_lap};
 pub use machine::{DEVIATIONS, TICK_S, VEHICLE};
 pub use probe::Probe;
+pub use recorded::{LogReport, LogRow, OverRuns, judge_log};
 pub use report::{Quartiles, RowReport, TrackReport};
 pub use surfaces::{Layout, SURFACES};
 pub use teleoperation::{Teleoperation, teleoperate};
 pub use track::Track;
 pub use verdict::{Ratio, Verdict};
 
-/// From the path to the walls [m]: tuned once, with the nominal model alone, to the paper's 52 % of turns (seed 1: see
+/// From the middle line to the walls [m]: tuned once, with the nominal model alone, to the paper's 52 % of turns (seed 1: see
 /// docs/kinodynamics.md), then frozen.
 pub const HALF_WIDTH_M: f64 = 0.35;
 /// Target speeds on the outdoor track [m/s].
@@ -215,6 +218,12 @@ pub enum KinodynamicsError {
         /// Examples to judge on.
         n_test: usize,
     },
+    /// A log that says too little.
+    #[error("log: expected at least 2 runs with wz, cmd_speed and cmd_steer, found {found}")]
+    TooFewRuns {
+        /// Runs with these.
+        found: usize,
+    },
     /// The latency cannot be told.
     #[error(transparent)]
     Latency(#[from] kinodynamics::LatencyError),
@@ -354,6 +363,7 @@ fn laps(
         ground(track, seed_of(request.seed, &[0x7AC, track.n_turns() as u64, u64::from(lap)])).map(Arc::new)
     });
     let worlds: Vec<Arc<World>> = worlds.collect::<Result<_, _>>()?;
+    let middle = walls::middle_line(track);
     let n = drivers.len() * speeds_mps.len() * worlds.len();
     watch.stage(Stage::Laps(n as u64));
     let per_driver = speeds_mps.len() * worlds.len();
@@ -366,6 +376,7 @@ fn laps(
         let asked = Lap {
             vehicle: &request.vehicle,
             track,
+            middle: &middle,
             world: Arc::clone(&worlds[lap]),
             driver: &drivers[driver].1,
             speed_mps: speeds_mps[speed],

@@ -20,7 +20,7 @@ use crate::checkpoint::{Checkpoint, CheckpointError, Sidecar, Standardisation};
 use crate::label::{Example, LabelConfig, LabelCounts, label};
 use crate::latency::{Latency, LatencyError, estimate_latency};
 use crate::model::{Desired, inputs};
-use crate::recording::{ImuCheckError, Recording, check_imu};
+use crate::recording::{ImuCheckError, Recording, VehicleSummary, check_imu};
 use crate::split::{Split, block_split};
 use network::Network;
 
@@ -214,6 +214,46 @@ pub fn train(
         identity_rmse_per_m: identity_rmse_per_m(&examples, &split.validation),
         n_examples,
     })
+}
+
+/// Fits a blind model to examples without histories, as a log without the unit gives them.
+///
+/// # Errors
+/// An architecture that senses, too few examples, and what [`train`] refuses in settings.
+pub fn train_blind(examples: &[Example], settings: &Settings) -> Result<Checkpoint, TrainError> {
+    validate(settings)?;
+    if settings.architecture.senses() {
+        let expected = "a blind architecture: there are no histories";
+        return Err(TrainError::Setting {
+            field: "embedding",
+            expected,
+            found: settings.architecture.n_embedding() as f64,
+        });
+    }
+    let split = block_split(examples, settings.seed);
+    let found = [split.training.len(), split.validation.len()];
+    if found[0] < EXAMPLES_MIN || found[1] < EXAMPLES_MIN / 10 {
+        return Err(TrainError::TooFew { found, ticks: examples.len() });
+    }
+    let standardisation = Standardisation { mean: [0.0; AXES], deviation: [1.0; AXES] };
+    let data = Data::new(examples, &split, &standardisation, settings)?;
+    let network = Network::new(&settings.architecture, settings.seed)?;
+    fit(&network, &data, settings, &mut |_| ControlFlow::Continue(()))?;
+    let mut tensors = network.tensors()?;
+    let fade = density::fit(&data, settings, &mut tensors)?;
+    let sidecar = Sidecar {
+        format: 0,
+        revision: String::new(),
+        vehicle: VehicleSummary { name: String::new(), wheelbase_m: 1.0, steering_max_rad: 1.0 },
+        architecture: settings.architecture,
+        standardisation,
+        fade,
+        latency: Latency { seconds: settings.labels.latency_s, correlation: 1.0 },
+        labels: settings.labels,
+        grounds: Vec::new(),
+        weights_sha256: String::new(),
+    };
+    Ok(Checkpoint::new(sidecar, tensors)?)
 }
 
 fn validate(settings: &Settings) -> Result<(), TrainError> {

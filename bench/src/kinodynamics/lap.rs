@@ -64,13 +64,15 @@ pub struct Lap<'a> {
     pub vehicle: &'a Vehicle,
     /// The path.
     pub track: &'a Track,
+    /// The middle between the walls.
+    pub middle: &'a Track,
     /// The ground.
     pub world: Arc<World>,
     /// Who drives.
     pub driver: &'a Driver,
     /// Target speed [m/s].
     pub speed_mps: f64,
-    /// From the path to the walls [m]; none drives without walls.
+    /// From there to the walls [m].
     pub half_width_m: f64,
     /// Decides the sensors' noise.
     pub seed: u64,
@@ -141,6 +143,8 @@ struct Attempt {
     machine: Machine,
     asker: Asker,
     way_m: f64,
+    /// The same along the middle line.
+    middle_m: f64,
     stuck: usize,
     distance_m: f64,
     n_samples: f64,
@@ -150,7 +154,9 @@ struct Attempt {
 impl Attempt {
     fn new(lap: &Lap<'_>, turn: usize, instructions: Instructions) -> Result<Self, KinodynamicsError> {
         let way_m = lap.track.turn_begin_m(turn);
-        let ([x_m, y_m], yaw_rad) = lap.track.place(way_m);
+        let (on_path, _) = lap.track.place(way_m);
+        let (middle_m, _) = lap.middle.project(on_path, 0.0, lap.middle.length_m());
+        let ([x_m, y_m], yaw_rad) = lap.middle.place(middle_m);
         let seed = seed_of(lap.seed, &[turn as u64]);
         let mut machine = Machine::new(lap.vehicle, Arc::clone(&lap.world), [x_m, y_m, yaw_rad], seed)?;
         let mut asker = Asker::new(lap.driver, seed, instructions)?;
@@ -158,7 +164,16 @@ impl Attempt {
             machine.drive([0.0, 0.0], |_| {})?;
             asker.hear(&machine);
         }
-        Ok(Self { machine, asker, way_m, stuck: 0, distance_m: 0.0, n_samples: 0.0, path_m: Vec::new() })
+        Ok(Self {
+            machine,
+            asker,
+            way_m,
+            middle_m,
+            stuck: 0,
+            distance_m: 0.0,
+            n_samples: 0.0,
+            path_m: Vec::new(),
+        })
     }
 
     /// Drives until a turn fails or the lap ends.
@@ -184,34 +199,33 @@ impl Attempt {
         }
     }
 
-    /// What the planner wants: the target speed, and of a hundred curvatures the one whose arc ends nearest to the point of
-    /// the path one metre ahead in the line of sight (equation 8).
+    /// What the planner wants from where it thinks it is.
     fn wish(&mut self, lap: &Lap<'_>) -> Desired {
         let odometry = self.machine.measure();
         let [x_m, y_m, _] = odometry.position_m;
         let (way_m, _) = lap.track.project([x_m, y_m], self.way_m, REACH_M);
-        let carrot = lap.track.carrot([x_m, y_m], way_m, LOOKAHEAD_M);
-        let (sin, cos) = odometry.attitude_rad[2].sin_cos();
-        let [east_m, north_m] = [carrot[0] - x_m, carrot[1] - y_m];
-        let [ahead_m, left_m] = [cos * east_m + sin * north_m, cos * north_m - sin * east_m];
-        Desired { speed_mps: lap.speed_mps as f32, curvature_per_m: best_curvature(ahead_m, left_m) as f32 }
+        let pose = [x_m, y_m, odometry.attitude_rad[2]];
+        let curvature_per_m = nominal_curvature_per_m(lap.track, pose, way_m) as f32;
+        Desired { speed_mps: lap.speed_mps as f32, curvature_per_m }
     }
 
     fn advance(&mut self, lap: &Lap<'_>, command: [f32; 2]) -> Result<Option<Failure>, KinodynamicsError> {
-        let Self { machine, way_m, stuck, distance_m, n_samples, path_m, .. } = self;
+        let Self { machine, way_m, middle_m, stuck, distance_m, n_samples, path_m, .. } = self;
         let mut failure = None;
         let watch = |plant: &Plant| {
             let motion = plant.motion();
             let pose = motion.pose;
             let (at_m, off_m) = lap.track.project([pose.x_m, pose.y_m], *way_m, REACH_M);
             *way_m = way_m.max(at_m);
+            let (beside_m, aside_m) = lap.middle.project([pose.x_m, pose.y_m], *middle_m, REACH_M);
+            *middle_m = middle_m.max(beside_m);
             *distance_m += off_m.min(DISTANCE_MAX_M);
             *n_samples += 1.0;
             let is_slow = motion.velocity_mps[0].abs() < STUCK_MPS;
             *stuck = if is_slow { *stuck + 1 } else { 0 };
             let (_, heading_rad) = lap.track.place(*way_m);
             let off_rad = (pose.yaw_rad - heading_rad).sin().atan2((pose.yaw_rad - heading_rad).cos());
-            let found = if off_m > lap.half_width_m {
+            let found = if aside_m > lap.half_width_m {
                 Some(Failure::Collision)
             } else if plant.rolled_over() || off_rad.abs() > SPUN_RAD {
                 Some(Failure::Spun)
@@ -227,6 +241,15 @@ impl Attempt {
         path_m.push([pose.x_m as f32, pose.y_m as f32]);
         Ok(failure)
     }
+}
+
+/// What the planner asks for: of a hundred curvatures the one whose arc ends nearest to the point of the path one metre ahead
+/// in the line of sight (equation 8) [1/m].
+pub(super) fn nominal_curvature_per_m(track: &Track, [x_m, y_m, yaw_rad]: [f64; 3], way_m: f64) -> f64 {
+    let carrot = track.carrot([x_m, y_m], way_m, LOOKAHEAD_M);
+    let (sin, cos) = yaw_rad.sin_cos();
+    let [east_m, north_m] = [carrot[0] - x_m, carrot[1] - y_m];
+    best_curvature(cos * east_m + sin * north_m, cos * north_m - sin * east_m)
 }
 
 /// The curvature whose arc of one metre ends nearest to a point ahead and to the left [1/m].

@@ -63,13 +63,19 @@ impl Track {
         Self::new("indoor", &INDOOR_M, &INDOOR_TURNS)
     }
 
-    fn new(name: &'static str, nodes_m: &[[f64; 2]], turns: &[Turn]) -> Self {
+    /// A closed line without turns.
+    pub(super) fn closed(name: &'static str, nodes_m: Vec<[f64; 2]>) -> Self {
         let n = nodes_m.len();
         let mut way_m = vec![0.0];
         for k in 0..n {
             way_m.push(way_m[k] + distance_m(nodes_m[k], nodes_m[(k + 1) % n]));
         }
-        let length_m = way_m[n];
+        Self { name, nodes_m, way_m, turn_ends_m: Vec::new() }
+    }
+
+    fn new(name: &'static str, nodes_m: &[[f64; 2]], turns: &[Turn]) -> Self {
+        let line = Self::closed(name, nodes_m.to_vec());
+        let (n, way_m, length_m) = (nodes_m.len(), &line.way_m, line.length_m());
         let at = |node: usize| way_m[node % n] + (node / n) as f64 * length_m;
         // Half-way between the last node of a turn and the first of the next.
         let ends = (0..turns.len()).map(|turn| {
@@ -77,7 +83,7 @@ impl Track {
             let next = turns.get(turn + 1).map_or(n + turns[0][0], |next| next[0]);
             0.5 * (at(last) + at(next))
         });
-        Self { name, nodes_m: nodes_m.to_vec(), turn_ends_m: ends.collect(), way_m }
+        Self { turn_ends_m: ends.collect(), ..line.clone() }
     }
 
     /// Number of turns.

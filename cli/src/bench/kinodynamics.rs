@@ -2,6 +2,7 @@
 #![allow(clippy::disallowed_methods, reason = "people are told how long the benchmark takes")]
 
 mod html;
+mod log;
 mod told;
 
 use std::io::IsTerminal;
@@ -34,6 +35,9 @@ pub(crate) fn run_kinodynamics(arguments: &BenchKinodynamicsArguments) -> anyhow
         .map_err(|error| UsageError(format!("--out: {}", UsageError::from_input(error))))?;
     arguments.json.as_deref().map_or(Ok(()), output::prepare_json)?;
     interrupt::catch_interrupts()?;
+    if let Some(path) = &arguments.log {
+        return log::run(arguments, path);
+    }
     let request = request(arguments)?;
     let pool = rayon::ThreadPoolBuilder::new().num_threads(arguments.n_threads()).build()?;
     let progress = Progress(if std::io::stderr().is_terminal() {
