@@ -5,6 +5,8 @@
 //! Ground, car and walls were settled before the first model was trained; the walls alone were tuned, once, until the nominal
 //! model failed as often as the paper's. What belongs to the plant is of other equations than what learns from it.
 
+mod data_curve;
+mod ground;
 mod lap;
 mod machine;
 mod probe;
@@ -12,6 +14,7 @@ mod recorded;
 mod report;
 mod surfaces;
 mod teleoperation;
+mod timing;
 mod track;
 mod verdict;
 mod walls;
@@ -29,6 +32,9 @@ use rayon::prelude::*;
 use scenarios::{CommandError, PlantError, World, WorldError, seed_of, stream};
 use serde::Serialize;
 
+use crate::Spread;
+pub use data_curve::{DataPoint, data_curve};
+pub use ground::GroundReport;
 pub use lap::{DrivenLap, Failure};
 use lap::{Driver, Lap, Told, drive_lap};
 pub use machine::{DEVIATIONS, TICK_S, VEHICLE};
@@ -42,7 +48,7 @@ pub use verdict::{Ratio, Verdict};
 
 /// From the middle line to the walls [m]: tuned once, with the nominal model alone, to the paper's 52 % of turns (seed 1: see
 /// docs/kinodynamics.md), then frozen.
-pub const HALF_WIDTH_M: f64 = 0.35;
+pub const HALF_WIDTH_M: f64 = 0.24;
 /// Target speeds on the outdoor track [m/s].
 pub const OUTDOOR_MPS: [f64; 10] = [1.6, 1.7, 1.8, 1.9, 2.0, 2.1, 2.2, 2.3, 2.4, 2.5];
 /// Target speeds on the indoor track [m/s].
@@ -146,7 +152,7 @@ pub struct Request {
     pub laps: u32,
     /// Which models.
     pub rows: Vec<Row>,
-    /// From the path to the walls [m].
+    /// From the middle line to the walls [m].
     pub half_width_m: f64,
 }
 
@@ -182,6 +188,10 @@ pub struct Report {
     pub latency: Latency,
     /// What can be told of the ground.
     pub probe: Probe,
+    /// What each surface does to the curvature.
+    pub grounds: Vec<GroundReport>,
+    /// What one answer of the learned model costs, from samples to command [us]; none without it.
+    pub answer_us: Option<Spread>,
     /// The trainings.
     pub trainings: Vec<TrainingReport>,
     /// The outdoor track on the four surfaces.
@@ -265,6 +275,7 @@ pub fn measure(request: &Request, revision: &str, watch: &dyn Watch) -> Result<R
     let labels = kinodynamics::LabelConfig::unfiltered(latency.seconds);
     let (examples, _) = label(&recording, &labels);
     let probe = probe::probe(&examples, SURFACES.len(), request.seed)?;
+    let grounds = ground::grounds(&recording, &examples);
     let (mut drivers, mut trainings) = (Vec::new(), Vec::new());
     for &row in &request.rows {
         let (driver, training) = prepare(request, row, &recording, &examples, (revision, watch))?;
@@ -275,8 +286,22 @@ pub fn measure(request: &Request, revision: &str, watch: &dyn Watch) -> Result<R
     let outdoor = laps(request, &Track::outdoor(), &OUTDOOR_MPS, &drivers, (instructions, watch))?;
     let indoor = laps(request, &Track::indoor(), &INDOOR_MPS, &drivers, (instructions, watch))?;
     let verdicts = verdict::verdicts(&outdoor, &indoor, &probe, request.seed);
+    let answer_us = timing::answer_us(&drivers, &examples, instructions)?;
     let &Request { seed, minutes, laps, half_width_m, .. } = request;
-    Ok(Report { seed, minutes, laps, half_width_m, latency, probe, trainings, outdoor, indoor, verdicts })
+    Ok(Report {
+        seed,
+        minutes,
+        laps,
+        half_width_m,
+        latency,
+        probe,
+        grounds,
+        answer_us,
+        trainings,
+        outdoor,
+        indoor,
+        verdicts,
+    })
 }
 
 /// Drives the outdoor track with the nominal model between walls of these half-widths, to tune them: the share of turns that

@@ -8,8 +8,8 @@ use std::ops::ControlFlow;
 use bicycle::ImuSample;
 use bicycle::lanes::Instructions;
 use kinodynamics::{
-    Architecture, Desired, InverseModel, PERIOD_NS, RecordedRun, Recording, Settings, Tick, VehicleSummary,
-    WINDOW, train,
+    Answer, Architecture, Desired, InverseModel, PERIOD_NS, RecordedRun, Recording, Sensing, Settings, Tick,
+    VehicleSummary, WINDOW, train,
 };
 
 /// Numbers between -1 and 1 that look random.
@@ -61,7 +61,9 @@ fn main() -> Result<(), Box<dyn Error>> {
         grounds: vec!["smooth".into(), "rough".into()],
         runs: (0..3).map(|_| minute(noise)).collect(),
     };
-    let settings = Settings { epochs: 12, ..Settings::paper(Architecture::PAPER, 1) };
+    // Three minutes are little: a wider embedding and larger steps than the paper's.
+    let architecture = Architecture { sensing: Sensing::Imu { embedding: 16 }, answer: Answer::Curvature };
+    let settings = Settings { epochs: 25, learning_rate: 1e-3, ..Settings::paper(architecture, 1) };
     let trained = train(&recording, &settings, "example", &mut |_| ControlFlow::Continue(()))?;
     let mut model = InverseModel::new(&trained.checkpoint, Instructions::widest())?;
     let wish = Desired { speed_mps: 1.6, curvature_per_m: 0.6 };

@@ -236,3 +236,6 @@ impl Corrector {
         *count += 1;
     }
 }
+
+#[cfg(test)]
+mod tests;

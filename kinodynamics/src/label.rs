@@ -4,6 +4,7 @@
 //! are one example; the yaw rate over the speed is the curvature that was driven, and the command is the answer to it.
 //! Its filters keep understeer only. Each of them is an option here, and what each takes away is counted.
 
+use bicycle::ImuSample;
 use serde::{Deserialize, Serialize};
 
 use crate::architecture::{AXES, CURVATURE_MAX_PER_M, WINDOW};
@@ -109,8 +110,8 @@ pub fn label(recording: &Recording, config: &LabelConfig) -> (Vec<Example>, Labe
     for (run, recorded) in recording.runs.iter().enumerate() {
         for (index, tick) in recorded.ticks.iter().enumerate() {
             counts.ticks += 1;
-            let Some(driven_radps) = driven_rate_radps(recorded, index, recording.tick_s, config.latency_s)
-            else {
+            let driven = driven_rate_radps(recorded, index, recording.tick_s, config.latency_s);
+            let (Some(driven_radps), Some(samples)) = (driven, window(recorded, tick.time_ns)) else {
                 counts.no_samples += 1;
                 continue;
             };
@@ -124,16 +125,12 @@ pub fn label(recording: &Recording, config: &LabelConfig) -> (Vec<Example>, Labe
                 *filter(&mut counts) += 1;
                 continue;
             }
-            let Some(window) = window(recorded, tick.time_ns) else {
-                counts.no_samples += 1;
-                continue;
-            };
             counts.kept += 1;
             examples.push(Example {
                 time_s: (tick.time_ns - recorded.ticks[0].time_ns) as f64 * 1e-9,
                 driven: [speed_mps, driven_per_m],
                 commanded: [commanded_per_m, tick.speed_mps],
-                window,
+                window: columns(samples.iter().map(numbers)),
                 run,
                 ground: tick.ground,
             });
@@ -192,16 +189,16 @@ fn wheel_speed_mps(run: &RecordedRun, index: usize, latency_s: f64) -> f32 {
 }
 
 /// The samples up to a command, none of them missing.
-fn window(run: &RecordedRun, time_ns: u64) -> Option<Vec<f32>> {
+fn window(run: &RecordedRun, time_ns: u64) -> Option<&[ImuSample]> {
     let end = run.imu.partition_point(|sample| sample.valid_at_ns <= time_ns);
     let samples = &run.imu[end.checked_sub(WINDOW)?..end];
     let (first, last) = (samples[0].valid_at_ns, samples[WINDOW - 1].valid_at_ns);
     let is_whole = last - first <= WINDOW as u64 * PERIOD_NS && time_ns - last <= 2 * PERIOD_NS;
-    is_whole.then(|| columns(samples.iter().map(numbers)))
+    is_whole.then_some(samples)
 }
 
 /// One column of all samples for each component.
-pub(crate) fn columns(samples: impl Iterator<Item = [f32; AXES]> + Clone) -> Vec<f32> {
+fn columns(samples: impl Iterator<Item = [f32; AXES]> + Clone) -> Vec<f32> {
     (0..AXES).flat_map(|axis| samples.clone().map(move |sample| sample[axis])).collect()
 }
 

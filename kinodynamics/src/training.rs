@@ -476,4 +476,4 @@ fn keep(
 }
 
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;

@@ -256,7 +256,7 @@ mod tests {
 
     #[test]
     fn bicycle_finds_the_understeer_of_a_car_and_the_network_comes_near() {
-        let report = judge_log(&log(), 0.324, 5, 1).unwrap();
+        let report = judge_log(&log(), 0.324, 60, 1).unwrap();
         for [gain, understeer, _] in &report.effects {
             assert!((gain - 1.1).abs() < 0.02 && (understeer - 0.08).abs() < 0.01, "{gain} {understeer}");
         }

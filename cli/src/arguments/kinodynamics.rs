@@ -114,7 +114,7 @@ pub struct BenchKinodynamicsArguments {
     #[arg(long, value_name = "N", value_parser = values::seed, default_value = "1", allow_hyphen_values = true)]
     pub seed: u64,
 
-    /// From the path to the walls [m] [default: 0.35, tuned once on the nominal model]
+    /// From the line that the planner would drive if its model were right to the walls [m] [default: 0.24, tuned once on the nominal model]
     #[arg(long, value_name = "METRES", value_parser = half_width_m, allow_hyphen_values = true)]
     pub half_width: Option<f64>,
 
@@ -123,8 +123,13 @@ pub struct BenchKinodynamicsArguments {
           allow_hyphen_values = true, conflicts_with_all = ["rows", "half_width"])]
     pub tune_walls: Vec<f64>,
 
+    /// Train on the first so many minutes of one drive, and judge the models on another
+    #[arg(long, value_name = "MINUTES,..", value_parser = minutes, value_delimiter = ',',
+          allow_hyphen_values = true, conflicts_with_all = ["rows", "half_width", "tune_walls", "minutes", "laps"])]
+    pub data_minutes: Vec<u32>,
+
     /// Judge models of a real car's recorded drives instead: CSV with run, t, wz, cmd_speed and cmd_steer
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["rows", "half_width", "tune_walls", "minutes", "laps"])]
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["rows", "half_width", "tune_walls", "data_minutes", "minutes", "laps"])]
     pub log: Option<PathBuf>,
 
     /// Laps and trainings at a time, 1 to 256 [default: the machine's threads]; the result does not depend on it
@@ -217,5 +222,6 @@ Intervals are 95 %: Wilson's of shares, of ratios a bootstrap over laps. With --
 Examples:
   surefoot bench kinodynamics                          all models, about a quarter of an hour
   surefoot bench kinodynamics --rows paper --minutes 5 --epochs 10 --laps 2
+  surefoot bench kinodynamics --data-minutes 1,5,20,60
   surefoot bench kinodynamics --tune-walls 0.3,0.35,0.4
   surefoot bench kinodynamics --log drives.csv";

@@ -9,7 +9,8 @@ use std::io::IsTerminal;
 use std::time::Instant;
 
 use ::bench::kinodynamics::{
-    HALF_WIDTH_M, KinodynamicsError, Report, Request, Row, Stage, VEHICLE, Watch, measure, tune_walls,
+    HALF_WIDTH_M, KinodynamicsError, Report, Request, Row, Stage, VEHICLE, Watch, data_curve, measure,
+    tune_walls,
 };
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
@@ -51,6 +52,18 @@ pub(crate) fn run_kinodynamics(arguments: &BenchKinodynamicsArguments) -> anyhow
         progress.0.finish_and_clear();
         for [half_width_m, success] in tuned {
             println!("  {half_width_m:.3} m: {:.1} % of the turns succeed", 100.0 * success);
+        }
+        return Ok(());
+    }
+    if !arguments.data_minutes.is_empty() {
+        let points =
+            pool.install(|| data_curve(&request, &arguments.data_minutes, summary::revision(), &progress));
+        let points = points.map_err(told_error)?;
+        progress.0.finish_and_clear();
+        print!("{}", told::data_curve(&points));
+        let file = arguments.out.join("kinodynamics_data.json");
+        for path in [Some(&file), arguments.json.as_ref()].into_iter().flatten() {
+            formats::write_json_atomic(path, &points)?;
         }
         return Ok(());
     }

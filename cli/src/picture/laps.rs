@@ -30,7 +30,7 @@ pub fn draw_laps(report: &TrackReport, half_width_m: f64) -> Result<Vec<u8>, Pic
 fn page(report: &TrackReport, half_width_m: f64) -> Canvas {
     let bars_top = TOP + MAP_HEIGHT + 150.0;
     let mut canvas = Canvas::new(PAGE_WIDTH, bars_top + BARS_HEIGHT + BELOW);
-    let title = format!("Laps of the {} track, walls {half_width_m} m from the path", report.track);
+    let title = format!("Laps of the {} track, walls {half_width_m} m from the nominal line", report.track);
     canvas.text((MARGIN, 48.0), &title, TextStyle::new(30, Anchor::Start).bold());
     let rows: Vec<&RowReport> = report.rows.iter().take(DRAWN).collect();
     for (k, row) in rows.iter().enumerate() {

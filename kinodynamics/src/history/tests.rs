@@ -52,7 +52,7 @@ fn few_missing_samples_are_the_last_before_them() {
     let window: Vec<f32> = history.window(sample(109).valid_at_ns, 0).unwrap().map(|s| s[2]).collect();
     // 10 to 99, then 99 twice for 100, 101 and 102 without themselves, then 103 to 109.
     let mut expected: Vec<f32> = (10..100).map(|k| 0.001 * k as f32).collect();
-    expected.extend([0.099; 3]);
+    expected.extend([0.001 * 99.0; 3]);
     expected.extend((103..110).map(|k| 0.001 * k as f32));
     assert_eq!(window, expected);
     assert_eq!(history.counts().made_up, 3);

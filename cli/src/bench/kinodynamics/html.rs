@@ -15,7 +15,7 @@ img{width:100%;height:auto;margin:.6em 0}.soft{color:#5a6474}.fails{color:#d61f3
 pub(super) fn page(report: &Report, pictures: &[Vec<u8>], revision: &str) -> String {
     let mut body = format!(
         "<h1>Inverse kinodynamics</h1>\n<p class=\"soft\">{} minutes of random driving, seed {}, {} laps at every speed, walls \
-         {} m from the path, revision {revision}.</p>\n",
+         {} m from the nominal line, revision {revision}.</p>\n",
         report.minutes, report.seed, report.laps, report.half_width_m
     );
     for (place, track) in [&report.outdoor, &report.indoor].into_iter().enumerate() {

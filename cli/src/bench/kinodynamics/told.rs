@@ -1,6 +1,6 @@
 //! The report as text.
 
-use ::bench::kinodynamics::{Report, Row, RowReport, TrackReport, TrainingReport, Verdict};
+use ::bench::kinodynamics::{DataPoint, Report, Row, RowReport, TrackReport, TrainingReport, Verdict};
 
 /// What the paper's tables and its published counts give: success outdoors and indoors [%].
 pub(super) fn published(row: Row) -> [Option<f64>; 2] {
@@ -14,7 +14,7 @@ pub(super) fn published(row: Row) -> [Option<f64>; 2] {
 
 pub(super) fn report(report: &Report) -> String {
     let mut told = format!(
-        "  {} minutes of random driving, latency {:.3} s; walls {} m from the path; {} laps at every speed\n  the ground \
+        "  {} minutes of random driving, latency {:.3} s; walls {} m from the nominal line; {} laps at every speed\n  the ground \
          is named rightly in {:.2} of the cases from the unit, {:.2} from speed and curvature, {:.2} by chance\n\n",
         report.minutes,
         report.latency.seconds,
@@ -24,6 +24,20 @@ pub(super) fn report(report: &Report) -> String {
         report.probe.from_wish,
         report.probe.chance
     );
+    told += "  driven over commanded curvature   1.2 to 1.8 m/s   2.0 to 2.6 m/s\n";
+    for ground in &report.grounds {
+        let [slow, fast] = ground
+            .driven_over_commanded
+            .map(|ratio| ratio.map_or("-".to_owned(), |ratio| format!("{ratio:.3}")));
+        told += &format!("  {:<32}{slow:>16}{fast:>17}\n", ground.name);
+    }
+    told.push('\n');
+    if let Some(spread) = report.answer_us {
+        told += &format!(
+            "  one answer of the learned model takes {:.0} us (median; least {:.0}, 99th percentile {:.0})\n\n",
+            spread.median, spread.min, spread.p99
+        );
+    }
     told += "  training                 examples   curvature off by [1/m]   the wish itself\n";
     told.extend(report.trainings.iter().map(training));
     for (place, track) in [&report.outdoor, &report.indoor].into_iter().enumerate() {
@@ -33,6 +47,25 @@ pub(super) fn report(report: &Report) -> String {
     }
     told += "\n  rules\n";
     told.extend(report.verdicts.iter().map(verdict));
+    told
+}
+
+/// Errors over minutes of own data.
+pub(super) fn data_curve(points: &[DataPoint]) -> String {
+    let mut told = format!(
+        "  {:>8}  {:<12}{:>24}{:>18}{:>10}\n",
+        "minutes", "model", "command off by [1/m]", "the wish itself", "examples"
+    );
+    for point in points {
+        told += &format!(
+            "  {:>8}  {:<12}{:>24.4}{:>18.4}{:>10}\n",
+            point.minutes,
+            point.row.name(),
+            point.rmse_per_m,
+            point.identity_rmse_per_m,
+            point.n
+        );
+    }
     told
 }
 
