@@ -1,6 +1,6 @@
 //! What things cost on this machine, and the tables that are published: one update of the controller ([`control`]), a
 //! risk map of the physics prior ([`prior_map`]) and of what was learned ([`learned_map`]), learning ([`learning`],
-//! [`traction_map`]), navigation ([`navigation`]), diagnoses ([`gap_score`], [`gap_closed_loop`]) and the plant itself
+//! [`traction_map`]), navigation ([`navigation`]), inverse kinodynamics ([`mod@kinodynamics`]), diagnoses ([`gap_score`], [`gap_closed_loop`]) and the plant itself
 //! ([`plant`]). A part of [Surefoot](../cli/index.html).
 //!
 //! All of it goes through the interfaces that a drive uses. [`closed_loop`] puts plant and planner together;
@@ -12,6 +12,7 @@ pub mod control;
 mod error;
 pub mod gap_closed_loop;
 pub mod gap_score;
+pub mod kinodynamics;
 pub mod learned_map;
 pub mod learning;
 pub mod navigation;

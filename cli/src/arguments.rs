@@ -8,6 +8,7 @@ mod drive;
 mod gap;
 mod gap_check;
 mod inspect;
+mod kinodynamics;
 mod learned_map;
 mod orders;
 mod plant;
@@ -29,6 +30,10 @@ pub use drive::{DriveArguments, InstructionSet, MapSource, Method, Pace};
 pub use gap::{GapApplyArguments, GapCommand, GapDiagnoseArguments, GapEffectsArguments};
 pub use gap_check::{GapScoreArguments, GapSealArguments};
 pub use inspect::InspectArguments;
+pub use kinodynamics::{
+    BenchKinodynamicsArguments, KinodynamicsAnswer, KinodynamicsFilter, KinodynamicsRows,
+    KinodynamicsSensing, KinodynamicsSpeed, TrainKinodynamicsArguments,
+};
 pub use learned_map::{BenchLearnedMapArguments, NetworkSizes};
 pub use orders::{AlphaArguments, AskedRun, GoalArguments, PathArguments};
 pub use plant::BenchPlantArguments;

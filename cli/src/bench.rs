@@ -1,6 +1,7 @@
 //! `surefoot bench`: what was asked, handed to the benchmarks, and their result shown and written.
 
 mod gap;
+mod kinodynamics;
 mod learned_map;
 mod learning;
 mod navigation;
@@ -12,6 +13,7 @@ use serde::Serialize;
 use crate::arguments::{BenchControlArguments, BenchPriorMapArguments, BenchWork};
 use crate::{UsageError, output};
 pub(crate) use gap::run_gap;
+pub(crate) use kinodynamics::run_kinodynamics;
 pub(crate) use learned_map::run_learned_map;
 pub(crate) use learning::run_learning;
 pub(crate) use navigation::run_navigation;

@@ -3,6 +3,7 @@
 
 mod recorded;
 mod summary;
+mod teleoperation;
 
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
@@ -32,6 +33,9 @@ const ROOM_BYTES: u64 = 64 << 20;
 
 pub(crate) fn run(arguments: &CollectArguments) -> anyhow::Result<()> {
     let picture = prepare_output(arguments)?;
+    if arguments.teleop_random {
+        return teleoperation::run(arguments);
+    }
     let vehicle = read_vehicle(arguments.vehicle_name_or_path()).map_err(UsageError::from_input)?;
     let began = Instant::now();
     let (collection, scale) = match (&arguments.log, &arguments.elevation) {

@@ -22,6 +22,7 @@
 //!
 //! Around it:
 //!
+//! - [`kinodynamics`]: which command does what is wanted on the ground that the inertial measurement unit feels.
 //! - [`scenarios`]: the truth that all of it is tested against: worlds, a plant of rigid bodies and tyres, sensors,
 //!   episodes.
 //! - [`bus`]: the contract with a vehicle: messages in shared memory, channels, ages, watchdog.
@@ -42,6 +43,7 @@
 //! | bring a risk map of your own | `cargo run -p traversability --example own_risk_map` |
 //! | ask physics about ground | `cargo run -p physics_prior --example judge_a_ramp` |
 //! | ask the networks about ground | `cargo run -p evidential --example learned_weight` |
+//! | learn which command the ground wants | `cargo run -p kinodynamics --example command_for_the_ground` |
 //! | drive the controller over a constant risk map | `cargo run -p mppi --example drive_constant_map` |
 //! | give the controller costs of your own | `cargo run -p mppi --example own_costs` |
 //! | drive the planner on your map, without sensors | `cargo run -p navigator --example own_surface` |
@@ -148,10 +150,16 @@ fn dispatch(command: Command) -> anyhow::Result<()> {
         Command::Train { command: TrainCommand::Traversability(traversability) } => {
             train::run(&traversability)
         }
+        Command::Train { command: TrainCommand::Kinodynamics(kinodynamics) } => {
+            train::run_kinodynamics(&kinodynamics)
+        }
         Command::Bench { command: BenchCommand::Control(control) } => bench::run_control(&control),
         Command::Bench { command: BenchCommand::PriorMap(prior_map) } => bench::run_prior_map(&prior_map),
         Command::Bench { command: BenchCommand::LearnedMap(learned_map) } => {
             bench::run_learned_map(&learned_map)
+        }
+        Command::Bench { command: BenchCommand::Kinodynamics(kinodynamics) } => {
+            bench::run_kinodynamics(&kinodynamics)
         }
         Command::Bench { command: BenchCommand::Plant(plant) } => bench::run_plant(&plant),
         Command::Bench { command: BenchCommand::Gap(gap) } => bench::run_gap(&gap),

@@ -2,6 +2,7 @@
 #![allow(clippy::disallowed_methods, reason = "people are told how long a training takes")]
 
 mod data;
+mod kinodynamics;
 mod sweep;
 
 use std::io::IsTerminal;
@@ -21,6 +22,7 @@ use crate::arguments::TrainArguments;
 use crate::picture::draw_loss_curves;
 use crate::{UsageError, WorkFailed, interrupt, output, summary};
 use data::Data;
+pub(crate) use kinodynamics::run_kinodynamics;
 
 /// Room that must be free beforehand: weights, curves and trials take less [bytes].
 const ROOM_BYTES: u64 = 16 << 20;

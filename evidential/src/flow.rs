@@ -12,9 +12,9 @@ use crate::loss::{contiguous, sigmoid};
 /// ln(2 pi).
 const LOG_TWO_PI: f64 = 1.837_877_066_409_345_3;
 
-/// Parameters of all layers in double precision.
+/// A density over latents of any width: parameters of all layers in double precision.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct RadialFlow {
+pub struct RadialFlow {
     n_latent: usize,
     /// Row-major [layers, latent].
     centres: Vec<f64>,
@@ -32,14 +32,15 @@ struct LayerShape {
 }
 
 /// What the backward pass needs to know of a layer's forward pass.
-#[derive(Clone, Copy, Default)]
+#[derive(Clone, Copy, Debug, Default)]
 struct Step {
     h: f64,
     r: f64,
 }
 
 /// Room for one latent on its way through the flow.
-pub(crate) struct FlowScratch {
+#[derive(Clone, Debug)]
+pub struct FlowScratch {
     /// The latent before every layer and after the last, [layers + 1, latent].
     path: Vec<f64>,
     steps: Vec<Step>,
@@ -55,12 +56,12 @@ struct FlowGradient {
 
 /// ln(1 + exp(x)) without overflow.
 fn softplus(x: f64) -> f64 {
-    x.max(0.0) + (-x.abs()).exp().ln_1p()
+    x.max(0.0) + libm::log1p(libm::exp(-x.abs()))
 }
 
 impl RadialFlow {
     /// From `centre` [layers, latent], row-major, and `alpha` and `beta` of all layers.
-    pub(crate) fn new(centre: &[f32], alpha: &[f32], beta: &[f32]) -> Self {
+    pub fn new(centre: &[f32], alpha: &[f32], beta: &[f32]) -> Self {
         let shape = |(&alpha, &beta): (&f32, &f32)| {
             let (alpha, beta) = (f64::from(alpha), f64::from(beta));
             let a = softplus(alpha);
@@ -73,7 +74,8 @@ impl RadialFlow {
         }
     }
 
-    pub(crate) fn scratch(&self) -> FlowScratch {
+    /// Room for one latent.
+    pub fn scratch(&self) -> FlowScratch {
         FlowScratch {
             path: vec![0.0; (self.shapes.len() + 1) * self.n_latent],
             steps: vec![Step::default(); self.shapes.len()],
@@ -82,7 +84,7 @@ impl RadialFlow {
     }
 
     /// Logarithm of the density at a latent.
-    pub(crate) fn log_density(&self, latent: &[f32], scratch: &mut FlowScratch) -> f64 {
+    pub fn log_density(&self, latent: &[f32], scratch: &mut FlowScratch) -> f64 {
         let width = self.n_latent;
         for (place, &value) in scratch.path.iter_mut().zip(latent) {
             *place = f64::from(value);
@@ -104,7 +106,9 @@ impl RadialFlow {
         }
         let end = &scratch.path[self.shapes.len() * width..];
         let square: f64 = end.iter().map(|z| z * z).sum();
-        -0.5 * (width as f64 * LOG_TWO_PI + square) + (width as f64 - 1.0) * across.ln() + along.ln()
+        -0.5 * (width as f64 * LOG_TWO_PI + square)
+            + (width as f64 - 1.0) * libm::log(across)
+            + libm::log(along)
     }
 
     /// Adds `by_density` times the gradient at the latent that `scratch` has just seen to `gradient`, and leaves the
@@ -141,7 +145,7 @@ impl RadialFlow {
 }
 
 /// Log densities [rows] of latents [rows, latent] under centres [layers, latent] and shapes [2, layers]: alpha, beta.
-pub(crate) struct LogDensity;
+pub struct LogDensity;
 
 impl LogDensity {
     fn flow(centres: &[f32], shapes: &[f32]) -> RadialFlow {

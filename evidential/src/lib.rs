@@ -41,6 +41,7 @@ pub use dataset::{
     Surveyor, SurveyorError,
 };
 pub use features::{FeatureLayout, Standardisation};
+pub use flow::{FlowScratch, LogDensity, RadialFlow};
 pub use label::{Label, LabelConfig, LabelError, Response, Responses, Reversing, estimate_responses, labels};
 pub use method::{Method, Prior};
 pub use predictor::{Evidence, Prediction, Predictor, PredictorError};

@@ -8,9 +8,10 @@ use bicycle::{Model, ModelError, Vehicle};
 use crate::{ConfigError, ConfigText};
 
 /// The shipped vehicles, name and text.
-const SHIPPED: [(&str, &str); 4] = [
+const SHIPPED: [(&str, &str); 5] = [
     ("pietra_full_size", include_str!("../../scenarios/vehicles/pietra_full_size.toml")),
     ("rc_car", include_str!("../../scenarios/vehicles/rc_car.toml")),
+    ("ut_automata", include_str!("../../scenarios/vehicles/ut_automata.toml")),
     ("buggy_fifth", include_str!("../../scenarios/vehicles/buggy_fifth.toml")),
     ("sedan", include_str!("../../scenarios/vehicles/sedan.toml")),
 ];
@@ -115,7 +116,7 @@ mod tests {
     #[test]
     fn shipped_vehicles_are_valid_and_named_as_they_are_called() {
         let names: Vec<_> = fleet().into_iter().map(|vehicle| vehicle.name).collect();
-        assert_eq!(names, ["pietra_full_size", "rc_car", "buggy_fifth", "sedan"]);
+        assert_eq!(names, ["pietra_full_size", "rc_car", "ut_automata", "buggy_fifth", "sedan"]);
     }
 
     #[test]

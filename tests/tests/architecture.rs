@@ -9,13 +9,14 @@ use std::sync::LazyLock;
 
 /// Every crate with the internal crates that its product may use, and no others. `cli` calls `bench` to run
 /// `surefoot bench`; `tests` may use all, but has no product: it has dev-dependencies only.
-const MAY_USE: [(&str, &[&str]); 16] = [
+const MAY_USE: [(&str, &[&str]); 17] = [
     ("terrain", &[]),
     ("traversability", &["terrain"]),
     ("bicycle", &[]),
     ("physics_prior", &["terrain", "traversability", "bicycle"]),
     ("mppi", &["traversability", "bicycle"]),
     ("evidential", &["terrain", "traversability", "bicycle", "physics_prior"]),
+    ("kinodynamics", &["bicycle", "evidential"]),
     ("navigator", &["terrain", "traversability", "bicycle", "physics_prior", "evidential", "mppi"]),
     ("scenarios", &["terrain", "bicycle"]),
     ("sim_to_real", &["terrain", "bicycle"]),
@@ -40,24 +41,26 @@ const MAY_USE: [(&str, &[&str]); 16] = [
     ("cli", &LIBRARIES_AND_BENCH),
     ("tests", &[]),
 ];
-const LIBRARIES: [&str; 10] = [
+const LIBRARIES: [&str; 11] = [
     "terrain",
     "traversability",
     "bicycle",
     "physics_prior",
     "evidential",
+    "kinodynamics",
     "mppi",
     "navigator",
     "scenarios",
     "sim_to_real",
     "formats",
 ];
-const LIBRARIES_AND_BENCH: [&str; 14] = [
+const LIBRARIES_AND_BENCH: [&str; 15] = [
     "terrain",
     "traversability",
     "bicycle",
     "physics_prior",
     "evidential",
+    "kinodynamics",
     "mppi",
     "navigator",
     "scenarios",

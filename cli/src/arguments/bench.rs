@@ -30,6 +30,9 @@ pub enum BenchCommand {
     /// How well traction, roll and pitch are foretold on ground unlike that of the training
     #[command(long_about = LEARNING_ABOUT)]
     Learning(BenchLearningArguments),
+    /// Laps of a small car with and without learned inverse kinodynamics
+    #[command(long_about = super::kinodynamics::BENCH_LONG_ABOUT)]
+    Kinodynamics(super::BenchKinodynamicsArguments),
 }
 
 /// How to measure the controller.

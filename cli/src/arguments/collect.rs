@@ -69,7 +69,25 @@ pub struct CollectArguments {
     )]
     pub elevation_origin: Option<Goal>,
 
-    /// The machine: a name or a TOML file [default: pietra_full_size; rc_car in the arena]
+    /// Drive a small car by random speeds and curvatures over four surfaces, to learn inverse kinodynamics from
+    ///
+    /// The recording holds commands, odometry and the inertial measurement unit; see `surefoot train kinodynamics`.
+    #[arg(long, help_heading = "Random driving",
+          conflicts_with_all = ["world", "split", "maps", "trials", "time_limit", "map", "log", "elevation",
+                                "test_height_scale", "harder_than"])]
+    pub teleop_random: bool,
+
+    /// Minutes of random driving, 1 to 600; each is a run on ground of its own
+    #[arg(long, value_name = "N", value_parser = super::kinodynamics::minutes_of_driving, default_value = "30",
+          allow_hyphen_values = true, requires = "teleop_random", help_heading = "Random driving")]
+    pub minutes: u32,
+
+    /// One surface alone instead of all four: cement, dirt, grass or leaves
+    #[arg(long, value_name = "NAME", requires = "teleop_random", help_heading = "Random driving")]
+    pub surface: Option<String>,
+
+    /// The machine: a name or a TOML file [default: pietra_full_size; rc_car in the arena; ut_automata with
+    /// --teleop-random]
     #[arg(long, value_name = "NAME|FILE", help_heading = "Run")]
     pub vehicle: Option<String>,
 
@@ -101,6 +119,7 @@ impl CollectArguments {
     /// The machine, a shipped name or a path: the one asked for, else the one that fits the world.
     pub fn vehicle_name_or_path(&self) -> &str {
         let fitting = match self.world {
+            _ if self.teleop_random => "ut_automata",
             CollectWorld::Arena => "rc_car",
             CollectWorld::Testbed | CollectWorld::Rocks => "pietra_full_size",
         };
@@ -176,6 +195,9 @@ Examples:
       A small car, and the ground as its own range sensor shows it.
   surefoot collect --log drive.mcap --elevation ground.npz --vehicle my.toml --out data/mine.safetensors
       A recorded drive.
+
+  surefoot collect --teleop-random --minutes 30 --out data/teleoperation.safetensors
+      Half an hour of random driving on cement, dirt, grass and leaves, with the IMU.
 
 Recorded drives:
   needed columns   t, x, y, yaw, vx, wz, cmd_speed, and cmd_steer or cmd_wz (or

@@ -13,6 +13,9 @@ pub enum TrainCommand {
     /// Networks that predict traction, roll and pitch from the ground under the vehicle, and know where they cannot
     #[command(long_about = LONG_ABOUT)]
     Traversability(Box<TrainArguments>),
+    /// A model that says which command does what is wanted on the ground that the IMU feels
+    #[command(long_about = super::kinodynamics::TRAIN_LONG_ABOUT)]
+    Kinodynamics(Box<super::TrainKinodynamicsArguments>),
 }
 
 /// What to fit, to what, and how.

@@ -1,0 +1,419 @@
+//! The tables and figures of inverse kinodynamics (Xiao, Biswas, Stone 2021): a car of 1/10 scale learns from thirty minutes
+//! of random driving and laps two tracks at ten speeds, with the nominal model, with one that learned without the inertial
+//! measurement unit, and with one that learned with it.
+//!
+//! Ground, car and walls were settled before the first model was trained; the walls alone were tuned, once, until the nominal
+//! model failed as often as the paper's. What belongs to the plant is of other equations than what learns from it.
+
+mod data_curve;
+mod ground;
+mod lap;
+mod machine;
+mod probe;
+mod recorded;
+mod report;
+mod surfaces;
+mod teleoperation;
+mod timing;
+mod track;
+mod verdict;
+mod walls;
+
+use std::ops::ControlFlow;
+use std::sync::Arc;
+
+use bicycle::Vehicle;
+use bicycle::lanes::Instructions;
+use kinodynamics::{
+    Answer, Architecture, Checkpoint, Epoch, Example, History, LabelCounts, Latency, Outcome, Recording,
+    Sensing, Settings, TrainError, label, train,
+};
+use rayon::prelude::*;
+use scenarios::{CommandError, PlantError, World, WorldError, seed_of, stream};
+use serde::Serialize;
+
+use crate::Spread;
+pub use data_curve::{DataPoint, data_curve};
+pub use ground::GroundReport;
+pub use lap::{DrivenLap, Failure};
+use lap::{Driver, Lap, Told, drive_lap};
+pub use machine::{DEVIATIONS, TICK_S, VEHICLE};
+pub use probe::Probe;
+pub use recorded::{LogReport, LogRow, OverRuns, judge_log};
+pub use report::{Quartiles, RowReport, TrackReport};
+pub use surfaces::{Layout, SURFACES};
+pub use teleoperation::{Teleoperation, teleoperate};
+pub use track::Track;
+pub use verdict::{Ratio, Verdict};
+
+/// From the middle line to the walls [m]: tuned once, with the nominal model alone, to the paper's 52 % of turns (seed 1: see
+/// docs/kinodynamics.md), then frozen.
+pub const HALF_WIDTH_M: f64 = 0.24;
+/// Target speeds on the outdoor track [m/s].
+pub const OUTDOOR_MPS: [f64; 10] = [1.6, 1.7, 1.8, 1.9, 2.0, 2.1, 2.2, 2.3, 2.4, 2.5];
+/// Target speeds on the indoor track [m/s].
+pub const INDOOR_MPS: [f64; 5] = [2.4, 2.5, 2.6, 2.7, 2.8];
+/// Ground beyond the path's corners [m].
+const MARGIN_M: f64 = 2.0;
+/// Windows that a shuffled history is drawn from.
+const POOL: usize = 2000;
+
+/// A model, or none.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Row {
+    /// The nominal model.
+    Baseline,
+    /// Learned without the unit.
+    Ablation,
+    /// Learned with it: the paper's model.
+    Learned,
+    /// Learned and driven with the histories of other moments.
+    Shuffled,
+    /// Learned and driven with one history for all moments.
+    Constant,
+    /// Learned with an embedding of 16 numbers, as the paper's successor (VI-IKD).
+    Wide,
+    /// Learned to answer speeds too, as the paper's text has it.
+    WithSpeed,
+    /// Learned without the unit from all that was driven, oversteer and large differences too.
+    UnfilteredAblation,
+    /// Learned with the unit from all that was driven.
+    Unfiltered,
+}
+
+impl Row {
+    /// All, in the order of the tables.
+    pub const ALL: [Self; 9] = [
+        Self::Baseline,
+        Self::Ablation,
+        Self::Learned,
+        Self::Shuffled,
+        Self::Constant,
+        Self::Wide,
+        Self::WithSpeed,
+        Self::UnfilteredAblation,
+        Self::Unfiltered,
+    ];
+    /// Those of the paper.
+    pub const PAPER: [Self; 3] = [Self::Baseline, Self::Ablation, Self::Learned];
+
+    /// Name, for reports.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Baseline => "baseline",
+            Self::Ablation => "ablation",
+            Self::Learned => "learned",
+            Self::Shuffled => "shuffled IMU",
+            Self::Constant => "constant IMU",
+            Self::Wide => "embedding of 16",
+            Self::WithSpeed => "answers speed too",
+            Self::UnfilteredAblation => "ablation, unfiltered",
+            Self::Unfiltered => "learned, unfiltered",
+        }
+    }
+
+    /// How its model is trained; none of the baseline.
+    pub fn settings(self, seed: u64) -> Option<Settings> {
+        let paper = Settings::paper(Architecture::PAPER, seed);
+        let labels = kinodynamics::LabelConfig::unfiltered(0.0);
+        Some(match self {
+            Self::Baseline => return None,
+            Self::Ablation => Settings::paper(Architecture::ABLATION, seed),
+            Self::Learned => paper,
+            Self::Shuffled => Settings { history: History::Shuffled, ..paper },
+            Self::Constant => Settings { history: History::Constant, ..paper },
+            Self::Wide => {
+                let sensing = Sensing::Imu { embedding: 16 };
+                Settings { architecture: Architecture { sensing, ..Architecture::PAPER }, ..paper }
+            }
+            Self::WithSpeed => {
+                let answer = Answer::SpeedAndCurvature;
+                Settings { architecture: Architecture { answer, ..Architecture::PAPER }, ..paper }
+            }
+            Self::UnfilteredAblation => Settings { labels, ..Settings::paper(Architecture::ABLATION, seed) },
+            Self::Unfiltered => Settings { labels, ..paper },
+        })
+    }
+}
+
+/// What to drive and train.
+#[derive(Clone, Debug)]
+pub struct Request {
+    /// The car.
+    pub vehicle: Vehicle,
+    /// Decides ground, commands, noise, initial weights.
+    pub seed: u64,
+    /// Minutes of random driving to learn from.
+    pub minutes: u32,
+    /// Passes over the data; the paper's are 50.
+    pub epochs: usize,
+    /// Laps at every speed.
+    pub laps: u32,
+    /// Which models.
+    pub rows: Vec<Row>,
+    /// From the middle line to the walls [m].
+    pub half_width_m: f64,
+}
+
+/// A training as it went.
+#[derive(Clone, Debug, Serialize)]
+pub struct TrainingReport {
+    /// Which model.
+    pub row: Row,
+    /// Root mean square of what the curvature is off by on validation blocks, of the best pass [1/m].
+    pub validation_rmse_per_m: f64,
+    /// The same of the wish itself [1/m].
+    pub identity_rmse_per_m: f64,
+    /// Examples to learn from and to choose by.
+    pub n_examples: [usize; 2],
+    /// What the filters took.
+    pub counts: LabelCounts,
+    /// All passes.
+    pub curves: Vec<Epoch>,
+}
+
+/// Everything.
+#[derive(Clone, Debug, Serialize)]
+pub struct Report {
+    /// Seed.
+    pub seed: u64,
+    /// Minutes of random driving.
+    pub minutes: u32,
+    /// Laps at every speed.
+    pub laps: u32,
+    /// From the path to the walls [m].
+    pub half_width_m: f64,
+    /// Latency that the drives showed.
+    pub latency: Latency,
+    /// What can be told of the ground.
+    pub probe: Probe,
+    /// What each surface does to the curvature.
+    pub grounds: Vec<GroundReport>,
+    /// What one answer of the learned model costs, from samples to command [us]; none without it.
+    pub answer_us: Option<Spread>,
+    /// The trainings.
+    pub trainings: Vec<TrainingReport>,
+    /// The outdoor track on the four surfaces.
+    pub outdoor: TrackReport,
+    /// The indoor track on a floor that nobody learned on.
+    pub indoor: TrackReport,
+    /// The rules, and whether they hold.
+    pub verdicts: Vec<Verdict>,
+}
+
+/// Why there is no report.
+#[derive(Debug, thiserror::Error)]
+pub enum KinodynamicsError {
+    /// The car cannot be.
+    #[error(transparent)]
+    Plant(#[from] PlantError),
+    /// The ground cannot be.
+    #[error(transparent)]
+    World(#[from] WorldError),
+    /// A model answered what is no command.
+    #[error(transparent)]
+    Command(#[from] CommandError),
+    /// Nothing could be learned.
+    #[error(transparent)]
+    Train(#[from] TrainError),
+    /// A checkpoint makes no model.
+    #[error(transparent)]
+    Checkpoint(#[from] kinodynamics::CheckpointError),
+    /// The examples know too few grounds.
+    #[error("probe: expected examples on known grounds in both halves, found {n_training} and {n_test}")]
+    NothingToProbe {
+        /// Examples to fit to.
+        n_training: usize,
+        /// Examples to judge on.
+        n_test: usize,
+    },
+    /// A log that says too little.
+    #[error("log: expected at least 2 runs with wz, cmd_speed and cmd_steer, found {found}")]
+    TooFewRuns {
+        /// Runs with these.
+        found: usize,
+    },
+    /// The latency cannot be told.
+    #[error(transparent)]
+    Latency(#[from] kinodynamics::LatencyError),
+    /// Somebody does not want to wait.
+    #[error("interrupted")]
+    Interrupted,
+}
+
+/// What is being done.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Stage {
+    /// Random driving, in minutes.
+    Driving(u64),
+    /// Training a model, in passes.
+    Training(Row, u64),
+    /// Laps.
+    Laps(u64),
+}
+
+/// Told of stages and of every step in them.
+pub trait Watch: Sync {
+    /// A stage begins.
+    fn stage(&self, stage: Stage);
+    /// A step of it is done.
+    fn step(&self);
+    /// Whether to give up.
+    fn interrupted(&self) -> bool;
+}
+
+/// Drives, trains, drives laps and judges.
+///
+/// # Errors
+/// See [`KinodynamicsError`].
+pub fn measure(request: &Request, revision: &str, watch: &dyn Watch) -> Result<Report, KinodynamicsError> {
+    watch.stage(Stage::Driving(u64::from(request.minutes)));
+    let asked = Teleoperation { minutes: request.minutes, only: None, seed: request.seed };
+    let recording = teleoperate(&request.vehicle, &asked, &|| watch.step())?;
+    let latency = kinodynamics::estimate_latency(&recording)?;
+    let labels = kinodynamics::LabelConfig::unfiltered(latency.seconds);
+    let (examples, _) = label(&recording, &labels);
+    let probe = probe::probe(&examples, SURFACES.len(), request.seed)?;
+    let grounds = ground::grounds(&recording, &examples);
+    let (mut drivers, mut trainings) = (Vec::new(), Vec::new());
+    for &row in &request.rows {
+        let (driver, training) = prepare(request, row, &recording, &examples, (revision, watch))?;
+        drivers.push((row, driver));
+        trainings.extend(training);
+    }
+    let instructions = Instructions::widest();
+    let outdoor = laps(request, &Track::outdoor(), &OUTDOOR_MPS, &drivers, (instructions, watch))?;
+    let indoor = laps(request, &Track::indoor(), &INDOOR_MPS, &drivers, (instructions, watch))?;
+    let verdicts = verdict::verdicts(&outdoor, &indoor, &probe, request.seed);
+    let answer_us = timing::answer_us(&drivers, &examples, instructions)?;
+    let &Request { seed, minutes, laps, half_width_m, .. } = request;
+    Ok(Report {
+        seed,
+        minutes,
+        laps,
+        half_width_m,
+        latency,
+        probe,
+        grounds,
+        answer_us,
+        trainings,
+        outdoor,
+        indoor,
+        verdicts,
+    })
+}
+
+/// Drives the outdoor track with the nominal model between walls of these half-widths, to tune them: the share of turns that
+/// succeed.
+///
+/// # Errors
+/// See [`KinodynamicsError`].
+pub fn tune_walls(
+    request: &Request,
+    half_widths_m: &[f64],
+    watch: &dyn Watch,
+) -> Result<Vec<[f64; 2]>, KinodynamicsError> {
+    let drivers = [(Row::Baseline, Driver::Baseline)];
+    let success = |half_width_m: &f64| {
+        let request = Request { half_width_m: *half_width_m, ..request.clone() };
+        let track =
+            laps(&request, &Track::outdoor(), &OUTDOOR_MPS, &drivers, (Instructions::widest(), watch))?;
+        Ok([*half_width_m, track.rows[0].success])
+    };
+    half_widths_m.iter().map(success).collect()
+}
+
+fn prepare(
+    request: &Request,
+    row: Row,
+    recording: &Recording,
+    examples: &[Example],
+    (revision, watch): (&str, &dyn Watch),
+) -> Result<(Driver, Option<TrainingReport>), KinodynamicsError> {
+    let Some(settings) = row.settings(request.seed) else { return Ok((Driver::Baseline, None)) };
+    let settings = Settings { epochs: request.epochs, ..settings };
+    watch.stage(Stage::Training(row, settings.epochs as u64));
+    let outcome = train(recording, &settings, revision, &mut |_| {
+        watch.step();
+        if watch.interrupted() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    })?;
+    if watch.interrupted() {
+        return Err(KinodynamicsError::Interrupted);
+    }
+    let Outcome { checkpoint, curves, counts, identity_rmse_per_m, n_examples, .. } = outcome;
+    let best = curves.iter().map(|epoch| epoch.validation_rmse_per_m).fold(f64::INFINITY, f64::min);
+    let told = told(row, &checkpoint, examples, request.seed);
+    let report =
+        TrainingReport { row, validation_rmse_per_m: best, identity_rmse_per_m, n_examples, counts, curves };
+    Ok((Driver::Model { checkpoint: Arc::new(checkpoint), told }, Some(report)))
+}
+
+fn told(row: Row, checkpoint: &Checkpoint, examples: &[Example], seed: u64) -> Told {
+    match row {
+        Row::Shuffled => {
+            use rand::RngExt;
+            let mut rng = stream(seed, &[0x5F]);
+            let draw = |_| examples[rng.random_range(0..examples.len())].window.clone();
+            Told::Shuffled(Arc::new((0..POOL).map(draw).collect()))
+        }
+        Row::Constant => {
+            let means = checkpoint.sidecar().standardisation.mean;
+            let column = |mean: f32| std::iter::repeat_n(mean, kinodynamics::WINDOW);
+            Told::Constant(Arc::new(means.into_iter().flat_map(column).collect()))
+        }
+        _ => Told::Measured,
+    }
+}
+
+/// The ground of a lap: the same for all models and speeds, another for every lap.
+fn ground(track: &Track, seed: u64) -> Result<World, WorldError> {
+    let bound = |axis: usize, pick: fn(f64, f64) -> f64, start: f64| {
+        track.nodes_m.iter().map(|node| node[axis]).fold(start, pick)
+    };
+    let low_m = [0, 1].map(|axis| bound(axis, f64::min, f64::INFINITY) - MARGIN_M);
+    let high_m = [0, 1].map(|axis| bound(axis, f64::max, f64::NEG_INFINITY) + MARGIN_M);
+    let layout = if track.name == "indoor" { Layout::Wood { seed } } else { Layout::Patches { seed } };
+    layout.world(low_m, high_m)
+}
+
+fn laps(
+    request: &Request,
+    track: &Track,
+    speeds_mps: &[f64],
+    drivers: &[(Row, Driver)],
+    (instructions, watch): (Instructions, &dyn Watch),
+) -> Result<TrackReport, KinodynamicsError> {
+    let worlds = (0..request.laps).map(|lap| {
+        ground(track, seed_of(request.seed, &[0x7AC, track.n_turns() as u64, u64::from(lap)])).map(Arc::new)
+    });
+    let worlds: Vec<Arc<World>> = worlds.collect::<Result<_, _>>()?;
+    let middle = walls::middle_line(track);
+    let n = drivers.len() * speeds_mps.len() * worlds.len();
+    watch.stage(Stage::Laps(n as u64));
+    let per_driver = speeds_mps.len() * worlds.len();
+    let drive = |job: usize| {
+        if watch.interrupted() {
+            return Err(KinodynamicsError::Interrupted);
+        }
+        let (driver, rest) = (job / per_driver, job % per_driver);
+        let (speed, lap) = (rest / worlds.len(), rest % worlds.len());
+        let asked = Lap {
+            vehicle: &request.vehicle,
+            track,
+            middle: &middle,
+            world: Arc::clone(&worlds[lap]),
+            driver: &drivers[driver].1,
+            speed_mps: speeds_mps[speed],
+            half_width_m: request.half_width_m,
+            seed: seed_of(request.seed, &[0x1A9, speed as u64, lap as u64]),
+        };
+        let driven = drive_lap(&asked, lap as u32, instructions);
+        watch.step();
+        driven
+    };
+    let driven: Vec<DrivenLap> = (0..n).into_par_iter().map(drive).collect::<Result<_, _>>()?;
+    let rows = drivers.iter().zip(driven.chunks(per_driver));
+    let rows = rows.map(|((row, _), laps)| RowReport::new(*row, track, speeds_mps, laps.to_vec()));
+    Ok(TrackReport { track: track.name, speeds_mps: speeds_mps.to_vec(), rows: rows.collect() })
+}

@@ -1,0 +1,479 @@
+//! Fitting a model to a recorded drive, as the paper's code does: Adam at 3e-4, batches of 64, 50 passes, the mean square of
+//! what the curvature is off by. Other than there, validation data are blocks of time, the pass that does best on them is
+//! kept, and weights decay apart from Adam's averages.
+
+mod density;
+mod network;
+
+use std::collections::BTreeMap;
+use std::ops::ControlFlow;
+
+use candle_core::{Device, Tensor, Var};
+use candle_nn::{AdamW, Optimizer, ParamsAdamW};
+use rand::SeedableRng;
+use rand::seq::SliceRandom;
+use rand_xoshiro::Xoshiro256PlusPlus;
+use serde::{Deserialize, Serialize};
+
+use crate::architecture::{AXES, Architecture, WINDOW};
+use crate::checkpoint::{Checkpoint, CheckpointError, Sidecar, Standardisation};
+use crate::label::{Example, LabelConfig, LabelCounts, label};
+use crate::latency::{Latency, LatencyError, estimate_latency};
+use crate::model::{Desired, inputs};
+use crate::recording::{ImuCheckError, Recording, VehicleSummary, check_imu};
+use crate::split::{Split, block_split};
+use network::Network;
+
+/// Examples that a validation error is taken of at a time.
+const VALIDATION_BATCH: usize = 1024;
+/// Fewer examples teach nothing.
+const EXAMPLES_MIN: usize = 500;
+/// Least deviation that divides a component of the unit.
+const DEVIATION_MIN: f32 = 1e-3;
+
+/// What becomes of the unit's history before a model learns from it: controls that must not do better than the ablation.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum History {
+    /// Nothing.
+    #[default]
+    AsMeasured,
+    /// Every example gets that of another, drawn by the seed.
+    Shuffled,
+    /// Every example gets the mean.
+    Constant,
+}
+
+/// How to fit.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Settings {
+    /// Which networks.
+    pub architecture: Architecture,
+    /// What becomes of the history.
+    pub history: History,
+    /// Seed of the initial weights, of the split and of the order of the examples.
+    pub seed: u64,
+    /// Passes over the data.
+    pub epochs: usize,
+    /// Examples per step.
+    pub batch: usize,
+    /// Learning rate of Adam.
+    pub learning_rate: f64,
+    /// Decay of the weights per step, over the learning rate.
+    pub weight_decay: f64,
+    /// Filters of the examples; the latency is estimated from the drive.
+    pub labels: LabelConfig,
+}
+
+impl Settings {
+    /// Those of the paper's code.
+    pub fn paper(architecture: Architecture, seed: u64) -> Self {
+        Self {
+            architecture,
+            history: History::AsMeasured,
+            seed,
+            epochs: 50,
+            batch: 64,
+            learning_rate: 3e-4,
+            weight_decay: 1e-3,
+            labels: LabelConfig::paper(0.0),
+        }
+    }
+}
+
+/// One pass.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Epoch {
+    /// From 1 on.
+    pub epoch: usize,
+    /// Mean square over the training examples while they were learned [answers over their scale].
+    pub training_loss: f64,
+    /// Root mean square of what the curvature is off by on the validation examples [1/m].
+    pub validation_rmse_per_m: f64,
+}
+
+/// What came of it.
+#[derive(Clone, Debug)]
+pub struct Outcome {
+    /// The weights of the best pass.
+    pub checkpoint: Checkpoint,
+    /// All passes.
+    pub curves: Vec<Epoch>,
+    /// What the filters took.
+    pub counts: LabelCounts,
+    /// The latency of the drive.
+    pub latency: Latency,
+    /// Root mean square of commanded less driven curvature on the validation examples: the error of no model [1/m].
+    pub identity_rmse_per_m: f64,
+    /// Examples to learn from and to choose by.
+    pub n_examples: [usize; 2],
+}
+
+/// Why nothing was fitted.
+#[derive(Debug, thiserror::Error)]
+pub enum TrainError {
+    /// The unit's numbers do not mean what they should.
+    #[error(transparent)]
+    Imu(#[from] ImuCheckError),
+    /// The vehicle does not follow its commands.
+    #[error(transparent)]
+    Latency(#[from] LatencyError),
+    /// Not enough is left behind the filters.
+    #[error(
+        "training data: expected at least {EXAMPLES_MIN} examples in both halves behind the filters, found {found:?} of {ticks} commands"
+    )]
+    TooFew {
+        /// Examples to learn from and to choose by.
+        found: [usize; 2],
+        /// Commands.
+        ticks: usize,
+    },
+    /// Drives on one ground cannot teach how grounds differ.
+    #[error(
+        "training data: expected drives on at least two grounds for a model that senses them, found {found} alone"
+    )]
+    OneGround {
+        /// The ground.
+        found: String,
+    },
+    /// The settings make no sense.
+    #[error("{field}: expected {expected}, found {found}")]
+    Setting {
+        /// Which.
+        field: &'static str,
+        /// What would do.
+        expected: &'static str,
+        /// What is there.
+        found: f64,
+    },
+    /// The loss is no number any more.
+    #[error("training: expected a finite loss, found {found} in pass {epoch}")]
+    Diverged {
+        /// Pass.
+        epoch: usize,
+        /// Loss.
+        found: f64,
+    },
+    /// Candle refused.
+    #[error("training: {0}")]
+    Candle(#[from] candle_core::Error),
+    /// The weights make no checkpoint.
+    #[error(transparent)]
+    Checkpoint(#[from] CheckpointError),
+}
+
+/// Fits a model; `on_epoch` is told every pass and may end it: the best weights so far are kept.
+///
+/// # Errors
+/// See [`TrainError`]. A recording that does not name its grounds may be of one alone: nobody can tell.
+pub fn train(
+    recording: &Recording,
+    settings: &Settings,
+    revision: &str,
+    on_epoch: &mut dyn FnMut(&Epoch) -> ControlFlow<()>,
+) -> Result<Outcome, TrainError> {
+    validate(settings)?;
+    check_imu(recording)?;
+    let grounds = recording.grounds_driven();
+    if let ([only], true) = (&grounds[..], settings.architecture.senses()) {
+        return Err(TrainError::OneGround { found: (*only).to_owned() });
+    }
+    let latency = estimate_latency(recording)?;
+    // The correlation finds the middle of the effect; a command is held for a tick, whose mean rate is the label.
+    let labels = LabelConfig { latency_s: latency.seconds, ..settings.labels };
+    let (examples, counts) = label(recording, &labels);
+    let split = block_split(&examples, settings.seed);
+    let n_examples = [split.training.len(), split.validation.len()];
+    if n_examples[0] < EXAMPLES_MIN || n_examples[1] < EXAMPLES_MIN / 10 {
+        return Err(TrainError::TooFew { found: n_examples, ticks: counts.ticks });
+    }
+    let standardisation = standardisation(&examples, &split.training);
+    let data = Data::new(&examples, &split, &standardisation, settings)?;
+    let network = Network::new(&settings.architecture, settings.seed)?;
+    let curves = fit(&network, &data, settings, on_epoch)?;
+    let mut tensors = network.tensors()?;
+    let fade = density::fit(&data, settings, &mut tensors)?;
+    let sidecar = Sidecar {
+        format: 0,
+        revision: revision.to_owned(),
+        vehicle: recording.vehicle.clone(),
+        architecture: settings.architecture,
+        standardisation,
+        fade,
+        latency,
+        labels,
+        grounds: grounds.into_iter().map(str::to_owned).collect(),
+        weights_sha256: String::new(),
+    };
+    Ok(Outcome {
+        checkpoint: Checkpoint::new(sidecar, tensors)?,
+        curves,
+        counts,
+        latency,
+        identity_rmse_per_m: identity_rmse_per_m(&examples, &split.validation),
+        n_examples,
+    })
+}
+
+/// Fits a blind model to examples without histories, as a log without the unit gives them.
+///
+/// # Errors
+/// An architecture that senses, too few examples, and what [`train`] refuses in settings.
+pub fn train_blind(examples: &[Example], settings: &Settings) -> Result<Checkpoint, TrainError> {
+    validate(settings)?;
+    if settings.architecture.senses() {
+        let expected = "a blind architecture: there are no histories";
+        return Err(TrainError::Setting {
+            field: "embedding",
+            expected,
+            found: settings.architecture.n_embedding() as f64,
+        });
+    }
+    let split = block_split(examples, settings.seed);
+    let found = [split.training.len(), split.validation.len()];
+    if found[0] < EXAMPLES_MIN || found[1] < EXAMPLES_MIN / 10 {
+        return Err(TrainError::TooFew { found, ticks: examples.len() });
+    }
+    let standardisation = Standardisation { mean: [0.0; AXES], deviation: [1.0; AXES] };
+    let data = Data::new(examples, &split, &standardisation, settings)?;
+    let network = Network::new(&settings.architecture, settings.seed)?;
+    fit(&network, &data, settings, &mut |_| ControlFlow::Continue(()))?;
+    let mut tensors = network.tensors()?;
+    let fade = density::fit(&data, settings, &mut tensors)?;
+    let sidecar = Sidecar {
+        format: 0,
+        revision: String::new(),
+        vehicle: VehicleSummary { name: String::new(), wheelbase_m: 1.0, steering_max_rad: 1.0 },
+        architecture: settings.architecture,
+        standardisation,
+        fade,
+        latency: Latency { seconds: settings.labels.latency_s, correlation: 1.0 },
+        labels: settings.labels,
+        grounds: Vec::new(),
+        weights_sha256: String::new(),
+    };
+    Ok(Checkpoint::new(sidecar, tensors)?)
+}
+
+fn validate(settings: &Settings) -> Result<(), TrainError> {
+    let refuse = |field, expected, found| Err(TrainError::Setting { field, expected, found });
+    let Settings { epochs, batch, learning_rate, .. } = *settings;
+    if epochs == 0 {
+        return refuse("epochs", "at least 1", 0.0);
+    }
+    if batch == 0 {
+        return refuse("batch", "at least 1", 0.0);
+    }
+    if !(learning_rate.is_finite() && learning_rate > 0.0) {
+        return refuse("learning rate", "a number > 0", learning_rate);
+    }
+    Ok(())
+}
+
+fn identity_rmse_per_m(examples: &[Example], places: &[usize]) -> f64 {
+    let square = |place: &usize| {
+        let example = &examples[*place];
+        f64::from(example.commanded[0] - example.driven[1]).powi(2)
+    };
+    (places.iter().map(square).sum::<f64>() / places.len() as f64).sqrt()
+}
+
+fn standardisation(examples: &[Example], places: &[usize]) -> Standardisation {
+    let values = |axis: usize| {
+        let column = axis * WINDOW..(axis + 1) * WINDOW;
+        places
+            .iter()
+            .flat_map(move |place| examples[*place].window[column.clone()].iter().map(|v| f64::from(*v)))
+    };
+    let n = (places.len() * WINDOW) as f64;
+    let mean: [f64; AXES] = std::array::from_fn(|axis| values(axis).sum::<f64>() / n);
+    let variance = |axis: usize| values(axis).map(|value| (value - mean[axis]).powi(2)).sum::<f64>() / n;
+    Standardisation {
+        mean: mean.map(|mean| mean as f32),
+        deviation: std::array::from_fn(|axis| (variance(axis).sqrt() as f32).max(DEVIATION_MIN)),
+    }
+}
+
+/// Half of the examples as tensors.
+struct Half {
+    /// [examples, 600], standardised; [examples, 0] of a blind model.
+    windows: Tensor,
+    /// [examples, 2].
+    desired: Tensor,
+    /// [examples, answers], over their scales.
+    targets: Tensor,
+    n: usize,
+}
+
+/// Both halves.
+struct Data {
+    training: Half,
+    validation: Half,
+}
+
+impl Data {
+    fn new(
+        examples: &[Example],
+        split: &Split,
+        standardisation: &Standardisation,
+        settings: &Settings,
+    ) -> candle_core::Result<Self> {
+        let half = |places: &[usize], key: u64| Half::new(examples, places, standardisation, settings, key);
+        Ok(Self { training: half(&split.training, 1)?, validation: half(&split.validation, 2)? })
+    }
+}
+
+impl Half {
+    fn new(
+        examples: &[Example],
+        places: &[usize],
+        standardisation: &Standardisation,
+        settings: &Settings,
+        key: u64,
+    ) -> candle_core::Result<Self> {
+        let n = places.len();
+        let architecture = &settings.architecture;
+        let mut sources = places.to_vec();
+        if settings.history == History::Shuffled {
+            sources.shuffle(&mut Xoshiro256PlusPlus::seed_from_u64(settings.seed ^ (key << 32)));
+        }
+        let n_window = if architecture.senses() { WINDOW * AXES } else { 0 };
+        let mut windows = Vec::with_capacity(n * n_window);
+        for place in &sources {
+            for k in 0..n_window {
+                let value = examples[*place].window[k];
+                windows.push(match settings.history {
+                    History::Constant => 0.0,
+                    _ => (value - standardisation.mean[k / WINDOW]) / standardisation.deviation[k / WINDOW],
+                });
+            }
+        }
+        let example = |place: &usize| &examples[*place];
+        let desired = |place: &usize| {
+            let [speed_mps, curvature_per_m] = example(place).driven;
+            inputs(Desired { speed_mps, curvature_per_m })
+        };
+        let scales = architecture.answer_scales();
+        let target =
+            |place: &usize| scales.iter().zip(example(place).commanded).map(|(scale, value)| value / scale);
+        Ok(Self {
+            windows: Tensor::from_vec(windows, (n, n_window), &Device::Cpu)?,
+            desired: Tensor::from_vec(places.iter().flat_map(desired).collect(), (n, 2), &Device::Cpu)?,
+            targets: Tensor::from_vec(
+                places.iter().flat_map(target).collect(),
+                (n, architecture.n_answers()),
+                &Device::Cpu,
+            )?,
+            n,
+        })
+    }
+
+    fn rows(&self, rows: &Tensor) -> candle_core::Result<[Tensor; 3]> {
+        Ok([
+            self.windows.index_select(rows, 0)?,
+            self.desired.index_select(rows, 0)?,
+            self.targets.index_select(rows, 0)?,
+        ])
+    }
+}
+
+fn fit(
+    network: &Network,
+    data: &Data,
+    settings: &Settings,
+    on_epoch: &mut dyn FnMut(&Epoch) -> ControlFlow<()>,
+) -> Result<Vec<Epoch>, TrainError> {
+    let Settings { learning_rate: lr, weight_decay, .. } = *settings;
+    let mut optimiser =
+        AdamW::new(network.variables(), ParamsAdamW { lr, weight_decay, ..ParamsAdamW::default() })?;
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(settings.seed.wrapping_add(1));
+    let mut best = Best { variables: network.variables(), kept: Vec::new(), error: f64::INFINITY };
+    let mut curves = Vec::with_capacity(settings.epochs);
+    for epoch in 1..=settings.epochs {
+        let training_loss = pass(network, data, settings, (&mut optimiser, &mut rng))?;
+        if !training_loss.is_finite() {
+            return Err(TrainError::Diverged { epoch, found: training_loss });
+        }
+        let validation_rmse_per_m = validation_rmse_per_m(network, &data.validation, settings.architecture)?;
+        best.offer(validation_rmse_per_m)?;
+        curves.push(Epoch { epoch, training_loss, validation_rmse_per_m });
+        if on_epoch(&curves[epoch - 1]).is_break() {
+            break;
+        }
+    }
+    best.restore()?;
+    Ok(curves)
+}
+
+fn pass(
+    network: &Network,
+    data: &Data,
+    settings: &Settings,
+    (optimiser, rng): (&mut AdamW, &mut Xoshiro256PlusPlus),
+) -> Result<f64, TrainError> {
+    let mut order: Vec<u32> = (0..data.training.n as u32).collect();
+    order.shuffle(rng);
+    let mut sum = 0.0;
+    for rows in order.chunks(settings.batch) {
+        let indices = Tensor::from_slice(rows, rows.len(), &Device::Cpu)?;
+        let [windows, desired, targets] = data.training.rows(&indices)?;
+        let loss = (network.forward(&windows, &desired)? - targets)?.sqr()?.mean_all()?;
+        sum += f64::from(loss.to_scalar::<f32>()?) * rows.len() as f64;
+        optimiser.backward_step(&loss)?;
+    }
+    Ok(sum / data.training.n as f64)
+}
+
+/// Of the curvature, the first of the answers.
+fn validation_rmse_per_m(
+    network: &Network,
+    half: &Half,
+    architecture: Architecture,
+) -> Result<f64, TrainError> {
+    let mut sum = 0.0;
+    for begin in (0..half.n).step_by(VALIDATION_BATCH) {
+        let rows: Vec<u32> = (begin..half.n.min(begin + VALIDATION_BATCH)).map(|row| row as u32).collect();
+        let indices = Tensor::from_slice(&rows, rows.len(), &Device::Cpu)?;
+        let [windows, desired, targets] = half.rows(&indices)?;
+        let off = (network.forward(&windows, &desired)? - targets)?.narrow(1, 0, 1)?;
+        sum += f64::from(off.sqr()?.sum_all()?.to_scalar::<f32>()?);
+    }
+    let scale = f64::from(architecture.answer_scales()[0]);
+    Ok(scale * (sum / half.n as f64).sqrt())
+}
+
+/// The weights of the best pass so far.
+struct Best {
+    variables: Vec<Var>,
+    kept: Vec<Tensor>,
+    error: f64,
+}
+
+impl Best {
+    fn offer(&mut self, error: f64) -> candle_core::Result<()> {
+        if error < self.error {
+            self.kept = self.variables.iter().map(|variable| variable.copy()).collect::<Result<_, _>>()?;
+            self.error = error;
+        }
+        Ok(())
+    }
+
+    fn restore(&self) -> candle_core::Result<()> {
+        self.variables.iter().zip(&self.kept).try_for_each(|(variable, kept)| variable.set(&kept.detach()))
+    }
+}
+
+/// Numbers of a tensor, row-major, under a name.
+fn keep(
+    tensors: &mut BTreeMap<String, crate::checkpoint::Tensor>,
+    name: impl Into<String>,
+    tensor: &Tensor,
+) -> candle_core::Result<()> {
+    let values = tensor.contiguous()?.flatten_all()?.to_vec1()?;
+    tensors.insert(name.into(), crate::checkpoint::Tensor { shape: tensor.dims().to_vec(), values });
+    Ok(())
+}
+
+#[cfg(test)]
+pub(crate) mod tests;
