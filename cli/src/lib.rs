@@ -43,7 +43,7 @@
 //! | bring a risk map of your own | `cargo run -p traversability --example own_risk_map` |
 //! | ask physics about ground | `cargo run -p physics_prior --example judge_a_ramp` |
 //! | ask the networks about ground | `cargo run -p evidential --example learned_weight` |
-//! | learn which command the ground wants | `cargo run -p kinodynamics --example command_for_the_ground` |
+//! | learn which command a car wants | `cargo run -p kinodynamics --example learn_understeer` |
 //! | drive the controller over a constant risk map | `cargo run -p mppi --example drive_constant_map` |
 //! | give the controller costs of your own | `cargo run -p mppi --example own_costs` |
 //! | drive the planner on your map, without sensors | `cargo run -p navigator --example own_surface` |

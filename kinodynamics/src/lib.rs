@@ -8,8 +8,8 @@
 //! A [`Recording`] is a drive with random commands. [`label`] turns it into examples, [`train`] fits a model and leaves a
 //! [`Checkpoint`]. In the control process an [`InverseModel`] answers from flat weights, without Candle and without
 //! allocation; a [`Corrector`] stands between planner and vehicle, keeps the [`ImuHistory`], bounds what the model may change
-//! and fades it out where the unit is silent or the moment unlike the training. `examples/command_for_the_ground.rs` trains a
-//! model on two grounds and asks it on both.
+//! and fades it out where the unit is silent or the moment unlike the training. `examples/learn_understeer.rs` trains a
+//! model and asks it.
 
 mod architecture;
 mod checkpoint;

@@ -14,7 +14,7 @@ use terrain::{RangePoint, Scan, TerrainClass};
 use traversability::CvarLevel;
 
 /// Crates, folders and files on the way from scan to command.
-const ON_THE_WAY: [&str; 9] = [
+const ON_THE_WAY: [&str; 14] = [
     "terrain/src",
     "traversability/src",
     "bicycle/src",
@@ -22,6 +22,11 @@ const ON_THE_WAY: [&str; 9] = [
     "evidential/src/belief_map.rs",
     "evidential/src/belief_map",
     "evidential/src/predictor",
+    "kinodynamics/src/correction.rs",
+    "kinodynamics/src/dense.rs",
+    "kinodynamics/src/familiarity.rs",
+    "kinodynamics/src/history.rs",
+    "kinodynamics/src/model.rs",
     "mppi/src",
     "navigator/src",
 ];
