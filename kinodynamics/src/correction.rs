@@ -184,7 +184,7 @@ impl Corrector {
         let step = self.config.share_step_max;
         self.share = target.clamp(self.share - step, self.share + step);
         // Where there is no answer there is nothing to fade.
-        if !matches!(wish, Ok(_)) {
+        if wish.is_err() {
             return Corrected { command: planned, share: 0.0, curvature_change_per_m: 0.0, uncorrected };
         }
         let most = self.config.curvature_change_max_per_m;

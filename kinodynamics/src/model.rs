@@ -82,8 +82,8 @@ impl InverseModel {
     /// tells by them how familiar they are.
     pub fn sense<'a>(&mut self, samples: impl Iterator<Item = &'a [f32; AXES]>) {
         for (k, sample) in samples.take(WINDOW).enumerate() {
-            for axis in 0..AXES {
-                self.window[axis * WINDOW + k] = (sample[axis] - self.means[axis]) * self.scales[axis];
+            for (axis, value) in sample.iter().enumerate() {
+                self.window[axis * WINDOW + k] = (value - self.means[axis]) * self.scales[axis];
             }
         }
         self.encode();

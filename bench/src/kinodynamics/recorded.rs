@@ -86,7 +86,7 @@ pub fn judge_log(
         let test = &runs[held_out];
         let bicycle = Bicycle::fit(&training);
         let mut network = network(&training, epochs, seed)?;
-        errors[0].push(errors_of(test, |row| row.speed_mps * row.commanded_per_m, |row| driven_per_m(row)));
+        errors[0].push(errors_of(test, |row| row.speed_mps * row.commanded_per_m, driven_per_m));
         errors[1].push(errors_of(test, |row| bicycle.yaw_rate_radps(row), |row| bicycle.command_per_m(row)));
         errors[2].push(errors_of(
             test,

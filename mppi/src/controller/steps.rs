@@ -1,7 +1,7 @@
 //! The steps of a cycle, in their order: start, samples, rollouts, weights, average.
 
 use super::{Controller, LONGEST_STEPS};
-use crate::config::{Actuation, Temperature};
+use crate::config::{Actuation, Config, Temperature};
 use crate::cost::{Frame, RolloutCost, StepCost};
 use crate::diagnostics::CostTerm;
 use crate::driven::Driven;
@@ -15,7 +15,7 @@ use crate::weights::{Weigh, WeightSummary};
 use bicycle::{MotionLimits, MotionState, MotionStepper};
 use std::f64::consts::TAU;
 use std::ops::Range;
-use traversability::RiskMapView;
+use traversability::{GridGeometry, RiskMapView};
 
 /// What to sample for, in metres.
 #[derive(Clone, Copy)]
@@ -149,52 +149,26 @@ impl<M: Driven, S: StepCost, R: RolloutCost> Controller<M, S, R> {
         }
     }
 
-    pub(super) fn roll_out<'a>(&mut self, input: &Input<'_, MotionState>, order: TaskOrder<'a>) {
+    pub(super) fn roll_out(&mut self, input: &Input<'_, MotionState>, order: TaskOrder<'_>) {
         let geometry = &input.map.geometry;
         let frame = Frame { corner_m: geometry.south_west_m(), cell_m: geometry.resolution_m };
-        let cell_m = frame.cell_m;
-        let cells = |at_m: [f64; 2]| frame.cells(at_m);
         if let TaskOrder::Path(path) = order {
-            let passed_m = path.project([self.start.x_m, self.start.y_m]);
-            let (costs, step_s) = (&self.config.costs, self.config.step_s);
-            for (t, step) in self.reference.iter_mut().enumerate() {
-                let (at_m, tangent) = path.at(passed_m + path.speed_mps * step_s * (t + 1) as f64);
-                let [x_cells, y_cells] = cells(at_m);
-                let along_s = costs.path_along_s_per_m2 * cell_m * cell_m;
-                let across_s = costs.path_across_s_per_m2 * cell_m * cell_m;
-                *step = ReferenceStep { x_cells, y_cells, tangent, along_s, across_s };
-            }
+            self.lay_out(&path, &frame);
         }
-        let (costs, step_s) = (&self.config.costs, self.config.step_s);
-        let to = |at_m: [f64; 2], tolerance_m: f64, distance_s_per_m: f64, rest| {
-            let [x_cells, y_cells] = cells(at_m);
-            Task::Goal(GoalTask {
-                x_cells,
-                y_cells,
-                tolerance_cells: tolerance_m / cell_m,
-                step_s,
-                distance_s: distance_s_per_m * cell_m,
-                rest_s: cell_m / costs.rest_speed_mps,
-                rest,
-            })
-        };
-        let rest = |terminal, of_field: fn(TerminalField<'a>) -> Rest<'a>| match terminal {
-            Terminal::StraightLine => Rest::Straight,
-            Terminal::CostToGo(view) => {
-                TerminalField::new(view, geometry, self.turning_s_per_rad).map_or(Rest::Straight, of_field)
-            }
+        let terms = GoalTerms {
+            config: &self.config,
+            turning_s_per_rad: self.turning_s_per_rad,
+            geometry,
+            frame: &frame,
         };
         let task = match order {
             TaskOrder::Path(_) => Task::Path(&self.reference),
-            // It counts to be near early, since nothing ends there.
-            TaskOrder::Back(target_m, terminal) => {
-                to(target_m, 0.0, step_s / costs.rest_speed_mps, rest(terminal, Rest::StraightFacing))
-            }
+            TaskOrder::Back(target_m, terminal) => Task::Goal(terms.back(target_m, terminal)),
             TaskOrder::Goal(goal_m, tolerance_m, terminal) => {
-                to(goal_m, tolerance_m, costs.distance_s_per_m, rest(terminal, Rest::Field))
+                Task::Goal(terms.onward(goal_m, tolerance_m, terminal))
             }
         };
-        let [x_cells, y_cells] = cells([self.start.x_m, self.start.y_m]);
+        let [x_cells, y_cells] = frame.cells([self.start.x_m, self.start.y_m]);
         let scene = Scene {
             stepper: &self.cell_stepper,
             grid: grid(&input.map),
@@ -219,6 +193,19 @@ impl<M: Driven, S: StepCost, R: RolloutCost> Controller<M, S, R> {
                 S::roll_out::<M>(Job { instructions, scene: &scene, chunk });
             }
         });
+    }
+
+    /// Where the reference is at the end of every step.
+    fn lay_out(&mut self, path: &ReferencePath<'_>, frame: &Frame) {
+        let passed_m = path.project([self.start.x_m, self.start.y_m]);
+        let (costs, step_s, cell_m) = (&self.config.costs, self.config.step_s, frame.cell_m);
+        for (t, step) in self.reference.iter_mut().enumerate() {
+            let (at_m, tangent) = path.at(passed_m + path.speed_mps * step_s * (t + 1) as f64);
+            let [x_cells, y_cells] = frame.cells(at_m);
+            let along_s = costs.path_along_s_per_m2 * cell_m * cell_m;
+            let across_s = costs.path_across_s_per_m2 * cell_m * cell_m;
+            *step = ReferenceStep { x_cells, y_cells, tangent, along_s, across_s };
+        }
     }
 
     /// Asks what whole rollouts cost.
@@ -284,6 +271,49 @@ impl<M: Driven, S: StepCost, R: RolloutCost> Controller<M, S, R> {
         }
         let share = 1.0 / summary.normalizer;
         self.plan.nominal.iter_mut().flatten().for_each(|value| *value *= share);
+    }
+}
+
+/// What goals are priced by, in cells of the map.
+struct GoalTerms<'a> {
+    config: &'a Config,
+    turning_s_per_rad: f64,
+    geometry: &'a GridGeometry,
+    frame: &'a Frame,
+}
+
+impl GoalTerms<'_> {
+    fn onward<'a>(&self, goal_m: [f64; 2], tolerance_m: f64, terminal: Terminal<'a>) -> GoalTask<'a> {
+        let rest = self.field(terminal).map_or(Rest::Straight, Rest::Field);
+        let tolerance_cells = tolerance_m / self.frame.cell_m;
+        GoalTask { tolerance_cells, ..self.to(goal_m, self.config.costs.distance_s_per_m, rest) }
+    }
+
+    /// Nothing ends at the target, so it counts to be near early.
+    fn back<'a>(&self, target_m: [f64; 2], terminal: Terminal<'a>) -> GoalTask<'a> {
+        let rest = self.field(terminal).map_or(Rest::Straight, Rest::StraightFacing);
+        self.to(target_m, self.config.step_s / self.config.costs.rest_speed_mps, rest)
+    }
+
+    fn to<'a>(&self, at_m: [f64; 2], distance_s_per_m: f64, rest: Rest<'a>) -> GoalTask<'a> {
+        let [x_cells, y_cells] = self.frame.cells(at_m);
+        let cell_m = self.frame.cell_m;
+        GoalTask {
+            x_cells,
+            y_cells,
+            tolerance_cells: 0.0,
+            step_s: self.config.step_s,
+            distance_s: distance_s_per_m * cell_m,
+            rest_s: cell_m / self.config.costs.rest_speed_mps,
+            rest,
+        }
+    }
+
+    fn field<'a>(&self, terminal: Terminal<'a>) -> Option<TerminalField<'a>> {
+        match terminal {
+            Terminal::StraightLine => None,
+            Terminal::CostToGo(view) => TerminalField::new(view, self.geometry, self.turning_s_per_rad),
+        }
     }
 }
 
