@@ -121,7 +121,7 @@ mod tests {
 
     #[test]
     fn stated_sizes_and_masses_hold() {
-        let [pietra, rc, buggy, sedan] = fleet().try_into().unwrap();
+        let [pietra, rc, automata, buggy, sedan] = fleet().try_into().unwrap();
         assert_eq!([pietra.geometry.length_m, pietra.geometry.width_m], [3.4, 1.8]);
         assert_eq!([pietra.limits.speed_max_mps, total_mass_kg(&pietra)], [1.0, 1500.0]);
         assert_eq!(
@@ -129,6 +129,7 @@ mod tests {
             [0.33, 0.25, 0.075]
         );
         assert_eq!([rc.limits.speed_max_mps, total_mass_kg(&rc)], [1.5, 3.0]);
+        assert!((total_mass_kg(&automata) - 3.9).abs() < 1e-9 && automata.geometry.wheelbase_m == 0.324);
         assert_eq!([buggy.limits.speed_max_mps, total_mass_kg(&buggy)], [8.0, 13.0]);
         assert!((total_mass_kg(&sedan) - 2303.1).abs() < 1e-9);
         // lf + lr = 1.5213 + 1.4987
