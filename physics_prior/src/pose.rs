@@ -9,7 +9,7 @@ use crate::ground::Contact;
 use crate::lane_ground::{LaneGround, VEGETATION_SHARES};
 use crate::lengths::Lengths;
 use crate::planes::span;
-use crate::stencil::{BellySpan, Stencil, WheelTap};
+use crate::stencil::{BellySpan, Span, Stencil, WheelTap};
 
 /// The ground under a wheel.
 #[derive(Clone, Copy)]
@@ -55,10 +55,10 @@ pub(crate) struct Placed<'a, L: Lanes> {
 }
 
 impl<L: Lanes> Placed<'_, L> {
-    /// Number of obstacle cells that the footprints touch.
+    /// Number of obstacle cells that the footprints touch at any of the headings that they stand for.
     #[inline(always)]
     pub fn n_obstacles(&self) -> Real<L> {
-        self.count(&self.ground.obstacles)
+        self.count(&self.stencil.swept, &self.ground.obstacles)
     }
 
     /// Everything that the prior wants to know.
@@ -67,7 +67,7 @@ impl<L: Lanes> Placed<'_, L> {
         let taps = &self.stencil.wheels;
         let wheels = [self.wheel(&taps[0]), self.wheel(&taps[1]), self.wheel(&taps[2]), self.wheel(&taps[3])];
         let n_cells = self.lanes.real_single(self.stencil.n_footprint_cells as f32);
-        let n_unknown = self.count(&self.ground.unknown);
+        let n_unknown = self.count(&self.stencil.footprint, &self.ground.unknown);
         let n_known = (n_cells - n_unknown).max(self.lanes.real(1.0));
         let per_known = self.lanes.real_single(VEGETATION_SHARES) * n_known;
         let left_slopes =
@@ -79,7 +79,7 @@ impl<L: Lanes> Placed<'_, L> {
         PoseGround {
             wheels,
             n_obstacles: self.n_obstacles(),
-            vegetation_share: self.count(&self.ground.vegetation) / per_known,
+            vegetation_share: self.count(&self.stencil.footprint, &self.ground.vegetation) / per_known,
             unknown_share: n_unknown / n_cells,
             along: self.lanes.real_single(0.25) * forward_slopes,
             across: (self.lanes.real_single(0.25) * left_slopes).abs(),
@@ -92,11 +92,11 @@ impl<L: Lanes> Placed<'_, L> {
         self.lanes.real_of_span(span(layer, self.first, delta), self.offset)
     }
 
-    /// Sum over the footprint.
+    /// Sum over some spans.
     #[inline(always)]
-    fn count(&self, sums: &[f32]) -> Real<L> {
+    fn count(&self, spans: &[Span], sums: &[f32]) -> Real<L> {
         let mut count = self.lanes.real(0.0);
-        for [start, end] in self.stencil.footprint.iter().map(|span| span.deltas) {
+        for [start, end] in spans.iter().map(|span| span.deltas) {
             count = count + (self.read(sums, end) - self.read(sums, start));
         }
         count

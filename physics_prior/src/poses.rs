@@ -115,7 +115,7 @@ impl Poses {
         let place = [x_m, y_m].map(|v| v / resolution_m);
         let base = place.map(|v| v.floor() as i64);
         let phase = place.map(|v| v - v.floor());
-        let mut stencil = Stencil::new(&self.lengths, resolution_m, phase, yaw_rad);
+        let mut stencil = Stencil::new(&self.lengths, resolution_m, phase, (yaw_rad, 0.0));
         self.contains(base, stencil.reach()).then(|| {
             let ground = self.ground.lanes();
             stencil.lay_on(ground.planes(), base);
@@ -305,9 +305,10 @@ fn stencils(lengths: &Lengths, ratio: Ratio, resolution_m: f64, n_yaws: usize) -
     for row in phases.clone() {
         for col in phases.clone() {
             for yaw_bin in 0..n_yaws {
-                let yaw_rad = (yaw_bin as f64 + 0.5) * std::f64::consts::TAU / n_yaws as f64;
+                let half_bin_rad = std::f64::consts::PI / n_yaws as f64;
+                let yaw_rad = (2 * yaw_bin + 1) as f64 * half_bin_rad;
                 let phase = [ratio.phase(col), ratio.phase(row)];
-                stencils.push(Stencil::new(lengths, resolution_m, phase, yaw_rad));
+                stencils.push(Stencil::new(lengths, resolution_m, phase, (yaw_rad, half_bin_rad)));
             }
         }
     }

@@ -53,6 +53,8 @@ pub(crate) struct Stencil {
     pub footprint: Vec<Span>,
     /// Number of cells that the footprint touches.
     pub n_footprint_cells: u32,
+    /// Every cell that the footprint touches at one of the headings that the stencil stands for.
+    pub swept: Vec<Span>,
     /// Every cell whose centre lies under the belly.
     pub belly: Vec<BellySpan>,
 }
@@ -87,9 +89,19 @@ impl Reach {
 }
 
 impl Stencil {
-    /// The stencil for a rear axle's centre at `phase` (columns, rows in [0, 1)) of its base cell.
-    pub fn new(lengths: &Lengths, resolution_m: f64, phase: [f64; 2], yaw_rad: f64) -> Self {
+    /// The stencil for a rear axle's centre at `phase` (columns, rows in [0, 1)) of its base cell, and for headings
+    /// that differ from `yaw_rad` by up to `half_bin_rad`.
+    pub fn new(
+        lengths: &Lengths,
+        resolution_m: f64,
+        phase: [f64; 2],
+        (yaw_rad, half_bin_rad): (f64, f64),
+    ) -> Self {
         let centre_m = phase.map(|share| share * resolution_m);
+        let turned = (-SWEEP_STEPS..=SWEEP_STEPS).map(|step| {
+            let off_rad = half_bin_rad * f64::from(step) / f64::from(SWEEP_STEPS);
+            touched_spans(&lengths.footprint, centre_m, yaw_rad + off_rad, resolution_m)
+        });
         let footprint = touched_spans(&lengths.footprint, centre_m, yaw_rad, resolution_m);
         let n_footprint_cells = footprint.iter().map(|span| span.n_cells as u32).sum();
         let (sine, cosine) = libm::sincos(yaw_rad);
@@ -98,6 +110,7 @@ impl Stencil {
             wheels: wheel_taps(&lengths.wheels, centre_m, yaw_rad, resolution_m),
             footprint,
             n_footprint_cells,
+            swept: union_of_rows(turned.flatten()),
             belly: belly_spans(&lengths.belly, centre_m, yaw_rad, resolution_m),
         }
     }
@@ -109,7 +122,7 @@ impl Stencil {
             let corners = [[east, north], [east + 1, north], [east, north + 1], [east + 1, north + 1]];
             wheel.deltas = corners.map(|corner| planes.delta(base, corner));
         }
-        for Span { start, n_cells, deltas } in &mut self.footprint {
+        for Span { start, n_cells, deltas } in self.footprint.iter_mut().chain(&mut self.swept) {
             let end = [start[0] + *n_cells as i64, start[1]];
             *deltas = [*start, end].map(|offset| planes.delta(base, offset));
         }
@@ -129,7 +142,7 @@ impl Stencil {
             reach.include(tap.offset.map(|v| v + 1));
         }
         let belly = self.belly.iter().map(|belly| &belly.span);
-        for span in self.footprint.iter().chain(belly) {
+        for span in self.footprint.iter().chain(&self.swept).chain(belly) {
             reach.include(span.start);
             reach.include([span.start[0] + span.n_cells as i64 - 1, span.start[1]]);
         }
@@ -163,6 +176,26 @@ fn touched_spans(footprint: &Footprint, centre_m: [f64; 2], yaw_rad: f64, resolu
         (n_cells > 0).then_some(Span { start: [start, row], n_cells, deltas: [0; 2] })
     };
     rows.filter_map(span).collect()
+}
+
+/// Headings to either side of a bin's middle at which a footprint is laid down to see what it sweeps.
+const SWEEP_STEPS: i32 = 8;
+
+/// One span a row, from the westmost to the eastmost cell of those that lie in it. Footprints about one point, turned
+/// by little, overlap: there is no gap between them.
+fn union_of_rows(spans: impl Iterator<Item = Span>) -> Vec<Span> {
+    let mut rows = std::collections::BTreeMap::new();
+    for Span { start: [west, row], n_cells, .. } in spans {
+        let end = west + n_cells as i64;
+        let extent = rows.entry(row).or_insert((west, end));
+        *extent = (extent.0.min(west), extent.1.max(end));
+    }
+    let span = |(row, (west, end)): (i64, (i64, i64))| Span {
+        start: [west, row],
+        n_cells: (end - west) as usize,
+        deltas: [0; 2],
+    };
+    rows.into_iter().map(span).collect()
 }
 
 /// Share of a cell that counts as nothing, so that rounding cannot add a row of cells.

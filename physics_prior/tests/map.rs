@@ -94,16 +94,23 @@ fn obstacles_block_every_pose_whose_footprint_touches_them() {
                 continue;
             }
             let [x_m, y_m] = geometry.centre_m(cell);
-            for yaw in 0..16 {
-                let (sin, cos) = view.yaw_rad(yaw).sin_cos();
+            // How far the centre of the post's cell lies outside the rectangle [-0.5, 2.9] x [-0.9, 0.9]:
+            // closer than half an edge it surely touches, further than half a diagonal of 0.0707 m surely not.
+            let outside_m = |yaw_rad: f64| {
+                let (sin, cos) = yaw_rad.sin_cos();
                 let forward_m = cos * (post_x_m - x_m) + sin * (post_y_m - y_m);
                 let left_m = -sin * (post_x_m - x_m) + cos * (post_y_m - y_m);
-                // How far the centre of the post's cell lies outside the rectangle [-0.5, 2.9] x [-0.9, 0.9]:
-                // closer than half an edge it surely touches, further than half a diagonal of 0.0707 m surely not.
                 let ahead_m = (forward_m - 2.9).max(-0.5 - forward_m).max(0.0);
-                let outside_m = ahead_m.hypot((left_m.abs() - 0.9).max(0.0));
+                ahead_m.hypot((left_m.abs() - 0.9).max(0.0))
+            };
+            for yaw in 0..16 {
+                // A pose stands for every heading of its bin, 11.25 degrees to either side. It is laid down every 1.4
+                // degrees; between two of these a corner at (2.9, 0.9) m stands out by 0.9 m times half of that: 11 mm
+                // at most, and less than 6 mm where the nearer of them counts.
+                let headings = (-40..=40).map(|step| view.yaw_rad(yaw) + PI / 16.0 * f64::from(step) / 40.0);
+                let outside_m = headings.map(outside_m).fold(f64::INFINITY, f64::min);
                 let blocked = view.risk(cell, yaw).is_blocked();
-                if outside_m < 0.049 {
+                if outside_m < 0.043 {
                     assert!(blocked, "{cell:?} {yaw} {outside_m}");
                 } else if outside_m > 0.0708 {
                     assert!(!blocked, "{cell:?} {yaw} {outside_m}");
@@ -117,14 +124,15 @@ fn obstacles_block_every_pose_whose_footprint_touches_them() {
 fn the_margin_widens_the_footprint_on_every_side() {
     let geometry = window(0.1, 40, 40);
     // Heading west from the centre of cell (20, 20) at (2.05, 2.05), the car reaches 0.295 m west, 0.035 m east and
-    // 0.125 m to either side; the obstacles' near edges lie 0.55, 0.25 and 0.25 m away.
+    // 0.125 m to either side; the obstacles' near edges lie 0.55, 0.25 and 0.25 m away. Half a degree to either side,
+    // for which the middle one of 361 headings stands, adds 3 mm.
     let sides = [(20, 14, 0.255), (20, 23, 0.215), (23, 20, 0.125), (17, 20, 0.125)];
     for (row, col, gap_m) in sides {
         let mut ground = level_ground(geometry);
         ground[Cell { row, col }] = SurfaceCell::certain(0.0, TerrainClass::Obstacle, 0.0);
         let blocked = |obstacle_margin_m: f64| {
-            let map = prior_map(&CAR, &Assumption::Nominal { obstacle_margin_m }, &ground, 1);
-            map.risk_map().view().risk(Cell { row: 20, col: 20 }, 0).is_blocked()
+            let map = prior_map(&CAR, &Assumption::Nominal { obstacle_margin_m }, &ground, 361);
+            map.risk_map().view().risk(Cell { row: 20, col: 20 }, 180).is_blocked()
         };
         assert!(!blocked(gap_m - 0.005) && blocked(gap_m + 0.005), "{row} {col}");
     }
