@@ -1,7 +1,7 @@
 //! What the prior says of many poses at once.
 
 use bicycle::lanes::Block;
-use traversability::N_BINS;
+use traversability::{N_BINS, Risk};
 
 /// Poses of one yaw in cells of a row that lie [`crate::Ratio::n_phases`] apart.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -20,14 +20,26 @@ pub struct BlockPrior {
     /// Partial moments of the distributions of equation 18, as in [`traversability::PartialMoments`]: shape
     /// [parameter, bin].
     pub moments: [[Block; N_BINS]; 4],
-    /// Number of obstacle cells that the footprint touches.
-    pub n_obstacles: Block,
+    /// 0 where the footprint touches no obstacle at any heading that the pose stands for, 1 where it does at one of
+    /// them, 2 where it does at the middle one.
+    pub obstruction: Block,
     /// 1 where so little of the footprint is known that it is judged as unknown ground, else 0.
     pub unknown: Block,
 }
 
 impl Default for BlockPrior {
     fn default() -> Self {
-        Self { moments: [[Block::ZERO; N_BINS]; 4], n_obstacles: Block::ZERO, unknown: Block::ZERO }
+        Self { moments: [[Block::ZERO; N_BINS]; 4], obstruction: Block::ZERO, unknown: Block::ZERO }
+    }
+}
+
+impl BlockPrior {
+    /// The risk of a pose, by that of the ground and the obstacles that it touches.
+    pub fn obstructed(&self, lane: usize, free: Risk) -> Risk {
+        match self.obstruction.0[lane] {
+            touching if touching > 1.0 => free.touching(),
+            near if near > 0.0 => free.blocked(),
+            _ => free,
+        }
     }
 }

@@ -30,7 +30,7 @@ pub(crate) struct PoseGround<L: Lanes> {
     /// Front left, rear left, rear right, front right.
     pub wheels: [WheelGround<L>; 4],
     /// Number of obstacle cells that the footprint touches.
-    pub n_obstacles: Real<L>,
+    pub obstruction: Real<L>,
     /// Share of vegetation in the known part of the footprint.
     pub vegetation_share: Real<L>,
     /// Share of the footprint that is unknown.
@@ -55,10 +55,13 @@ pub(crate) struct Placed<'a, L: Lanes> {
 }
 
 impl<L: Lanes> Placed<'_, L> {
-    /// Number of obstacle cells that the footprints touch at any of the headings that they stand for.
+    /// As [`crate::BlockPrior::obstruction`].
     #[inline(always)]
-    pub fn n_obstacles(&self) -> Real<L> {
-        self.count(&self.stencil.swept, &self.ground.obstacles)
+    pub fn obstruction(&self) -> Real<L> {
+        let one = self.lanes.real(1.0);
+        let near = self.count(&self.stencil.swept, &self.ground.obstacles);
+        let touched = self.count(&self.stencil.footprint, &self.ground.obstacles);
+        near.min(one) + touched.min(one)
     }
 
     /// Everything that the prior wants to know.
@@ -78,7 +81,7 @@ impl<L: Lanes> Placed<'_, L> {
             + wheels[3].forward_slope;
         PoseGround {
             wheels,
-            n_obstacles: self.n_obstacles(),
+            obstruction: self.obstruction(),
             vegetation_share: self.count(&self.stencil.footprint, &self.ground.vegetation) / per_known,
             unknown_share: n_unknown / n_cells,
             along: self.lanes.real_single(0.25) * forward_slopes,

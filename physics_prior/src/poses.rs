@@ -189,11 +189,11 @@ impl ReadLine<'_> {
             }
         };
         let Judgement::Physics(physics) = &poses.judgement else {
-            write(&mut self.block.n_obstacles, placed.n_obstacles());
+            write(&mut self.block.obstruction, placed.obstruction());
             return;
         };
         let pose = placed.pose_ground(&poses.lengths);
-        write(&mut self.block.n_obstacles, pose.n_obstacles);
+        write(&mut self.block.obstruction, pose.obstruction);
         let is_unknown = physics.equations.is_unknown(lanes, &pose);
         write(&mut self.block.unknown, lanes.real(1.0).or_else(is_unknown, lanes.real(0.0)));
         let outcomes = physics.equations.outcomes(lanes, &pose);

@@ -153,7 +153,6 @@ impl PriorField {
             }
             Judgement::Nominal => None,
         };
-        let n_obstacles = block.n_obstacles;
         (0..n).map(move |lane| {
             let free = free.as_ref().map_or(Risk::NONE, |[linear, angular, roll, pitch]| Risk {
                 linear_traction: linear.0[lane],
@@ -161,7 +160,7 @@ impl PriorField {
                 roll_rad: roll.0[lane],
                 pitch_rad: pitch.0[lane],
             });
-            if n_obstacles.0[lane] > 0.0 { free.blocked() } else { free }
+            block.obstructed(lane, free)
         })
     }
 

@@ -31,7 +31,12 @@ fn the_map_is_the_belief_of_every_pose() {
                 // A hair to the north-east, so that rounding cannot take the pose to another surface cell.
                 let belief = map.belief(x_m + 1e-9, y_m + 1e-9, view.yaw_rad(yaw)).unwrap();
                 let expected = belief.risk(level(at));
-                let expected = if found.is_blocked() { expected.blocked() } else { expected };
+                let [is_touching, is_blocked] = [2.0, 1.0].map(|turns| found.roll_rad >= turns * Risk::BLOCKED_RAD);
+                let expected = match (is_touching, is_blocked) {
+                    (true, _) => expected.touching(),
+                    (_, true) => expected.blocked(),
+                    _ => expected,
+                };
                 assert!(
                     close(found, expected, 1e-4),
                     "{resolution_m} {row} {col} {yaw} {found:?} {expected:?}"
@@ -108,7 +113,11 @@ fn obstacles_block_every_pose_whose_footprint_touches_them() {
                 // degrees; between two of these a corner at (2.9, 0.9) m stands out by 0.9 m times half of that: 11 mm
                 // at most, and less than 6 mm where the nearer of them counts.
                 let headings = (-40..=40).map(|step| view.yaw_rad(yaw) + PI / 16.0 * f64::from(step) / 40.0);
-                let outside_m = headings.map(outside_m).fold(f64::INFINITY, f64::min);
+                let at_the_middle_m = outside_m(view.yaw_rad(yaw));
+                let outside_m = headings.map(&outside_m).fold(f64::INFINITY, f64::min);
+                let is_touching = view.risk(cell, yaw).roll_rad >= 2.0 * Risk::BLOCKED_RAD;
+                assert!(is_touching || at_the_middle_m >= 0.049, "{cell:?} {yaw} {at_the_middle_m}");
+                assert!(!is_touching || at_the_middle_m <= 0.0708, "{cell:?} {yaw} {at_the_middle_m}");
                 let blocked = view.risk(cell, yaw).is_blocked();
                 if outside_m < 0.043 {
                     assert!(blocked, "{cell:?} {yaw} {outside_m}");
@@ -152,7 +161,7 @@ fn the_nominal_map_is_full_traction_on_level_ground_whatever_the_ground() {
             assert_eq!(risk, Risk::OUTSIDE);
             continue;
         }
-        assert!(risk == Risk::NONE || risk == Risk::NONE.blocked());
+        assert!([Risk::NONE, Risk::NONE.blocked(), Risk::NONE.touching()].contains(&risk));
         if risk.is_blocked() { n_blocked += 1 } else { n_free += 1 }
     }
     assert!(n_free > 1000 && n_blocked > 1000);
@@ -381,9 +390,9 @@ fn a_pose_prior_has_the_risk_of_the_map() {
             let found = map.risk_map().view().risk(Cell { row: row as usize, col: 1 + lane }, yaw);
             let moments = block.moments.each_ref().map(|moments| moments.each_ref().map(|bin| bin.0[lane]));
             let free = PartialMoments { moments }.risk(level(0.3));
-            let is_blocked = block.n_obstacles.0[lane] > 0.0;
+            let is_blocked = block.obstruction.0[lane] > 0.0;
             assert_eq!(is_blocked, found.is_blocked());
-            let expected = if is_blocked { free.blocked() } else { free };
+            let expected = block.obstructed(lane, free);
             assert!(close(found, expected, 1e-5), "{row} {lane} {yaw} {found:?} {expected:?}");
             n_unknown += usize::from(block.unknown.0[lane] > 0.0);
         }

@@ -41,12 +41,20 @@ impl Risk {
         Self { roll_rad, pitch_rad, ..self }
     }
 
-    /// Whether this is the risk of a pose that touches an obstacle.
+    /// A pose that touches an obstacle at its very heading, where a blocked one touches it at some heading that it
+    /// stands for: a whole turn on top of its attitude, so that a vehicle may leave a blocked pose and not through this.
+    pub fn touching(self) -> Self {
+        let Self { roll_rad, pitch_rad, .. } = self.blocked();
+        Self { roll_rad: roll_rad + Self::BLOCKED_RAD, pitch_rad: pitch_rad + Self::BLOCKED_RAD, ..self }
+    }
+
+    /// Whether this is the risk of a pose that is blocked or touches an obstacle.
     pub fn is_blocked(self) -> bool {
         self.roll_rad >= Self::BLOCKED_RAD
     }
 
-    /// |roll| and |pitch| of the ground, whether an obstacle blocks the pose or not [rad].
+    /// |roll| and |pitch| that who leaves a blocked pose has to answer for [rad]: those of the ground, whether the pose
+    /// is blocked or not, and half a turn more where it touches an obstacle.
     pub fn lean_rad(self) -> [f32; 2] {
         let added_rad = if self.is_blocked() { Self::BLOCKED_RAD } else { 0.0 };
         [self.roll_rad - added_rad, self.pitch_rad - added_rad]
@@ -371,6 +379,14 @@ mod tests {
         assert_eq!(risk.lean_rad(), [0.1, 0.3]);
         let [roll_rad, pitch_rad] = risk.blocked().lean_rad();
         assert!((roll_rad - 0.1).abs() < 2.4e-7 && (pitch_rad - 0.3).abs() < 2.4e-7);
+    }
+
+    #[test]
+    fn touching_an_obstacle_is_worse_to_leave_through_than_being_blocked() {
+        let risk = Risk { roll_rad: 0.1, pitch_rad: 0.3, ..Risk::NONE };
+        let [blocked_rad, touching_rad] = [risk.blocked(), risk.touching()].map(Risk::lean_rad);
+        assert!(risk.touching().is_blocked());
+        assert!((0..2).all(|k| (touching_rad[k] - blocked_rad[k] - Risk::BLOCKED_RAD).abs() < 1e-6));
     }
 
     #[test]

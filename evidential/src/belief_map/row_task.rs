@@ -266,7 +266,7 @@ impl Fuse<'_> {
                 pitch_rad: cvars[3].0[lane],
             };
             let free = if is_out { self.fusion.unfamiliar(free) } else { free };
-            risks[lane] = if prior.n_obstacles.0[lane] > 0.0 { free.blocked() } else { free };
+            risks[lane] = prior.obstructed(lane, free);
         }
     }
 }

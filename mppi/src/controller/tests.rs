@@ -185,6 +185,37 @@ fn who_leaves_an_obstacle_keeps_off_steeper_ground() {
     }
 }
 
+/// The vehicle stands where some heading would touch an obstacle; one metre ahead, and two to its end, it is touched at
+/// any. Leaving excuses the first alone.
+#[test]
+fn who_leaves_a_blocked_pose_does_not_drive_into_the_obstacle() {
+    let mut map = RiskMap::constant(GridGeometry::centred(0.25, 160, 160, 0.0, 0.0), 1, Risk::NONE);
+    let geometry = *map.geometry();
+    map.fill(|risks, _| {
+        for (index, risk) in risks.iter_mut().enumerate() {
+            let [x_m, _] = geometry.centre_m(geometry.cell(index));
+            *risk = match x_m {
+                x_m if (1.0..2.0).contains(&x_m) => Risk::NONE.touching(),
+                x_m if x_m.abs() < 2.5 => Risk::NONE.blocked(),
+                _ => Risk::NONE,
+            };
+        }
+    });
+    let config = Config { n_rollouts: 64, ..Config::default() };
+    let mut controller = Controller::new(config, Model { effects: Vec::new(), ..model(0.0) }, 1).unwrap();
+    let objective =
+        Objective::Goal { goal_m: [19.0, 0.0], tolerance_m: 0.5, terminal: Terminal::StraightLine };
+    let input = Input { state: State::default(), elapsed_s: STEP_S, cycle: 0, map: map.view(), objective };
+    let decision = controller.decide(&input);
+    assert!(matches!(decision, Decision::Drive(_)), "{decision:?}");
+    let breaks = [1.0, -1.0].map(|speed_mps| {
+        let mut memory = controller.slots.map(f64::from);
+        let controls = std::iter::repeat_n([speed_mps, 0.0], 30);
+        controller.judge_over(map.view()).breaks_limits(&controller.start, controls, &mut memory)
+    });
+    assert_eq!(breaks, [true, false], "ahead, behind");
+}
+
 /// A wall right ahead that costs next to nothing to drive through: mean and cheapest rollouts lead into it, many others
 /// do not. One of those is driven; whether it keeps clear is looked at with equations of this test's own.
 #[test]
