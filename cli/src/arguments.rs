@@ -13,6 +13,7 @@ mod learned_map;
 mod orders;
 mod plant;
 mod replay;
+mod route;
 mod train;
 mod up;
 mod values;
@@ -38,6 +39,7 @@ pub use learned_map::{BenchLearnedMapArguments, NetworkSizes};
 pub use orders::{AlphaArguments, AskedRun, GoalArguments, PathArguments};
 pub use plant::BenchPlantArguments;
 pub use replay::ReplayArguments;
+pub use route::{BareGround, RouteArguments};
 pub use train::{TrainArguments, TrainCommand};
 pub use up::{UpArguments, UpRole};
 pub use values::{Goal, StartPose, WorldSource, place_with_minus};
@@ -89,6 +91,9 @@ pub enum Command {
     /// Make every decision of a recording again, to the last bit
     #[command(long_about = replay::LONG_ABOUT)]
     Replay(ReplayArguments),
+    /// Search a route over measured ground, and the fastest speeds along it
+    #[command(long_about = route::LONG_ABOUT)]
+    Route(RouteArguments),
     /// Say what a recording, an elevation map, a vehicle or networks hold
     #[command(long_about = inspect::LONG_ABOUT)]
     Inspect(InspectArguments),
@@ -129,6 +134,8 @@ Examples:
   surefoot drive --help                 every option, with its unit and default
   surefoot up                           the same drive by processes that survive one another
   surefoot goal 30,25 40,10             where that run shall go next
+  surefoot route --world hills.npz --start 20,20,0.8 --goal 250,240
+                                        a way over measured ground, and how fast to drive it
   surefoot collect                      data to learn from, out of 200 simulated trials
   surefoot train traversability --train train.safetensors --validation validation.safetensors
                                         networks that know what the drives have taught

@@ -23,6 +23,7 @@
 //! Around it:
 //!
 //! - [`kinodynamics`]: which command does what is wanted on the ground that the inertial measurement unit feels.
+//! - [`route`](::route): a route over kilometres of measured ground, and the speeds along it.
 //! - [`scenarios`]: the truth that all of it is tested against: worlds, a plant of rigid bodies and tyres, sensors,
 //!   episodes.
 //! - [`bus`]: the contract with a vehicle: messages in shared memory, channels, ages, watchdog.
@@ -44,6 +45,7 @@
 //! | ask physics about ground | `cargo run -p physics_prior --example judge_a_ramp` |
 //! | ask the networks about ground | `cargo run -p evidential --example learned_weight` |
 //! | learn which command a car wants | `cargo run -p kinodynamics --example learn_understeer` |
+//! | search a route around slippery ground | `cargo run -p route --example around_ice` |
 //! | drive the controller over a constant risk map | `cargo run -p mppi --example drive_constant_map` |
 //! | give the controller costs of your own | `cargo run -p mppi --example own_costs` |
 //! | drive the planner on your map, without sensors | `cargo run -p navigator --example own_surface` |
@@ -88,6 +90,7 @@ pub mod output;
 pub mod picture;
 pub mod progress;
 mod replay;
+mod route;
 pub mod summary;
 mod train;
 mod up;
@@ -144,6 +147,7 @@ fn dispatch(command: Command) -> anyhow::Result<()> {
         Command::Reset(run) => orders::tell(&run, &Order::Reset),
         Command::Alpha(alpha) => orders::alpha(&alpha),
         Command::Replay(replay) => replay::run(&replay),
+        Command::Route(route) => route::run(&route),
         Command::Inspect(inspect) => inspect::run(&inspect),
         Command::Gap { command } => gap::run(&command),
         Command::Collect(collect) => collect::run(&collect),

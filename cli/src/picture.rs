@@ -16,6 +16,7 @@ mod map;
 mod navigation_table;
 mod plant;
 mod relief;
+mod route;
 mod signatures;
 mod strips;
 mod traction_map;
@@ -41,6 +42,7 @@ pub use learning::{draw_learning, learning_svg};
 pub use loss_curves::draw_loss_curves;
 pub use navigation_table::draw_navigation_table;
 pub use plant::draw_plant;
+pub use route::{RoutePicture, draw_route};
 pub use signatures::draw_signatures;
 pub use traction_map::draw_traction_map;
 

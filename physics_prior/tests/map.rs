@@ -31,7 +31,8 @@ fn the_map_is_the_belief_of_every_pose() {
                 // A hair to the north-east, so that rounding cannot take the pose to another surface cell.
                 let belief = map.belief(x_m + 1e-9, y_m + 1e-9, view.yaw_rad(yaw)).unwrap();
                 let expected = belief.risk(level(at));
-                let [is_touching, is_blocked] = [2.0, 1.0].map(|turns| found.roll_rad >= turns * Risk::BLOCKED_RAD);
+                let [is_touching, is_blocked] =
+                    [2.0, 1.0].map(|turns| found.roll_rad >= turns * Risk::BLOCKED_RAD);
                 let expected = match (is_touching, is_blocked) {
                     (true, _) => expected.touching(),
                     (_, true) => expected.blocked(),

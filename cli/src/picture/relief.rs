@@ -118,7 +118,7 @@ fn exaggeration(slopes: &[[f32; 2]]) -> f32 {
 }
 
 /// Lambert's law, scaled to 1 on level ground.
-fn lit([east, north]: [f32; 2]) -> f32 {
+pub(super) fn lit([east, north]: [f32; 2]) -> f32 {
     let length = (east * east + north * north + 1.0).sqrt();
     let sun = ((SUN[2] - SUN[0] * east - SUN[1] * north) / length).max(0.0);
     AMBIENT + (1.0 - AMBIENT) * sun / SUN[2]

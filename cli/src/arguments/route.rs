@@ -1,0 +1,86 @@
+//! `surefoot route`.
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+
+use super::values::{Goal, StartPose};
+
+/// From where to where, over what.
+#[derive(Args, Clone, Debug)]
+#[command(after_long_help = AFTER_HELP)]
+pub struct RouteArguments {
+    /// Elevation file: .npz, GeoTIFF or 16-bit PNG with its scale
+    #[arg(long, value_name = "FILE")]
+    pub world: PathBuf,
+
+    /// Where the vehicle stands [m, m, rad]
+    #[arg(long, value_name = "X,Y,YAW", allow_hyphen_values = true)]
+    pub start: StartPose,
+
+    /// Where it shall go [m]
+    #[arg(long, value_name = "X,Y", allow_hyphen_values = true)]
+    pub goal: Goal,
+
+    /// The machine, a shipped name or a path
+    #[arg(long, value_name = "NAME|FILE", default_value = "pietra_full_size")]
+    pub vehicle: String,
+
+    /// Edge of the map's cells [m] [default: that of the file, between 0.5 and 2]
+    #[arg(long, value_name = "M", allow_hyphen_values = true)]
+    pub cell: Option<f64>,
+
+    /// Ground where no plants grow
+    #[arg(long, value_name = "GROUND", default_value = "dirt")]
+    pub bare: BareGround,
+
+    /// Fastest [m/s] [default: the vehicle's]
+    #[arg(long, value_name = "M/S", allow_hyphen_values = true)]
+    pub speed: Option<f64>,
+
+    /// Folder for route.png, route.csv and route.json; made if missing, earlier files are replaced
+    #[arg(long, value_name = "DIR", default_value = "surefoot-out")]
+    pub out: PathBuf,
+
+    /// Write the numbers to this file too
+    #[arg(long, value_name = "FILE")]
+    pub json: Option<PathBuf>,
+}
+
+/// Grounds that AnyNav states coefficients for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum BareGround {
+    /// 0.98 static, 0.70 sliding
+    Asphalt,
+    /// 0.93, 0.62
+    Rock,
+    /// 0.68, 0.76
+    Dirt,
+    /// 0.61, 0.65
+    Grass,
+    /// 0.55, 0.55
+    Mud,
+    /// 0.60, 0.60
+    Sand,
+    /// 0.40, 0.20
+    Ice,
+}
+
+pub(super) const LONG_ABOUT: &str = "\
+Searches a route over measured ground, from one place to another, and the fastest speeds along it.
+
+The search weighs length, friction, slope, roughness and turns (AnyNav, equations 37 to 42); the speeds are the fastest \
+that friction, traction, brakes and roughness allow (equations 43 to 51). Ground too slippery for its slope, steeper \
+than nine tenths of the vehicle's limits, or under water is not driven on. Where there is no way, the line that says so \
+names what blocks it, and where.";
+
+const AFTER_HELP: &str = "\
+Writes route.png, route.csv and route.json.
+  route.csv   x_m, y_m, yaw_rad, height_m, speed_mps, curvature_per_m, grade, friction along the way
+  path        `surefoot path` takes the corners that are printed
+
+Friction comes from the file's share of low plants (grass) and from --bare; nothing is learned from images.
+
+Examples:
+  surefoot route --world hills.npz --start 20,20,0.8 --goal 250,240
+  surefoot route --world hills.npz --start 20,20,0.8 --goal 250,240 --bare mud --speed 5 --vehicle mine.toml";

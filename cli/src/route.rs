@@ -1,0 +1,196 @@
+//! `surefoot route`: a way over measured ground and the speeds along it, as text, CSV, JSON and picture.
+
+use ::route::{
+    FrictionCurve, GroundLayers, Planner, Route, RouteConfig, RouteError, RoutePoint, SpeedLimits,
+};
+use bicycle::Vehicle;
+use formats::{read_elevation, read_vehicle};
+use serde::Serialize;
+
+use crate::arguments::{BareGround, RouteArguments};
+use crate::picture::{RoutePicture, draw_route};
+use crate::{UsageError, WorkFailed, output, summary};
+
+/// Room that must be free beforehand [bytes].
+const ROOM_BYTES: u64 = 16 << 20;
+/// Share of the attitude limits that a route may use; the rest is for what no map shows.
+const ATTITUDE_SHARE: f64 = 0.9;
+/// Room beside the vehicle, in all [m].
+const MARGIN_M: f64 = 0.6;
+
+pub(crate) fn run(arguments: &RouteArguments) -> anyhow::Result<()> {
+    let vehicle = read_vehicle(&arguments.vehicle).map_err(UsageError::from_input)?;
+    let limits = speed_limits(&vehicle, arguments);
+    limits.validate().map_err(UsageError::from_input)?;
+    let planner = planner(&vehicle, arguments)?;
+    formats::prepare_out_dir(&arguments.out, ROOM_BYTES)
+        .map_err(|error| UsageError(format!("--out: {}", UsageError::from_input(error))))?;
+    arguments.json.as_deref().map_or(Ok(()), output::prepare_json)?;
+    let start = arguments.start;
+    let goal_m = [arguments.goal.x_m, arguments.goal.y_m];
+    let route = planner.route(([start.x_m, start.y_m], start.yaw_rad), goal_m, &limits).map_err(failed)?;
+    let told = Summary::of(&route, &vehicle, arguments);
+    print!("{}", told.text());
+    write(&planner, &route, &told, arguments)
+}
+
+/// Places where nobody can stand are bad input; no way between them is an answer.
+fn failed(error: RouteError) -> anyhow::Error {
+    match error {
+        RouteError::Outside { .. } | RouteError::Blocked { .. } => UsageError::from_input(error).into(),
+        _ => WorkFailed(error.to_string()).into(),
+    }
+}
+
+fn planner(vehicle: &Vehicle, arguments: &RouteArguments) -> Result<Planner, UsageError> {
+    let file = read_elevation(&arguments.world).map_err(UsageError::from_input)?;
+    let cell_m = arguments.cell.unwrap_or_else(|| file.elevation.geometry().resolution_m.clamp(0.5, 2.0));
+    let layers = GroundLayers {
+        elevation_m: &file.elevation,
+        low_vegetation_fraction: file.layers.low_vegetation_fraction.as_ref(),
+        water: file.layers.water.as_ref(),
+        ground_gap_m: file.layers.ground_gap_m.as_ref(),
+        bare: arguments.bare.curve(),
+    };
+    let ground = layers.ground(cell_m).map_err(UsageError::from_input)?;
+    Planner::new(ground, config(vehicle)).map_err(UsageError::from_input)
+}
+
+fn config(vehicle: &Vehicle) -> RouteConfig {
+    RouteConfig {
+        clear_width_m: vehicle.geometry.width_m + MARGIN_M,
+        pitch_max_rad: ATTITUDE_SHARE * vehicle.limits.pitch_max_rad,
+        roll_max_rad: ATTITUDE_SHARE * vehicle.limits.roll_max_rad,
+        ..RouteConfig::default()
+    }
+}
+
+fn speed_limits(vehicle: &Vehicle, arguments: &RouteArguments) -> SpeedLimits {
+    let mass_kg = vehicle.body.mass_kg + 4.0 * vehicle.wheel.mass_kg;
+    let per_torque = 1.0 / (vehicle.geometry.wheel_radius_m * mass_kg);
+    SpeedLimits {
+        speed_max_mps: arguments.speed.unwrap_or(vehicle.limits.speed_max_mps),
+        traction_max_mps2: (vehicle.drivetrain.drive_torque_max_nm * per_torque).min(100.0),
+        braking_max_mps2: (vehicle.drivetrain.brake_torque_max_nm * per_torque).min(100.0),
+        ..SpeedLimits::default()
+    }
+}
+
+impl BareGround {
+    fn curve(self) -> FrictionCurve {
+        match self {
+            Self::Asphalt => FrictionCurve::ASPHALT,
+            Self::Rock => FrictionCurve::ROCK,
+            Self::Dirt => FrictionCurve::DIRT,
+            Self::Grass => FrictionCurve::GRASS,
+            Self::Mud => FrictionCurve::MUD,
+            Self::Sand => FrictionCurve::SAND,
+            Self::Ice => FrictionCurve::ICE,
+        }
+    }
+}
+
+/// What is said of a route.
+#[derive(Serialize)]
+struct Summary {
+    revision: &'static str,
+    world: String,
+    vehicle: String,
+    length_m: f64,
+    duration_s: f64,
+    climb_m: f64,
+    steepest_deg: f64,
+    fastest_mps: f64,
+    tightest_radius_m: f64,
+    turning_radius_m: f64,
+    cost_m: f64,
+    n_expanded: usize,
+    corners_m: Vec<[f64; 2]>,
+}
+
+impl Summary {
+    fn of(route: &Route, vehicle: &Vehicle, arguments: &RouteArguments) -> Self {
+        let points = &route.points;
+        let largest = |value: &dyn Fn(&RoutePoint) -> f64| points.iter().map(value).fold(0.0, f64::max);
+        let climbs_m = points.windows(2).map(|ends| (ends[1].height_m - ends[0].height_m).max(0.0));
+        let slope = |point: &RoutePoint| point.bend.grade.hypot(point.bend.cross_slope);
+        let every = points.len().div_ceil(CORNERS).max(1);
+        let corners =
+            points.iter().step_by(every).chain(points.last().filter(|_| (points.len() - 1) % every != 0));
+        Self {
+            revision: summary::revision(),
+            world: arguments.world.file_name().unwrap_or_default().to_string_lossy().into_owned(),
+            vehicle: vehicle.name.clone(),
+            length_m: route.spacing_m * (points.len() - 1) as f64,
+            duration_s: route.duration_s,
+            climb_m: climbs_m.sum(),
+            steepest_deg: largest(&slope).atan().to_degrees(),
+            fastest_mps: largest(&|point| point.speed_mps),
+            tightest_radius_m: 1.0 / largest(&|point| point.bend.curvature_per_m.abs()).max(1e-6),
+            turning_radius_m: vehicle.geometry.wheelbase_m / vehicle.limits.steering_max_rad.tan(),
+            cost_m: route.cost_m,
+            n_expanded: route.n_expanded,
+            corners_m: corners.map(|point| point.at_m).collect(),
+        }
+    }
+
+    fn text(&self) -> String {
+        let corners: Vec<String> =
+            self.corners_m.iter().map(|[x_m, y_m]| format!("{x_m:.1},{y_m:.1}")).collect();
+        let warning = if self.tightest_radius_m < self.turning_radius_m {
+            format!("\n  tighter than the vehicle turns ({:.1} m)", self.turning_radius_m)
+        } else {
+            String::new()
+        };
+        format!(
+            "  {} over {}\n  length             {:.1} m\n  expected time      {:.1} s\n  climb              {:.1} m\n  \
+             steepest           {:.1} deg\n  fastest            {:.1} m/s\n  tightest radius    {:.1} m{warning}\n  \
+             states expanded    {}\n  corners            {}\n",
+            self.vehicle,
+            self.world,
+            self.length_m,
+            self.duration_s,
+            self.climb_m,
+            self.steepest_deg,
+            self.fastest_mps,
+            self.tightest_radius_m,
+            self.n_expanded,
+            corners.join(" ")
+        )
+    }
+}
+
+/// Corners that are printed, at most.
+const CORNERS: usize = 24;
+
+fn write(
+    planner: &Planner,
+    route: &Route,
+    summary: &Summary,
+    arguments: &RouteArguments,
+) -> anyhow::Result<()> {
+    let places = [Some(arguments.out.join("route.json")), arguments.json.clone()];
+    places.iter().flatten().try_for_each(|path| formats::write_json_atomic(path, summary))?;
+    formats::write_bytes_atomic(&arguments.out.join("route.csv"), csv(route).as_bytes())?;
+    let title = format!("{}: {:.0} m in {:.0} s", summary.vehicle, summary.length_m, summary.duration_s);
+    let subtitle = format!(
+        "{}, climb {:.0} m, steepest {:.0} deg, tightest radius {:.1} m",
+        summary.world, summary.climb_m, summary.steepest_deg, summary.tightest_radius_m
+    );
+    let picture = RoutePicture { title: &title, subtitle: &subtitle, ground: planner.ground(), route };
+    draw_route(&picture, &arguments.out.join("route.png"))?;
+    println!("\n  route.png, route.csv and route.json in {}", arguments.out.display());
+    Ok(())
+}
+
+fn csv(route: &Route) -> String {
+    let mut text = String::from("x_m,y_m,yaw_rad,height_m,speed_mps,curvature_per_m,grade,friction\n");
+    for RoutePoint { at_m: [x_m, y_m], yaw_rad, height_m, bend, speed_mps } in &route.points {
+        let (curvature, grade, friction) = (bend.curvature_per_m, bend.grade, bend.friction);
+        let row = format!(
+            "{x_m:.3},{y_m:.3},{yaw_rad:.5},{height_m:.3},{speed_mps:.4},{curvature:.5},{grade:.5},{friction:.4}\n"
+        );
+        text.push_str(&row);
+    }
+    text
+}

@@ -1,0 +1,83 @@
+//! `surefoot route` as its users call it.
+
+#![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
+
+mod ground;
+
+use std::path::Path;
+use std::process::{Command, Output};
+
+use tempfile::TempDir;
+
+/// A plain of 120 m with a pond from 40 to 60 m east that leaves a ford between 80 and 90 m north, and, east of 100 m,
+/// ground that nobody measured.
+fn ford() -> (TempDir, String) {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("ford.npz");
+    let height_m = |x: f64, _: f64| if x > 100.0 { f64::NAN } else { 2.0 };
+    let is_pond = |x: f64, y: f64| (40.0..60.0).contains(&x) && !(80.0..90.0).contains(&y);
+    let water = |x: f64, y: f64| f64::from(is_pond(x, y));
+    ground::write(&path, 120, &[("elevation", &height_m), ("water", &water)]);
+    let path = path.to_str().unwrap().to_owned();
+    (folder, path)
+}
+
+fn route(world: &str, out: &Path, words: &[&str]) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_surefoot"));
+    command.args(["route", "--world", world, "--out"]).arg(out).args(words).output().unwrap()
+}
+
+#[test]
+fn a_route_takes_the_ford_and_leaves_text_table_and_picture() {
+    let (folder, world) = ford();
+    let out = folder.path().join("out");
+    let found = route(&world, &out, &["--start", "20,20,0", "--goal", "80,20", "--speed", "3"]);
+    let told = String::from_utf8(found.stdout).unwrap();
+    assert!(found.status.success(), "{}", String::from_utf8_lossy(&found.stderr));
+    assert!(told.contains("expected time") && told.contains("corners"), "{told}");
+    let summary: serde_json::Value =
+        serde_json::from_slice(&std::fs::read(out.join("route.json")).unwrap()).unwrap();
+    // From (20, 20) through (40, 80) and (60, 80) to (80, 20) it is 2 hypot(20, 60) + 20 = 146.5 m at least.
+    let length_m = summary["length_m"].as_f64().unwrap();
+    assert!((146.5..175.0).contains(&length_m), "{length_m}");
+    assert!(summary["duration_s"].as_f64().unwrap() > length_m / 3.0);
+    let table = std::fs::read_to_string(out.join("route.csv")).unwrap();
+    let places = table.lines().skip(1).map(|line| {
+        let numbers: Vec<f64> = line.split(',').map(|word| word.parse().unwrap()).collect();
+        assert!(numbers.len() == 8 && numbers.iter().all(|number| number.is_finite()), "{line}");
+        [numbers[0], numbers[1]]
+    });
+    let is_in_the_pond = |[x, y]: &[f64; 2]| (40.0..60.0).contains(x) && !(80.0..90.0).contains(y);
+    assert!(!places.into_iter().any(|place| is_in_the_pond(&place)));
+    assert!(std::fs::read(out.join("route.png")).unwrap().starts_with(b"\x89PNG"));
+}
+
+#[test]
+fn what_cannot_be_is_told_in_one_line_and_leaves_nothing() {
+    let (folder, world) = ford();
+    let out = folder.path().join("out");
+    let refused = |words: &[&str], code: i32, told: &str| {
+        let found = route(&world, &out, words);
+        let error = String::from_utf8(found.stderr).unwrap();
+        assert_eq!(found.status.code(), Some(code), "{words:?}: {error}");
+        assert!(error.lines().count() == 1 && error.contains(told), "{words:?}: {error}");
+        assert!(!out.join("route.png").exists(), "{words:?} left a picture behind");
+    };
+    let start = ["--start", "20,20,0", "--goal"];
+    let with = |goal: &'static str| [start[0], start[1], start[2], goal];
+    refused(&with("500,20"), 2, "goal: expected a point of the map, found (500.0, 20.0)");
+    refused(&with("110,20"), 2, "goal at (110.0, 20.0) m: nothing is known of the ground");
+    refused(&with("50,20"), 2, "goal at (50.0, 20.0) m: an obstacle stands in the way");
+    refused(
+        &["--start", "20,20,0", "--goal", "80,20", "--cell", "0.001"],
+        2,
+        "resolution_m: expected 0.05 to 100 m",
+    );
+    refused(
+        &["--start", "20,20,0", "--goal", "80,20", "--speed", "-1"],
+        2,
+        "speed_max_mps: expected 0.1 to 100 m/s",
+    );
+    // Cells of 20 m do not show the ford.
+    refused(&["--start", "20,20,0", "--goal", "80,20", "--cell", "20"], 1, "no route: ");
+}

@@ -1,0 +1,270 @@
+//! From start to goal: search, smooth line, speeds.
+
+use crate::RouteConfig;
+use crate::config::SettingError;
+use crate::edges::{Barrier, Edges, STEPS, stepped};
+use crate::ground::{self, GroundCell, GroundError};
+use crate::line::{self, Gate, Line, heading_of};
+use crate::search::{self, CellPath, Unreachable};
+use crate::speed::{Bend, SpeedError, SpeedLimits};
+use terrain::{Cell, CellRegion, GridMap};
+
+/// Share of friction that makes ground as good as other ground to smooth a line over, and of roughness likewise.
+const AS_GOOD: f32 = 0.9;
+
+/// Searches one map for routes.
+#[derive(Clone, Debug)]
+pub struct Planner {
+    ground: GridMap<GroundCell>,
+    config: RouteConfig,
+    edges: Edges,
+}
+
+/// A way from start to goal.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Route {
+    /// The cells that it was searched over.
+    pub cells: Vec<Cell>,
+    /// Cost of the way over the cells (sum of equations 37 to 41) [metres of way].
+    pub cost_m: f64,
+    /// States that the search expanded.
+    pub n_expanded: usize,
+    /// Points of the smooth line, evenly spaced.
+    pub points: Vec<RoutePoint>,
+    /// Between two points along the line [m].
+    pub spacing_m: f64,
+    /// Expected time [s].
+    pub duration_s: f64,
+}
+
+/// A point of a route's line.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RoutePoint {
+    /// Place in the map frame [m].
+    pub at_m: [f64; 2],
+    /// Direction of the line, counter-clockwise from east [rad].
+    pub yaw_rad: f64,
+    /// Height of the ground [m].
+    pub height_m: f64,
+    /// What the speed depends on.
+    pub bend: Bend,
+    /// Speed [m/s].
+    pub speed_mps: f64,
+}
+
+/// Why there is no planner.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum PlannerError {
+    /// A setting is out of range.
+    #[error(transparent)]
+    Setting(#[from] SettingError),
+    /// A cell holds no usable numbers.
+    #[error(transparent)]
+    Ground(#[from] GroundError),
+    /// The map has more states than can be numbered.
+    #[error("map: expected at most {max} cells, found {found}")]
+    TooLarge {
+        /// Most cells.
+        max: usize,
+        /// Cells of the map.
+        found: usize,
+    },
+}
+
+/// Why there is no route.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum RouteError {
+    /// Start or goal is not a point of the map.
+    #[error("{name}: expected a point of the map, found ({:.1}, {:.1})", .found_m[0], .found_m[1])]
+    Outside {
+        /// Start or goal.
+        name: &'static str,
+        /// The point that was given [m].
+        found_m: [f64; 2],
+    },
+    /// Nobody can stand there.
+    #[error("{name} at ({:.1}, {:.1}) m: {barrier}", .at_m[0], .at_m[1])]
+    Blocked {
+        /// Start or goal.
+        name: &'static str,
+        /// The point that was given [m].
+        at_m: [f64; 2],
+        /// What is there.
+        barrier: Barrier,
+    },
+    /// No way leads from one to the other.
+    #[error(
+        "no route: {n_reached} cells can be reached from the start; the one nearest to the goal is {left_m:.1} m away \
+         at ({:.1}, {:.1}) m, and beyond it {barrier}",
+        .at_m[0], .at_m[1]
+    )]
+    Unreachable {
+        /// Cells that can be reached.
+        n_reached: usize,
+        /// The one nearest to the goal [m].
+        at_m: [f64; 2],
+        /// From there to the goal [m].
+        left_m: f64,
+        /// What ends the way there.
+        barrier: Barrier,
+    },
+    /// No smooth line was found near the cells.
+    #[error("smooth line: expected one near {n_cells} cells, found none")]
+    Smooth {
+        /// Cells of the way.
+        n_cells: usize,
+    },
+    /// No speed will do.
+    #[error(transparent)]
+    Speed(#[from] SpeedError),
+}
+
+impl Planner {
+    /// A planner for a map.
+    ///
+    /// # Errors
+    /// A setting out of range, a cell with unusable numbers, or too large a map.
+    pub fn new(ground: GridMap<GroundCell>, config: RouteConfig) -> Result<Self, PlannerError> {
+        config.validate()?;
+        ground::check(&ground)?;
+        let found = ground.geometry().n_cells();
+        if found > search::CELLS_MAX {
+            return Err(PlannerError::TooLarge { max: search::CELLS_MAX, found });
+        }
+        let edges = Edges::new(&ground, &config);
+        Ok(Self { ground, config, edges })
+    }
+
+    /// The map.
+    pub fn ground(&self) -> &GridMap<GroundCell> {
+        &self.ground
+    }
+
+    /// Changes a part of the map.
+    ///
+    /// # Errors
+    /// A cell with unusable numbers; the map then stays as it was.
+    pub fn change(
+        &mut self,
+        region: &CellRegion,
+        cell: impl Fn(Cell, GroundCell) -> GroundCell,
+    ) -> Result<(), GroundError> {
+        let before = self.ground.clone();
+        for row in region.rows.clone() {
+            for col in region.cols.clone() {
+                let at = Cell { row, col };
+                self.ground[at] = cell(at, self.ground[at]);
+            }
+        }
+        if let Err(error) = ground::check(&self.ground) {
+            self.ground = before;
+            return Err(error);
+        }
+        self.edges.update(&self.ground, &self.config, region);
+        Ok(())
+    }
+
+    /// The cheapest route from a pose to a point, and the fastest speeds along it.
+    ///
+    /// # Errors
+    /// There is none, and why.
+    pub fn route(
+        &self,
+        (start_m, yaw_rad): ([f64; 2], f64),
+        goal_m: [f64; 2],
+        limits: &SpeedLimits,
+    ) -> Result<Route, RouteError> {
+        let start = self.open_cell("start", start_m)?;
+        let goal = self.open_cell("goal", goal_m)?;
+        let path = self.search((start, heading_of(yaw_rad)), goal, goal_m)?;
+        let mut corridor = self.corridor(&path.cells);
+        line::fix_ends(&mut corridor, start_m, goal_m);
+        let resolution_m = self.ground.geometry().resolution_m;
+        let line = Line::through(&corridor, resolution_m)?;
+        let sliding_mps = self.config.sliding_mps as f32;
+        let grounded = line.samples.iter().map(|sample| line::grounded(&self.ground, sliding_mps, sample));
+        let (points, duration_s) = line.driven(grounded.collect(), limits)?;
+        Ok(Route {
+            cost_m: path.cost * resolution_m,
+            cells: path.cells,
+            n_expanded: path.n_expanded,
+            points,
+            spacing_m: line.spacing_m,
+            duration_s,
+        })
+    }
+
+    /// The cell of a point that a vehicle can stand on.
+    pub(crate) fn open_cell(&self, name: &'static str, at_m: [f64; 2]) -> Result<Cell, RouteError> {
+        let cell = self.ground.geometry().cell_at(at_m[0], at_m[1]);
+        let cell = cell.ok_or(RouteError::Outside { name, found_m: at_m })?;
+        match self.edges.barrier_at(&self.ground, &self.config, cell) {
+            Some(barrier) => Err(RouteError::Blocked { name, at_m, barrier }),
+            None => Ok(cell),
+        }
+    }
+
+    /// What ends the way where it comes nearest to the goal.
+    fn explain(&self, unreachable: &Unreachable, goal_m: [f64; 2]) -> RouteError {
+        let geometry = *self.ground.geometry();
+        let left_m = |cell: Cell| {
+            let [x_m, y_m] = geometry.centre_m(cell);
+            libm::hypot(x_m - goal_m[0], y_m - goal_m[1])
+        };
+        let reached = unreachable.is_reached.iter().enumerate().filter(|(_, is_reached)| **is_reached);
+        let cells: Vec<Cell> = reached.map(|(index, _)| geometry.cell(index)).collect();
+        let nearest = cells.iter().copied().min_by(|a, b| left_m(*a).total_cmp(&left_m(*b)));
+        let nearest = nearest.unwrap_or(Cell { row: 0, col: 0 });
+        let ahead = (0..STEPS.len()).filter(|direction| {
+            let to = stepped(&geometry, nearest, STEPS[*direction]);
+            to.is_some_and(|to| left_m(to) < left_m(nearest))
+        });
+        let barriers =
+            ahead.filter_map(|direction| self.edges.barrier(&self.ground, &self.config, nearest, direction));
+        RouteError::Unreachable {
+            n_reached: cells.len(),
+            at_m: geometry.centre_m(nearest),
+            left_m: left_m(nearest),
+            barrier: barriers.last().unwrap_or(Barrier::Edge),
+        }
+    }
+
+    /// The cheapest way over cells between two of them.
+    pub(crate) fn search(
+        &self,
+        (start, heading): (Cell, usize),
+        goal: Cell,
+        goal_m: [f64; 2],
+    ) -> Result<CellPath, RouteError> {
+        search::cheapest(&self.edges, self.config.steering_weight as f32, (start, heading), goal)
+            .map_err(|unreachable| self.explain(&unreachable, goal_m))
+    }
+
+    /// Where a line along cells may run.
+    pub(crate) fn corridor(&self, cells: &[Cell]) -> Vec<Gate> {
+        let geometry = self.ground.geometry();
+        let gate = |cell: &Cell| Gate { at_m: geometry.centre_m(*cell), freedom_m: self.freedom_m(*cell) };
+        cells.iter().map(gate).collect()
+    }
+
+    /// How far the line may go from a cell's centre along each axis: half a cell, more where the ground around is as
+    /// good [m].
+    fn freedom_m(&self, cell: Cell) -> f64 {
+        const LARGEST_CELLS: usize = 3;
+        let geometry = self.ground.geometry();
+        let friction = |cell: Cell| self.ground[cell].friction.at(self.config.sliding_mps as f32);
+        let is_as_good = |other: Cell| {
+            self.edges.is_free(other)
+                && friction(other) >= AS_GOOD * friction(cell)
+                && AS_GOOD * self.ground[other].roughness_m <= self.ground[cell].roughness_m
+        };
+        let is_free = |reach: usize| {
+            let around = CellRegion::of_cell(cell).grown(reach, geometry);
+            let is_whole = around.n_cells() == (2 * reach + 1).pow(2);
+            let mut cells = around.rows.flat_map(|row| around.cols.clone().map(move |col| Cell { row, col }));
+            is_whole && cells.all(is_as_good)
+        };
+        let reach = (1..=LARGEST_CELLS).take_while(|reach| is_free(*reach)).count();
+        (reach as f64 - 0.5).max(0.5) * geometry.resolution_m
+    }
+}

@@ -1,0 +1,71 @@
+//! Routes over maps in tiles.
+
+use route::{FrictionCurve, GroundCell, MeasuredCell, Planner, RouteConfig, SpeedLimits, TileMap, far_route};
+use terrain::{Cell, GridGeometry, GridMap};
+
+const RESOLUTION_M: f64 = 0.5;
+
+/// Rolling ground with a lake across the way, 600 x 600 m, in tiles of a folder.
+fn lakeside(folder: &std::path::Path) -> TileMap {
+    let mut map = TileMap::open(folder, RESOLUTION_M, 16 << 20).unwrap();
+    for (east, north) in (0..6).flat_map(|east| (0..6).map(move |north| (east, north))) {
+        let geometry = GridGeometry {
+            resolution_m: RESOLUTION_M,
+            origin: [200 * east, 200 * north],
+            n_rows: 200,
+            n_cols: 200,
+        };
+        let cell = |index: usize| {
+            let [x_m, y_m] = geometry.centre_m(geometry.cell(index));
+            let height_m = 4.0 * ((x_m / 60.0).sin() + (y_m / 80.0).cos());
+            let is_obstacle = ((x_m - 300.0) / 60.0).powi(2) + ((y_m - 280.0) / 140.0).powi(2) < 1.0;
+            let ground = GroundCell {
+                height_m: height_m as f32,
+                is_obstacle,
+                ..GroundCell::level(FrictionCurve::GRASS)
+            };
+            MeasuredCell { ground, deviation_m: 0.05 }
+        };
+        let values = (0..geometry.n_cells()).map(cell).collect();
+        map.merge(&GridMap::from_values(geometry, values).unwrap()).unwrap();
+    }
+    map
+}
+
+#[test]
+fn a_far_route_is_hardly_dearer_than_one_over_the_whole_map_at_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut map = lakeside(folder.path());
+    let (config, limits) = (RouteConfig::default(), SpeedLimits::default());
+    let (start, goal_m) = (([60.2, 250.2], 0.0), [540.2, 300.2]);
+    let far = far_route(&mut map, 1, &config, start, goal_m, &limits).unwrap();
+    assert!(far.n_legs >= 4, "{}", far.n_legs);
+    let geometry = GridGeometry { resolution_m: 1.0, origin: [0, 0], n_rows: 600, n_cols: 600 };
+    let whole = map.window(1, &geometry).unwrap();
+    let at_once = Planner::new(whole.clone(), config).unwrap().route(start, goal_m, &limits).unwrap();
+    assert!(far.duration_s < 1.1 * at_once.duration_s, "{} {}", far.duration_s, at_once.duration_s);
+    for (point, expected_m) in [(far.points[0], start.0), (far.points[far.points.len() - 1], goal_m)] {
+        assert!((0..2).all(|axis| (point.at_m[axis] - expected_m[axis]).abs() < 1e-9), "{point:?}");
+        assert!(point.speed_mps.abs() < 1e-9);
+    }
+    for ends in far.points.windows(2) {
+        let gap_m = (ends[1].at_m[0] - ends[0].at_m[0]).hypot(ends[1].at_m[1] - ends[0].at_m[1]);
+        assert!((gap_m - far.spacing_m).abs() < 0.02, "{gap_m}");
+        let Cell { row, col } = geometry.cell_at(ends[0].at_m[0], ends[0].at_m[1]).unwrap();
+        assert!(!whole[Cell { row, col }].is_obstacle, "{:?}", ends[0]);
+    }
+}
+
+#[test]
+fn a_goal_beyond_what_is_known_is_told_with_its_place() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut map = lakeside(folder.path());
+    let refused = |map: &mut TileMap, goal_m: [f64; 2]| {
+        let start = ([60.2, 250.2], 0.0);
+        far_route(map, 1, &RouteConfig::default(), start, goal_m, &SpeedLimits::default())
+            .unwrap_err()
+            .to_string()
+    };
+    assert_eq!(refused(&mut map, [700.0, 300.0]), "goal at (700.0, 300.0) m: nothing is known of the ground");
+    assert_eq!(refused(&mut map, [300.0, 280.0]), "goal at (300.0, 280.0) m: an obstacle stands in the way");
+}
