@@ -115,8 +115,10 @@ impl Summary {
         let climbs_m = points.windows(2).map(|ends| (ends[1].height_m - ends[0].height_m).max(0.0));
         let slope = |point: &RoutePoint| point.bend.grade.hypot(point.bend.cross_slope);
         let every = points.len().div_ceil(CORNERS).max(1);
-        let corners =
-            points.iter().step_by(every).chain(points.last().filter(|_| (points.len() - 1) % every != 0));
+        let corners = points
+            .iter()
+            .step_by(every)
+            .chain(points.last().filter(|_| !(points.len() - 1).is_multiple_of(every)));
         Self {
             revision: summary::revision(),
             world: arguments.world.file_name().unwrap_or_default().to_string_lossy().into_owned(),

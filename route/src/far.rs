@@ -67,13 +67,13 @@ pub fn far_route(
     let mut n_legs = 0;
     loop {
         let leg = Leg::ahead(&guide, at_m);
-        let (gates, end) = leg.searched(map, level, config, (at_m, heading), &mut n_expanded)?;
+        let kept = leg.searched(map, level, config, (at_m, heading), &mut n_expanded)?;
         n_legs += 1;
-        corridor.extend_from_slice(if corridor.is_empty() { &gates } else { &gates[1..] });
+        corridor.extend_from_slice(if corridor.is_empty() { &kept.gates } else { &kept.gates[1..] });
         if leg.is_last {
             break;
         }
-        (at_m, heading) = end;
+        (at_m, heading) = (kept.end_m, kept.heading);
     }
     line::fix_ends(&mut corridor, start_m, goal_m);
     let line = Line::through(&corridor, map.cell_m(level))?;
@@ -142,6 +142,15 @@ struct Leg {
     is_last: bool,
 }
 
+/// What is kept of a leg's way.
+struct Kept {
+    gates: Vec<Gate>,
+    /// Where it ends [m].
+    end_m: [f64; 2],
+    /// And in which direction of the search.
+    heading: usize,
+}
+
 impl Leg {
     fn ahead(guide: &[[f64; 2]], from_m: [f64; 2]) -> Self {
         let away_m = |point: &[f64; 2]| libm::hypot(point[0] - from_m[0], point[1] - from_m[1]);
@@ -160,7 +169,7 @@ impl Leg {
         Self { guide: guide[nearest..=end].to_vec(), is_last: end == guide.len() - 1 }
     }
 
-    /// The gates of its way over fine cells, as far as they are kept, and the point and heading where that ends.
+    /// Its way over fine cells, as far as it is kept.
     fn searched(
         &self,
         map: &mut TileMap,
@@ -168,7 +177,7 @@ impl Leg {
         config: &RouteConfig,
         (from_m, heading): ([f64; 2], usize),
         n_expanded: &mut usize,
-    ) -> Result<(Vec<Gate>, ([f64; 2], usize)), FarRouteError> {
+    ) -> Result<Kept, FarRouteError> {
         let mut found = None;
         for widening in WIDENINGS {
             let mut points_m = self.guide.clone();
@@ -208,7 +217,7 @@ impl Leg {
         Err(error.unwrap_or(RouteError::Smooth { n_cells: 0 }))
     }
 
-    fn kept(&self, planner: &Planner, cells: &[Cell]) -> (Vec<Gate>, ([f64; 2], usize)) {
+    fn kept(&self, planner: &Planner, cells: &[Cell]) -> Kept {
         let geometry = *planner.ground().geometry();
         let n_kept = (LEG_M.1 / geometry.resolution_m) as usize;
         let n = if self.is_last { cells.len() } else { n_kept.clamp(2, cells.len()) };
@@ -221,6 +230,6 @@ impl Leg {
             _ => 0,
         };
         let end_m = geometry.centre_m(kept[n - 1]);
-        (planner.corridor(kept), (end_m, heading))
+        Kept { gates: planner.corridor(kept), end_m, heading }
     }
 }

@@ -219,13 +219,13 @@ impl Planner {
             let to = stepped(&geometry, nearest, STEPS[*direction]);
             to.is_some_and(|to| left_m(to) < left_m(nearest))
         });
-        let barriers =
+        let mut barriers =
             ahead.filter_map(|direction| self.edges.barrier(&self.ground, &self.config, nearest, direction));
         RouteError::Unreachable {
             n_reached: cells.len(),
             at_m: geometry.centre_m(nearest),
             left_m: left_m(nearest),
-            barrier: barriers.last().unwrap_or(Barrier::Edge),
+            barrier: barriers.next_back().unwrap_or(Barrier::Edge),
         }
     }
 

@@ -138,8 +138,8 @@ pub fn fastest_speeds(bends: &[Bend], spacing_m: f64, limits: &SpeedLimits) -> R
         is_inner.then(|| (variable(point), factor))
     };
     let mut programme = Programme::new(2 * (n - 2) + n - 1);
-    for point in 1..n - 1 {
-        let fastest_mps = limits.fastest_mps(bends[point].roughness_m);
+    for (point, bend) in bends.iter().enumerate().take(n - 1).skip(1) {
+        let fastest_mps = limits.fastest_mps(bend.roughness_m);
         programme.not_negative(&[
             Affine::new(fastest_mps.powi(2), &[(square(point), -1.0)]),
             Affine::new(0.0, &[(speed(point), 1.0)]),
@@ -151,14 +151,13 @@ pub fn fastest_speeds(bends: &[Bend], spacing_m: f64, limits: &SpeedLimits) -> R
             Affine::new(0.0, &[(speed(point), 2.0)]),
         ]);
     }
-    for segment in 0..n - 1 {
-        let (friction_mps2, grade_mps2, cross_mps2) = bends[segment].forces_mps2(limits);
+    for (segment, bend) in bends.iter().enumerate().take(n - 1) {
+        let (friction_mps2, grade_mps2, cross_mps2) = bend.forces_mps2(limits);
         let per_length = 0.5 / spacing_m;
         let mut terms: Vec<_> = of_point(&square, segment + 1, per_length).into_iter().collect();
         terms.extend(of_point(&square, segment, -per_length));
         let along = Affine::new(grade_mps2, &terms);
-        let turning: Vec<_> =
-            of_point(&square, segment, bends[segment].curvature_per_m).into_iter().collect();
+        let turning: Vec<_> = of_point(&square, segment, bend.curvature_per_m).into_iter().collect();
         programme.no_shorter(&[
             Affine::new(friction_mps2, &[]),
             along.clone(),

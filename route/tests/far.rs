@@ -1,5 +1,7 @@
 //! Routes over maps in tiles.
 
+#![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
+
 use route::{FrictionCurve, GroundCell, MeasuredCell, Planner, RouteConfig, SpeedLimits, TileMap, far_route};
 use terrain::{Cell, GridGeometry, GridMap};
 

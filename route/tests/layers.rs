@@ -1,5 +1,7 @@
 //! Maps for a route from measured elevation.
 
+#![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
+
 use route::{FrictionCurve, GroundLayers};
 use terrain::{Cell, GridGeometry, GridMap};
 

@@ -1,5 +1,7 @@
 //! Routes against an independent search and closed forms.
 
+#![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
+
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use route::{Barrier, FrictionCurve, GroundCell, Planner, RouteConfig, RouteError, SpeedLimits};

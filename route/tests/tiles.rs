@@ -1,5 +1,7 @@
 //! Maps in tiles: what comes back, what levels hold, and what a kill, a fault and a contradiction leave.
 
+#![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
+
 use route::{FrictionCurve, GroundCell, MeasuredCell, TILE_EDGE, TileMap};
 use std::io::{BufRead as _, BufReader};
 use std::path::Path;

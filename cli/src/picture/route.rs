@@ -152,11 +152,13 @@ fn draw_legend(picture: &RoutePicture<'_>, top: f64, canvas: &mut Canvas) {
     }
 }
 
+/// A strip's label and what it shows of a point.
+type Strip = (&'static str, fn(&RoutePoint) -> f64);
+
 /// Speed and height over the way.
 fn draw_strips(route: &Route, top: f64, canvas: &mut Canvas) {
     let length_m = route.spacing_m * (route.points.len() - 1) as f64;
-    let rows: [(&str, fn(&RoutePoint) -> f64); 2] =
-        [("speed [m/s]", |point| point.speed_mps), ("height [m]", |point| point.height_m)];
+    let rows: [Strip; 2] = [("speed [m/s]", |point| point.speed_mps), ("height [m]", |point| point.height_m)];
     for (row, (label, value)) in rows.into_iter().enumerate() {
         let values = route.points.iter().map(value).filter(|value| value.is_finite());
         let (low, high) =
