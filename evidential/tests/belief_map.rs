@@ -97,6 +97,15 @@ fn is_close(found: Risk, expected: Risk) -> bool {
     parts(found).iter().zip(parts(expected)).all(|(f, e)| (f - e).abs() < 1e-3)
 }
 
+/// A risk with as many half turns on top of it as another has.
+fn as_blocked_as(other: Risk, free: Risk) -> Risk {
+    match (other.roll_rad / Risk::BLOCKED_RAD) as u8 {
+        0 => free,
+        1 => free.blocked(),
+        _ => free.touching(),
+    }
+}
+
 /// Also for risk cells that are coarser and finer than those of the surface.
 #[test]
 fn every_pose_has_the_risk_of_its_posterior() {
@@ -119,7 +128,7 @@ fn every_pose_has_the_risk_of_its_posterior() {
             let by_prior = prior.risk_map().view().risk(cell, yaw);
             let is_known = is_wholly_known(&checkpoint, &surface, [x_m, y_m, yaw_rad]);
             let expected = expected_risk(&checkpoint, &pmfs, &prediction, is_known);
-            let expected = if by_prior.is_blocked() { expected.blocked() } else { expected };
+            let expected = as_blocked_as(by_prior, expected);
             let found = view.risk(cell, yaw);
             // Mostly unknown ground is the prior's alone.
             let is_right = is_close(found, expected) || is_close(found, by_prior);
@@ -165,7 +174,7 @@ fn the_belief_of_a_pose_is_what_its_risk_is_made_of() {
             let [linear, angular, roll, pitch] = &belief.posterior;
             let expected = PmfQuad::new(linear, angular, roll, pitch).risk(level());
             let found = view.risk(cell, yaw);
-            let expected = if found.is_blocked() { expected.blocked() } else { expected };
+            let expected = as_blocked_as(found, expected);
             assert!(is_close(found, expected), "{method:?} {cell:?} {yaw}: {found:?} {expected:?}");
             match belief.prediction {
                 Some(_) => n_learned += usize::from(belief.learned_share.iter().all(|share| *share > 0.0)),

@@ -1,4 +1,6 @@
-//! A route around a frozen pond: `cargo run -p route --example around_ice`.
+//! A route around a frozen pond.
+//!
+//! `cargo run -p route --example around_ice`
 
 use route::{FrictionCurve, GroundCell, Planner, RouteConfig, SpeedLimits};
 use terrain::{GridGeometry, GridMap};

@@ -15,6 +15,8 @@
 //! measured; [`far_route`] searches it.
 //! [`GroundLayers`] makes the map of measured elevation.
 //!
+//! `examples/around_ice.rs` goes around a frozen pond.
+//!
 //! Frames: map, x east, y north, z up. SI units.
 //!
 //! ```

@@ -237,9 +237,9 @@ fn the_instruction_set_of_the_configuration_makes_the_map() {
 /// system is. A change of the computation changes these numbers on purpose; another compiler, processor or platform
 /// must not.
 const EVERYWHERE: [(Isa, [u64; 3]); 3] = [
-    (Isa::Avx512, [0xaa65_bf16_4750_d5a3, 0x96d4_2f70_548b_f712, 0x7db1_9694_7a8a_5104]),
-    (Isa::Avx2, [0xaa65_bf16_4750_d5a3, 0x96d4_2f70_548b_f712, 0xe893_7e86_dcbe_7622]),
-    (Isa::Portable, [0xaa65_bf16_4750_d5a3, 0x693b_4eb1_a20b_8895, 0xdfed_6440_bf2e_b374]),
+    (Isa::Avx512, [0xaa65_bf16_4750_d5a3, 0x96d4_2f70_548b_f712, 0x7370_dc1e_a996_3fe9]),
+    (Isa::Avx2, [0xaa65_bf16_4750_d5a3, 0x96d4_2f70_548b_f712, 0x08f3_cb5b_3622_31a2]),
+    (Isa::Portable, [0xaa65_bf16_4750_d5a3, 0x693b_4eb1_a20b_8895, 0x23dc_80ff_8f55_0cb8]),
 ];
 
 #[test]
