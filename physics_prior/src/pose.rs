@@ -29,7 +29,7 @@ pub(crate) struct WheelGround<L: Lanes> {
 pub(crate) struct PoseGround<L: Lanes> {
     /// Front left, rear left, rear right, front right.
     pub wheels: [WheelGround<L>; 4],
-    /// Number of obstacle cells that the footprint touches.
+    /// As [`crate::BlockPrior::obstruction`].
     pub obstruction: Real<L>,
     /// Share of vegetation in the known part of the footprint.
     pub vegetation_share: Real<L>,

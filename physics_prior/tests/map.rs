@@ -112,7 +112,7 @@ fn obstacles_block_every_pose_whose_footprint_touches_them() {
             for yaw in 0..16 {
                 // A pose stands for every heading of its bin, 11.25 degrees to either side. It is laid down every 1.4
                 // degrees; between two of these a corner at (2.9, 0.9) m stands out by 0.9 m times half of that: 11 mm
-                // at most, and less than 6 mm where the nearer of them counts.
+                // at most; 6 mm of it are asked for here, so that a coarser sweep is found out.
                 let headings = (-40..=40).map(|step| view.yaw_rad(yaw) + PI / 16.0 * f64::from(step) / 40.0);
                 let at_the_middle_m = outside_m(view.yaw_rad(yaw));
                 let outside_m = headings.map(&outside_m).fold(f64::INFINITY, f64::min);

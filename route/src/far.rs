@@ -61,6 +61,9 @@ pub fn far_route(
     goal_m: [f64; 2],
     limits: &SpeedLimits,
 ) -> Result<FarRoute, FarRouteError> {
+    if !yaw_rad.is_finite() {
+        return Err(RouteError::Yaw { found_rad: yaw_rad }.into());
+    }
     let mut n_expanded = 0;
     let guide = guide(map, level, config, (start_m, yaw_rad), goal_m, &mut n_expanded)?;
     let (mut corridor, mut at_m, mut heading) = (Vec::new(), start_m, heading_of(yaw_rad));
@@ -72,6 +75,9 @@ pub fn far_route(
         corridor.extend_from_slice(if corridor.is_empty() { &kept.gates } else { &kept.gates[1..] });
         if leg.is_last {
             break;
+        }
+        if kept.gates.len() < 2 {
+            return Err(RouteError::Smooth { n_cells: corridor.len() }.into());
         }
         (at_m, heading) = (kept.end_m, kept.heading);
     }
@@ -103,7 +109,8 @@ fn guide(
         let edge = |axis: usize| ((goal_m[axis] - start_m[axis]).abs() + 2.0 * margin_m) / map.cell_m(level);
         edge(0) * edge(1)
     };
-    let coarse = (level..LEVEL_MAX).find(|level| n_cells(*level) <= COARSE_CELLS_MAX).unwrap_or(LEVEL_MAX);
+    let coarse = (level..=LEVEL_MAX).find(|level| n_cells(*level) <= COARSE_CELLS_MAX);
+    let coarse = coarse.ok_or(RouteError::Outside { name: "goal", found_m: goal_m })?;
     let ground = read(map, coarse, &[start_m, goal_m], margin_m)?;
     // Ground of larger cells is rougher by the shape that small ones follow.
     let growth = map.cell_m(coarse) / map.cell_m(level);
@@ -220,7 +227,7 @@ impl Leg {
     fn kept(&self, planner: &Planner, cells: &[Cell]) -> Kept {
         let geometry = *planner.ground().geometry();
         let n_kept = (LEG_M.1 / geometry.resolution_m) as usize;
-        let n = if self.is_last { cells.len() } else { n_kept.clamp(2, cells.len()) };
+        let n = if self.is_last { cells.len() } else { n_kept.max(2).min(cells.len()) };
         let kept = &cells[..n];
         let heading = match kept {
             [.., before, last] => {

@@ -1,7 +1,7 @@
 //! The map that a route is searched on.
 
 use crate::FrictionCurve;
-use terrain::{Cell, GridMap};
+use terrain::{Cell, GridGeometry, GridMap};
 
 /// What is known of one cell (AnyNav, section 4.1).
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -49,12 +49,16 @@ pub struct GroundError {
 /// Whether every known cell holds numbers that a ground can have.
 pub(crate) fn check(ground: &GridMap<GroundCell>) -> Result<(), GroundError> {
     let geometry = ground.geometry();
-    let is_bad = |cell: &GroundCell| cell.is_known() && fault(cell).is_some();
-    let Some(index) = ground.values().iter().position(is_bad) else { return Ok(()) };
-    let Cell { row, col } = geometry.cell(index);
-    let at_m = geometry.centre_m(Cell { row, col });
-    let (expected, found) = fault(&ground.values()[index]).unwrap_or(("numbers", f32::NAN));
-    Err(GroundError { at_m, expected, found })
+    let mut cells = ground.values().iter().enumerate();
+    cells.try_for_each(|(index, cell)| check_cell(geometry, geometry.cell(index), cell))
+}
+
+/// The same for one cell.
+pub(crate) fn check_cell(geometry: &GridGeometry, at: Cell, cell: &GroundCell) -> Result<(), GroundError> {
+    match fault(cell).filter(|_| cell.is_known()) {
+        Some((expected, found)) => Err(GroundError { at_m: geometry.centre_m(at), expected, found }),
+        None => Ok(()),
+    }
 }
 
 fn fault(cell: &GroundCell) -> Option<(&'static str, f32)> {

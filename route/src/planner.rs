@@ -74,13 +74,19 @@ pub enum PlannerError {
 /// Why there is no route.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum RouteError {
-    /// Start or goal is not a point of the map.
+    /// Start or goal is not a point of the map, or lies farther away than can be searched.
     #[error("{name}: expected a point of the map, found ({:.1}, {:.1})", .found_m[0], .found_m[1])]
     Outside {
         /// Start or goal.
         name: &'static str,
         /// The point that was given [m].
         found_m: [f64; 2],
+    },
+    /// The heading at the start is no angle.
+    #[error("yaw at the start: expected a finite angle, found {found_rad} rad")]
+    Yaw {
+        /// The angle that was given [rad].
+        found_rad: f64,
     },
     /// Nobody can stand there.
     #[error("{name} at ({:.1}, {:.1}) m: {barrier}", .at_m[0], .at_m[1])]
@@ -149,16 +155,12 @@ impl Planner {
         region: &CellRegion,
         cell: impl Fn(Cell, GroundCell) -> GroundCell,
     ) -> Result<(), GroundError> {
-        let before = self.ground.clone();
-        for row in region.rows.clone() {
-            for col in region.cols.clone() {
-                let at = Cell { row, col };
-                self.ground[at] = cell(at, self.ground[at]);
-            }
-        }
-        if let Err(error) = ground::check(&self.ground) {
-            self.ground = before;
-            return Err(error);
+        let cells = region.rows.clone().flat_map(|row| region.cols.clone().map(move |col| Cell { row, col }));
+        let changed: Vec<(Cell, GroundCell)> = cells.map(|at| (at, cell(at, self.ground[at]))).collect();
+        let geometry = *self.ground.geometry();
+        changed.iter().try_for_each(|(at, cell)| ground::check_cell(&geometry, *at, cell))?;
+        for (at, cell) in changed {
+            self.ground[at] = cell;
         }
         self.edges.update(&self.ground, &self.config, region);
         Ok(())
@@ -174,6 +176,9 @@ impl Planner {
         goal_m: [f64; 2],
         limits: &SpeedLimits,
     ) -> Result<Route, RouteError> {
+        if !yaw_rad.is_finite() {
+            return Err(RouteError::Yaw { found_rad: yaw_rad });
+        }
         let start = self.open_cell("start", start_m)?;
         let goal = self.open_cell("goal", goal_m)?;
         let path = self.search((start, heading_of(yaw_rad)), goal, goal_m)?;

@@ -94,10 +94,10 @@ pub(crate) fn cheapest(
     let mut reached = Reached { cost: vec![0.0; n_states], before: vec![0; n_states] };
     let first = state(geometry.index(start), heading, Motion::Straight);
     reached.cost[first] = f32::MIN_POSITIVE;
-    open.put(first as u32, rest.from(start));
+    open.put(first as u32, f32::MIN_POSITIVE, rest.from(start));
     let mut best: Option<(f32, usize)> = None;
     let mut n_expanded = 0;
-    while let Some((from, bound)) = open.take() {
+    while let Some((from, entered, bound)) = open.take() {
         if best.is_some_and(|(cost, _)| cost <= bound) {
             break;
         }
@@ -105,8 +105,8 @@ pub(crate) fn cheapest(
         let (index, heading, before) = parts(from);
         let cell = geometry.cell(index);
         let cost = reached.cost[from];
-        // It was found again at a lower cost and has been expanded since.
-        if cost + rest.from(cell) < bound {
+        // It was found again at a lower cost, which has an entry of its own.
+        if cost < entered {
             continue;
         }
         if cell == goal {
@@ -129,7 +129,7 @@ pub(crate) fn cheapest(
             if reached.cost[to] == 0.0 || cost < reached.cost[to] {
                 reached.cost[to] = cost;
                 reached.before[to] = before as u8;
-                open.put(to as u32, cost + rest.from(to_cell));
+                open.put(to as u32, cost, cost + rest.from(to_cell));
             }
         }
     }

@@ -69,5 +69,11 @@ fn a_goal_beyond_what_is_known_is_told_with_its_place() {
             .to_string()
     };
     assert_eq!(refused(&mut map, [700.0, 300.0]), "goal at (700.0, 300.0) m: nothing is known of the ground");
+    for far_m in [1e12, f64::INFINITY, f64::NAN] {
+        assert!(
+            refused(&mut map, [far_m, 300.0]).starts_with("goal: expected a point of the map, found ("),
+            "{far_m}"
+        );
+    }
     assert_eq!(refused(&mut map, [300.0, 280.0]), "goal at (300.0, 280.0) m: an obstacle stands in the way");
 }
