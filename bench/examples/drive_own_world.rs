@@ -36,6 +36,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         episode: EpisodeConfig::for_vehicle(&vehicle),
         method: Method::Physics,
         networks: None,
+        corrector: None,
         map_source: MapSource::Sensed,
         level: CvarLevel::new(0.5)?,
         seed: 1,

@@ -98,6 +98,8 @@ pub struct Drive<'a> {
     pub method: Method,
     /// Networks in place of those that come with the program, for a method that has any.
     pub networks: Option<Arc<Checkpoint>>,
+    /// What corrects commands for the ground under the wheels, if anything does.
+    pub corrector: Option<Arc<kinodynamics::Checkpoint>>,
     /// Where its map comes from.
     pub map_source: MapSource,
     /// Share of the worst outcomes to plan for.
@@ -153,7 +155,7 @@ impl ClosedLoop {
     /// Puts the vehicle at the start with a planner that has seen nothing.
     pub fn new(drive: Drive<'_>) -> Result<Self, DriveError> {
         let belief = belief(&drive)?;
-        let Drive { task, vehicle, model, config, episode, map_source, level, seed, .. } = drive;
+        let Drive { task, vehicle, model, config, episode, corrector, map_source, level, seed, .. } = drive;
         let surface = match map_source {
             MapSource::Sensed => Surface::Sensed,
             MapSource::Oracle => Surface::Given(true_surface(&task.world, config.elevation.resolution_m)),
@@ -170,6 +172,10 @@ impl ClosedLoop {
             goal_m,
             tolerance_m,
         })?;
+        let navigator = match &corrector {
+            Some(checkpoint) => navigator.with_corrector(checkpoint)?,
+            None => navigator,
+        };
         Ok(Self { episode: Episode::new(task, vehicle, episode, seed)?, navigator })
     }
 
@@ -184,6 +190,7 @@ impl ClosedLoop {
     /// Observes, decides and drives on for one control cycle. The episode ends at the last goal of the mission.
     pub fn cycle(&mut self) -> Result<Cycle, DriveError> {
         let observation = self.episode.observe();
+        self.navigator.hear_imu(&observation.imu);
         let began = Instant::now();
         let is_renewed = self.navigator.observe(
             observation.valid_at_ns,

@@ -198,8 +198,8 @@ pub enum CollectionError {
         source: EpisodeError,
     },
     /// The mapping refused its settings.
-    #[error(transparent)]
-    Elevation(#[from] terrain::ElevationConfigError),
+    #[error("elevation map: {0}")]
+    Elevation(#[from] terrain::SettingError),
     /// The mapping refused a pose.
     #[error(transparent)]
     Fuse(#[from] terrain::FuseError),

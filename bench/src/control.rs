@@ -32,7 +32,7 @@ const SEED: u64 = 7;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Work {
-    /// Time to goal with latch, attitude limits, white noise on the controls, no effects: [`Config::bound`].
+    /// Time to goal with latch, attitude limits, white noise on the controls, no effects: [`Config::minimal`].
     Bound,
     /// The same with two effects in the model: lagging steering and understeer.
     Effects,
@@ -163,7 +163,7 @@ impl Laps {
 
 fn config(request: &Request) -> Config {
     let config = match request.work {
-        Work::Bound | Work::Effects => Config::bound(),
+        Work::Bound | Work::Effects => Config::minimal(),
         Work::Drive => Config::default(),
     };
     Config { n_threads: request.n_threads, isa: request.isa, ..config }

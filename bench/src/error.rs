@@ -22,8 +22,8 @@ pub enum BenchError {
     #[error(transparent)]
     Belief(#[from] evidential::BeliefMapError),
     /// The elevation map cannot be made.
-    #[error(transparent)]
-    Elevation(#[from] terrain::ElevationConfigError),
+    #[error("elevation map: {0}")]
+    Elevation(#[from] terrain::SettingError),
     /// The elevation map refused a pose.
     #[error(transparent)]
     Fuse(#[from] terrain::FuseError),

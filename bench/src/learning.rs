@@ -28,7 +28,7 @@ pub use tally::Domain;
 pub use testbed::{Request, Stage, Testbed, TestbedReport};
 pub use verdict::Verdict;
 
-use evidential::{DatasetError, PredictorError, SettingsError, TrainError};
+use evidential::{DatasetError, PredictorError, SettingError, TrainError};
 
 use crate::collection::CollectionError;
 
@@ -65,7 +65,7 @@ pub enum LearningError {
         /// Name of the method.
         method: &'static str,
         /// Which setting.
-        source: SettingsError,
+        source: SettingError,
     },
     /// A training failed.
     #[error("{training}: {source}")]

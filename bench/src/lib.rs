@@ -9,6 +9,7 @@
 pub mod closed_loop;
 pub mod collection;
 pub mod control;
+pub mod crossings;
 mod error;
 pub mod gap_closed_loop;
 pub mod gap_score;

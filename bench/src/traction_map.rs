@@ -113,7 +113,7 @@ pub struct Judgement {
 pub enum JudgeError {
     /// The ground cannot be found.
     #[error(transparent)]
-    Ground(#[from] terrain::GroundFilterError),
+    Ground(#[from] terrain::SettingError),
 }
 
 /// Judges a traction map. Intervals are of 95 %, from a bootstrap over spatial blocks drawn with `seed`.

@@ -32,7 +32,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut memory = vec![0.0; stepper.n_slots()];
     let command = Command { speed_mps: 2.0, steering_rad: 0.3 };
     let mut state = State { speed_mps: 2.0, ..State::default() };
-    stepper.settle(Command { steering_rad: 0.0, ..command }, &mut memory);
+    stepper.fill_steady_state(Command { steering_rad: 0.0, ..command }, &mut memory);
     let mut steering_after_lag_rad = 0.0;
     let mut farthest_m = 0.0_f64;
     let mut began_circle = State::default();

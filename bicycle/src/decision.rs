@@ -1,5 +1,7 @@
 //! What a controller returns each cycle: a command or a reason not to give one.
 
+use std::fmt;
+
 use crate::{Command, MotionCommand};
 
 /// The outcome of one control cycle. Degraded operation is a value, never a stale command.
@@ -68,4 +70,26 @@ pub enum StopReason {
     InputFromFuture,
     /// Somebody has told it to, and nobody has reset that yet.
     EmergencyStop,
+    /// Whatever is planned meets a moving obstacle where it is expected to be.
+    MovingObstacle,
+}
+
+impl fmt::Display for StopReason {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str(match self {
+            Self::StaleOdometry => "stale odometry",
+            Self::StaleScan => "stale scan",
+            Self::NonFiniteInput => "non finite input",
+            Self::NoFeasibleRollout => "no feasible rollout",
+            Self::NonFiniteResult => "non finite result",
+            Self::OutsideMap => "outside map",
+            Self::StaleCommand => "stale command",
+            Self::StaleMission => "stale mission",
+            Self::InputOutOfRange => "input out of range",
+            Self::InputOutOfOrder => "input out of order",
+            Self::InputFromFuture => "input from future",
+            Self::EmergencyStop => "emergency stop",
+            Self::MovingObstacle => "moving obstacle",
+        })
+    }
 }

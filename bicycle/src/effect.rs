@@ -114,8 +114,8 @@ macro_rules! catalogue {
                 match self { $(Self::$name(effect) => effect.held_follows_per_s(),)* }
             }
 
-            fn settled(&self, command: [f64; 2]) -> f64 {
-                match self { $(Self::$name(effect) => effect.settled(command),)* }
+            fn steady_state(&self, command: [f64; 2]) -> f64 {
+                match self { $(Self::$name(effect) => effect.steady_state(command),)* }
             }
 
             fn on_sensors(&self, sensors: &mut SensorModel) {

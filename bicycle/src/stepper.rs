@@ -170,9 +170,9 @@ impl Stepper {
     }
 
     /// Fills the memory as a command leaves it that was in force for long.
-    pub fn settle(&self, command: Command, memory: &mut [f64]) {
+    pub fn fill_steady_state(&self, command: Command, memory: &mut [f64]) {
         let command = [f64::from(command.speed_mps), f64::from(command.steering_rad)];
-        self.effects.settle(command, memory);
+        self.effects.fill_steady_state(command, memory);
     }
 
     /// One step of a model without effects whose actuators follow at once.

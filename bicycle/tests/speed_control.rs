@@ -29,7 +29,7 @@ fn stepper(effects: &[(&str, f64)]) -> Stepper {
 fn speeds(stepper: &Stepper, speed_mps: f64, n: usize) -> (Vec<f64>, Vec<f64>) {
     let command = Command { speed_mps: SPEED_MPS as f32, steering_rad: 0.0 };
     let mut memory = vec![0.0; stepper.n_slots()];
-    stepper.settle(Command { speed_mps: speed_mps as f32, ..command }, &mut memory);
+    stepper.fill_steady_state(Command { speed_mps: speed_mps as f32, ..command }, &mut memory);
     let mut state = State { speed_mps, ..State::default() };
     let mut step = |t| {
         state = stepper.step_state(&state, command, &GroundSample::FIRM, &mut memory, t);
@@ -45,7 +45,7 @@ fn speed_uphill_mps(effects: &[(&str, f64)], slope: f64) -> f64 {
     let command = Command { speed_mps: SPEED_MPS as f32, steering_rad: 0.0 };
     let ground = GroundSample { gradient: [slope, 0.0], ..GroundSample::FIRM };
     let mut memory = vec![0.0; stepper.n_slots()];
-    stepper.settle(command, &mut memory);
+    stepper.fill_steady_state(command, &mut memory);
     let mut state = State { speed_mps: SPEED_MPS, ..State::default() };
     (0..1000).for_each(|t| state = stepper.step_state(&state, command, &ground, &mut memory, t));
     state.speed_mps

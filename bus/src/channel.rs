@@ -11,7 +11,8 @@ use iceoryx2::prelude::ZeroCopySend;
 
 use crate::message::{
     CheckpointHeader, CommandRecord, DecisionRecord, ImuRecord, MissionRecord, OdometryRecord, OrderHeader,
-    PointRecord, RiskHeader, ScanHeader, Stamp, StatusRecord, StuckRecord, SurfaceHeader,
+    PointRecord, RiskHeader, ScanHeader, Stamp, StatusRecord, StuckRecord, SurfaceHeader, TrackRecord,
+    TracksHeader,
 };
 use crate::payload;
 pub use bus::{Bus, Cleared, RunName, RunNameError};
@@ -48,7 +49,7 @@ macro_rules! header {
         }
     )* };
 }
-header!(ScanHeader, SurfaceHeader, RiskHeader, CheckpointHeader, OrderHeader);
+header!(ScanHeader, SurfaceHeader, TracksHeader, RiskHeader, CheckpointHeader, OrderHeader);
 
 /// An element of a payload.
 pub trait Element: ZeroCopySend + bytemuck::Pod + Default + Debug + 'static {}
@@ -77,13 +78,16 @@ pub const ODOMETRY: Channel<Stamp, OdometryRecord> =
 /// What the inertial measurement unit feels, as many samples as have come since the last message: whoever runs the
 /// vehicle.
 pub const IMU: Channel<Stamp, ImuRecord> =
-    Channel { name: "imu", depth: 32, history: 0, n_readers: 2, check: payload::check_imu };
+    Channel { name: "imu", depth: 32, history: 0, n_readers: 3, check: payload::check_imu };
 /// What the range sensor sees: whoever runs the vehicle.
 pub const SCAN: Channel<ScanHeader, PointRecord> =
     Channel { name: "scan", depth: 2, history: 0, n_readers: 2, check: payload::check_scan };
 /// The map of the ground: mapping.
 pub const SURFACE: Channel<SurfaceHeader, [f32; 8]> =
     Channel { name: "surface", depth: 2, history: 0, n_readers: 3, check: payload::check_surface };
+/// What moves: mapping, after every scan, where the settings say how it is dealt with.
+pub const TRACKS: Channel<TracksHeader, TrackRecord> =
+    Channel { name: "tracks", depth: 4, history: 0, n_readers: 2, check: payload::check_tracks };
 /// The risk map of what was learned: learning.
 pub const RISK: Channel<RiskHeader, [f32; 4]> =
     Channel { name: "risk", depth: 1, history: 0, n_readers: 4, check: payload::check_risk };

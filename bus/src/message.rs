@@ -9,7 +9,10 @@ use crate::layout::{RecordLayout, record};
 pub use convert::{HOLD_REASONS, STOP_REASONS, drive_row};
 
 /// Version of everything in this file; messages of another are refused.
-pub const LAYOUT_VERSION: u32 = 6;
+pub const LAYOUT_VERSION: u32 = 7;
+
+/// Moving obstacles that are told of at the most.
+pub const TRACKS_MAX: usize = 16;
 
 record! {
     /// First field of every header: whose message it is, and of when.
@@ -150,6 +153,38 @@ record! {
 }
 
 record! {
+    /// Header of what moves; the payload is one TrackRecord for each thing, the nearest first, at most TRACKS_MAX.
+    TracksHeader = "surefoot.TracksHeader" {
+        /// Whose and of when: valid_at_ns is that of the scan.
+        stamp: Stamp,
+        /// The scan that shows where they are.
+        scan: Source,
+        /// When the odometry was measured in whose frame they lie [ns].
+        frame_at_ns: u64,
+    }
+}
+
+record! {
+    /// A thing that moves.
+    TrackRecord = "surefoot.Track" {
+        /// Counts the things that mapping has seen, from 1.
+        number: u64,
+        /// Centre in the map frame, east and north [m].
+        position_m: [f64; 2],
+        /// Velocity, east and north [m/s].
+        velocity_mps: [f64; 2],
+        /// Variance of the position along each axis [m2].
+        position_m2: f64,
+        /// Covariance of position and velocity along each axis [m2/s].
+        cross_m2ps: f64,
+        /// Variance of the velocity along each axis [m2/s2].
+        velocity_m2ps2: f64,
+        /// Radius of the thing [m].
+        radius_m: f64,
+    }
+}
+
+record! {
     /// Header of a risk map; the payload is risks, grounds and times to the goal, see docs/runtime.md.
     RiskHeader = "surefoot.RiskHeader" {
         /// Whose and of when: valid_at_ns is that of the scan.
@@ -218,6 +253,8 @@ record! {
         learned: Source,
         /// The newest map of physics alone that there was to choose from.
         physics: Source,
+        /// What was known last of what moves; none where nothing is tracked.
+        tracks: Source,
         /// Where to go [m].
         goal_m: [f64; 2],
         /// How near counts as there [m].
@@ -228,6 +265,18 @@ record! {
         elapsed_s: f64,
         /// State that it was made for: x, y [m], yaw [rad], speed [m/s], steering [rad].
         state: [f64; 5],
+        /// The message of the IMU that was taken in last; none where nobody corrects commands.
+        imu: Source,
+        /// How many were taken in since the decision before, without a gap up to the last.
+        n_imu: u64,
+        /// How the command was corrected: 0 = by nobody, else what became of it; see docs/runtime.md.
+        correction: u32,
+        /// Share that the correction had, 0 to 1.
+        correction_share: f32,
+        /// Curvature that it added [1/m].
+        curvature_change_per_m: f32,
+        /// Angle of the front wheels before it [rad].
+        planned_steering_rad: f32,
         /// Time that the decision took [ns].
         duration_ns: u64,
         /// By how much the cycle began after its deadline [ns].
@@ -354,6 +403,8 @@ pub fn layouts() -> Vec<RecordLayout> {
         ScanHeader::layout(),
         PointRecord::layout(),
         SurfaceHeader::layout(),
+        TracksHeader::layout(),
+        TrackRecord::layout(),
         RiskHeader::layout(),
         CommandRecord::layout(),
         DecisionRecord::layout(),

@@ -9,7 +9,7 @@ use xxhash_rust::xxh3::xxh3_64;
 use crate::message::{RiskHeader, SurfaceHeader};
 pub(crate) use check::{
     check_anything, check_checkpoint, check_command, check_imu, check_mission, check_odometry, check_order,
-    check_risk, check_scan, check_stuck, check_surface,
+    check_risk, check_scan, check_stuck, check_surface, check_tracks,
 };
 
 /// Yaw bins beyond which nobody believes a map.
@@ -155,7 +155,7 @@ mod tests {
     use crate::channel::{FUTURE_NS, Refusal};
     use crate::message::{
         CheckpointHeader, CommandRecord, Grid, ImuRecord, MissionRecord, OrderHeader, PointRecord,
-        ScanHeader, Stamp, StuckRecord,
+        ScanHeader, Stamp, StuckRecord, TRACKS_MAX, TrackRecord, TracksHeader,
     };
     use traversability::{GroundFlags, RiskMap};
 
@@ -194,6 +194,29 @@ mod tests {
         assert_eq!(check_imu(&stamp, &[at(1_000_000_000 + FUTURE_NS + 1)]), Err(Refusal::FromFuture));
         let broken = ImuRecord { angular_rate_radps: [0.0, f32::NAN, 0.0], ..at(10) };
         assert_eq!(check_imu(&stamp, &[at(5), broken]), Err(Refusal::NonFinite));
+    }
+
+    #[test]
+    fn tracks_that_cannot_be_are_refused() {
+        let (header, track) = (TracksHeader::default(), TrackRecord { number: 1, ..TrackRecord::default() });
+        assert_eq!(check_tracks(&header, &[]), Ok(()), "nothing moves");
+        assert_eq!(check_tracks(&header, &[track; TRACKS_MAX]), Ok(()));
+        assert_eq!(check_tracks(&header, &[track; TRACKS_MAX + 1]), Err(Refusal::Malformed));
+        for broken in [
+            TrackRecord { position_m: [0.0, f64::NAN], ..track },
+            TrackRecord { velocity_mps: [f64::INFINITY, 0.0], ..track },
+            TrackRecord { cross_m2ps: f64::NAN, ..track },
+            TrackRecord { radius_m: f64::INFINITY, ..track },
+        ] {
+            assert_eq!(check_tracks(&header, &[track, broken]), Err(Refusal::NonFinite), "{broken:?}");
+        }
+        for broken in [
+            TrackRecord { radius_m: -0.1, ..track },
+            TrackRecord { position_m2: -0.1, ..track },
+            TrackRecord { velocity_m2ps2: -0.1, ..track },
+        ] {
+            assert_eq!(check_tracks(&header, &[broken]), Err(Refusal::Malformed), "{broken:?}");
+        }
     }
 
     #[test]

@@ -3,16 +3,19 @@
 mod bench;
 mod bench_gap;
 mod collect;
+mod crossings;
 mod deviation;
 mod drive;
 mod gap;
 mod gap_check;
 mod inspect;
+mod kernels;
 mod kinodynamics;
 mod learned_map;
 mod orders;
 mod plant;
 mod replay;
+mod results;
 mod route;
 mod train;
 mod up;
@@ -26,11 +29,13 @@ pub use bench::{
 };
 pub use bench_gap::BenchGapArguments;
 pub use collect::{CollectArguments, CollectMap, CollectSplit, CollectWorld};
+pub use crossings::{BenchCrossingsArguments, CrossingHandling};
 pub use deviation::AskedDeviation;
-pub use drive::{DriveArguments, InstructionSet, MapSource, Method, Pace};
+pub use drive::{Correct, DriveArguments, MapSource, Method, Pace};
 pub use gap::{GapApplyArguments, GapCommand, GapDiagnoseArguments, GapEffectsArguments};
 pub use gap_check::{GapScoreArguments, GapSealArguments};
 pub use inspect::InspectArguments;
+pub use kernels::{InstructionSet, KernelArguments, ThreadArguments};
 pub use kinodynamics::{
     BenchKinodynamicsArguments, KinodynamicsAnswer, KinodynamicsFilter, KinodynamicsRows,
     KinodynamicsSensing, KinodynamicsSpeed, TrainKinodynamicsArguments,
@@ -39,6 +44,7 @@ pub use learned_map::{BenchLearnedMapArguments, NetworkSizes};
 pub use orders::{AlphaArguments, AskedRun, GoalArguments, PathArguments};
 pub use plant::BenchPlantArguments;
 pub use replay::ReplayArguments;
+pub use results::{JsonArguments, ResultArguments};
 pub use route::{BareGround, RouteArguments};
 pub use train::{TrainArguments, TrainCommand};
 pub use up::{UpArguments, UpRole};

@@ -1,5 +1,6 @@
 //! `surefoot bench`: what was asked, handed to the benchmarks, and their result shown and written.
 
+mod crossings;
 mod gap;
 mod kinodynamics;
 mod learned_map;
@@ -10,8 +11,9 @@ mod plant;
 use ::bench::{BenchError, control, prior_map};
 use serde::Serialize;
 
-use crate::arguments::{BenchControlArguments, BenchPriorMapArguments, BenchWork};
-use crate::{UsageError, output};
+use crate::UsageError;
+use crate::arguments::{BenchControlArguments, BenchPriorMapArguments, BenchWork, JsonArguments};
+pub(crate) use crossings::run_crossings;
 pub(crate) use gap::run_gap;
 pub(crate) use kinodynamics::run_kinodynamics;
 pub(crate) use learned_map::run_learned_map;
@@ -20,32 +22,30 @@ pub(crate) use navigation::run_navigation;
 pub(crate) use plant::run_plant;
 
 pub(crate) fn run_control(arguments: &BenchControlArguments) -> anyhow::Result<()> {
-    let json = arguments.json.as_deref();
-    json.map_or(Ok(()), output::prepare_json)?;
+    arguments.copy.prepare()?;
     let report = control::measure(control::Request {
-        n_threads: arguments.n_threads(),
+        n_threads: arguments.kernels.threads.count(),
         n_updates: arguments.updates,
         work: match arguments.work {
             BenchWork::Bound => control::Work::Bound,
             BenchWork::Effects => control::Work::Effects,
             BenchWork::Drive => control::Work::Drive,
         },
-        isa: arguments.isa.into(),
+        isa: arguments.kernels.isa.into(),
     })
     .map_err(told)?;
-    show(&report, json)
+    show(&report, &arguments.copy)
 }
 
 pub(crate) fn run_prior_map(arguments: &BenchPriorMapArguments) -> anyhow::Result<()> {
-    let json = arguments.json.as_deref();
-    json.map_or(Ok(()), output::prepare_json)?;
+    arguments.copy.prepare()?;
     let request = prior_map::Request {
-        n_threads: arguments.n_threads(),
+        n_threads: arguments.kernels.threads.count(),
         n_updates: arguments.updates,
-        isa: arguments.isa.into(),
+        isa: arguments.kernels.isa.into(),
     };
     let report = prior_map::measure(request).map_err(told)?;
-    show(&report, json)
+    show(&report, &arguments.copy)
 }
 
 /// An instruction set that the machine lacks is the user's choice; all else is not.
@@ -57,10 +57,7 @@ fn told(error: BenchError) -> anyhow::Error {
 }
 
 /// JSON on standard output, and in the file if one was asked for.
-fn show(report: &impl Serialize, json: Option<&std::path::Path>) -> anyhow::Result<()> {
+fn show(report: &impl Serialize, copy: &JsonArguments) -> anyhow::Result<()> {
     println!("{}", serde_json::to_string_pretty(report)?);
-    if let Some(path) = json {
-        formats::write_json_atomic(path, report)?;
-    }
-    Ok(())
+    Ok(copy.write(report)?)
 }

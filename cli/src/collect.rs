@@ -5,7 +5,6 @@ mod recorded;
 mod summary;
 mod teleoperation;
 
-use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -15,21 +14,17 @@ use bench::collection::{
 };
 use bicycle::Vehicle;
 use evidential::Dataset;
-use formats::{read_vehicle, write_bytes_atomic, write_json_atomic};
-use indicatif::{ProgressBar, ProgressStyle};
+use formats::{read_vehicle, write_bytes_atomic};
 use scenarios::{RockFieldConfig, Split};
 
 use crate::arguments::{CollectArguments, CollectMap, CollectWorld};
-use crate::picture::draw_collection;
-use crate::{UsageError, output};
+use crate::{UsageError, output, progress};
 use summary::CollectSummary;
 
 /// Share of the test footprints that shall be more uneven than half of the training ones, and how exactly.
 const HARDER_SHARE: [f64; 2] = [0.91, 0.005];
 /// Height scales that are driven for it.
 const SCALES_TRIED: usize = 8;
-/// Room that must be free beforehand: the dataset of the papers takes less [bytes].
-const ROOM_BYTES: u64 = 64 << 20;
 
 pub(crate) fn run(arguments: &CollectArguments) -> anyhow::Result<()> {
     let picture = prepare_output(arguments)?;
@@ -44,8 +39,8 @@ pub(crate) fn run(arguments: &CollectArguments) -> anyhow::Result<()> {
     };
     let summary = CollectSummary::of(&collection, scale, began.elapsed().as_secs_f64());
     write_bytes_atomic(&arguments.out, &collection.dataset.to_bytes()?)?;
-    arguments.json.as_deref().map_or(Ok(()), |path| write_json_atomic(path, &summary))?;
-    draw_collection(&collection, &vehicle, &picture)?;
+    arguments.copy.write(&summary)?;
+    formats::write_bytes_atomic(&picture, &report::collection::picture(&collection, &vehicle)?)?;
     print!("{summary}");
     println!("  {}\n  {}", arguments.out.display(), picture.display());
     Ok(())
@@ -53,15 +48,9 @@ pub(crate) fn run(arguments: &CollectArguments) -> anyhow::Result<()> {
 
 /// Tries out the places of the results and tells where the picture goes.
 fn prepare_output(arguments: &CollectArguments) -> Result<PathBuf, UsageError> {
-    let out = &arguments.out;
-    if out.is_dir() || out.file_name().is_none() {
-        return Err(UsageError(format!("--out: expected a file, found the folder {}", out.display())));
-    }
-    let folder = out.parent().filter(|folder| !folder.as_os_str().is_empty());
-    formats::prepare_out_dir(folder.unwrap_or(Path::new(".")), ROOM_BYTES)
-        .map_err(|error| UsageError(format!("--out: {}", UsageError::from_input(error))))?;
-    arguments.json.as_deref().map_or(Ok(()), output::prepare_json)?;
-    Ok(out.with_extension("png"))
+    output::prepare_large_file("--out", &arguments.out)?;
+    arguments.copy.prepare()?;
+    Ok(arguments.out.with_extension("png"))
 }
 
 /// Simulated drives, and the height scale if one was looked for.
@@ -71,7 +60,8 @@ fn drive(
 ) -> anyhow::Result<(Collection, Option<HeightScale>)> {
     let mut request = request(arguments, vehicle)?;
     let scale = find_scale(arguments, &mut request)?;
-    let bar = bar(u64::from(request.n_maps) * u64::from(request.n_trials));
+    let n_trials = u64::from(request.n_maps) * u64::from(request.n_trials);
+    let bar = progress::bar(n_trials, "{pos}/{len} trials, {eta} left");
     let collected = collect(&request, || bar.inc(1));
     bar.finish_and_clear();
     Ok((collected.map_err(told)?, scale))
@@ -102,7 +92,7 @@ fn request(arguments: &CollectArguments, vehicle: &Vehicle) -> Result<Request, U
             CollectMap::Oracle => MapSource::Oracle,
             CollectMap::Sensed => MapSource::Sensed,
         },
-        n_threads: arguments.n_threads(),
+        n_threads: arguments.threads.count(),
         ..Request::new(vehicle.clone(), place, arguments.seed)
     })
 }
@@ -129,19 +119,6 @@ pub(crate) fn read_dataset(path: &Path) -> Result<Dataset, UsageError> {
     let bytes =
         std::fs::read(path).map_err(|error| told(&format!("expected a readable file, found: {error}")))?;
     Dataset::from_bytes(&bytes).map_err(|error| told(&error))
-}
-
-/// Counts trials on standard error; draws nothing where that is not a terminal.
-fn bar(n_trials: u64) -> ProgressBar {
-    let bar =
-        if std::io::stderr().is_terminal() { ProgressBar::new(n_trials) } else { ProgressBar::hidden() };
-    // The template is a constant: were it wrong, the plain bar would do.
-    if let Ok(style) =
-        ProgressStyle::with_template("  {bar:28.green/black.bright} {pos}/{len} trials, {eta} left")
-    {
-        bar.set_style(style.progress_chars("━╸━"));
-    }
-    bar
 }
 
 /// What was asked for cannot be: the user's choice. All else is not.

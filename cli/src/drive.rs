@@ -1,6 +1,7 @@
 //! `surefoot drive`: world, vehicle, navigator and episode, tied together.
 #![allow(clippy::disallowed_methods, reason = "--pace real follows the wall clock")]
 
+mod correction;
 mod knowledge;
 mod open_loop;
 mod record;
@@ -11,30 +12,36 @@ use std::time::{Duration, Instant};
 
 use bench::closed_loop::{self, ClosedLoop, Cycle, Drive, DriveError};
 use bicycle::{Decision, StopReason};
-use formats::{config_hash, write_json_atomic};
-use scenarios::EpisodeConfig;
+use formats::config_hash;
+use report::drive::{DrivePicture, RiskLayer};
+use scenarios::{Episode, EpisodeConfig, Walker};
 use traversability::CvarLevel;
 
 use crate::arguments::{DriveArguments, Goal, MapSource, Pace, StartPose};
-use crate::output::OutputFiles;
-use crate::picture::{DrivePicture, RiskLayer, draw_drive};
 use crate::progress::{DriveProgress, ProgressLine};
 use crate::summary::{Milliseconds, Outcome, Summary, revision};
 use crate::{UsageError, interrupt};
+pub(crate) use correction::read_inverse_model;
 pub(crate) use knowledge::read_checkpoint;
 use open_loop::Script;
 use record::{KnownRisk, Recording, path_samples};
 use scene::Scene;
+
+/// The files that a drive leaves.
+const SUMMARY: &str = "summary.json";
+const RECORDING: &str = "drive.mcap";
+const PICTURE: &str = "drive.png";
 
 pub(crate) fn run(arguments: &DriveArguments) -> anyhow::Result<()> {
     arguments.bush_height_m()?;
     let scene = scene::prepare(arguments)?;
     let mut closed = ClosedLoop::new(drive(arguments, &scene)?).map_err(|error| refused(arguments, error))?;
     closed.follow(scene::route(arguments, &scene.task)?)?;
-    let files = OutputFiles::prepare(arguments)?;
+    let results = &arguments.results;
+    results.prepare()?;
     let config_hash = config_hash(&(&scene.config, &scene.model, &scene.vehicle))?;
     let about = about(arguments, &scene, &config_hash);
-    let mut recording = Recording::create(&files.recording, about).map_err(UsageError::from_input)?;
+    let mut recording = Recording::create(&results.file(RECORDING), about).map_err(UsageError::from_input)?;
     recording.goal(&scene.task.world, scene.task.goal_m)?;
     interrupt::catch_interrupts()?;
     if let Some(why) = &scene.knowledge.why_not_learned {
@@ -43,12 +50,11 @@ pub(crate) fn run(arguments: &DriveArguments) -> anyhow::Result<()> {
     let kept = follow(arguments, &scene, &mut closed, &mut recording)?;
     recording.finish()?;
     let summary = summarise(arguments, &scene, &closed, &kept, config_hash);
-    for path in &files.summaries {
-        write_json_atomic(path, &summary)?;
-    }
-    draw(&scene, &closed, &kept.known, &summary, &files)?;
+    results.write_json(SUMMARY, &summary)?;
+    results.write(PICTURE, &drawn(&scene, &closed, &kept, &summary)?)?;
     println!("{summary}");
-    for path in files.summaries.iter().chain([&files.recording, &files.picture]) {
+    let files = [SUMMARY, RECORDING, PICTURE].map(|name| results.file(name));
+    for path in files.iter().chain(&results.copy.json) {
         println!("  {}", path.display());
     }
     match scene.script.as_ref().is_some_and(|script| script.is_over(&closed.episode)) {
@@ -61,6 +67,17 @@ pub(crate) fn run(arguments: &DriveArguments) -> anyhow::Result<()> {
 struct Kept {
     tally: Tally,
     known: KnownRisk,
+    /// Where each walker was after every cycle [m].
+    walked: Vec<Vec<[f64; 2]>>,
+}
+
+impl Kept {
+    fn note_walkers(&mut self, walkers: &[Walker]) {
+        self.walked.resize(walkers.len(), Vec::new());
+        for (way_m, walker) in self.walked.iter_mut().zip(walkers) {
+            way_m.push(walker.position_m());
+        }
+    }
 }
 
 /// Times and stops over a drive.
@@ -93,6 +110,7 @@ fn drive<'a>(arguments: &DriveArguments, scene: &'a Scene) -> Result<Drive<'a>, 
         Script::prepare(&mut episode);
     }
     episode.deviations = arguments.deviation.iter().map(|asked| asked.deviation).collect();
+    scene::let_walk(arguments, &scene.vehicle, &scene.task, &mut episode);
     Ok(Drive {
         task: scene.task.clone(),
         vehicle: &scene.vehicle,
@@ -101,6 +119,7 @@ fn drive<'a>(arguments: &DriveArguments, scene: &'a Scene) -> Result<Drive<'a>, 
         episode,
         method: scene.knowledge.method,
         networks: scene.knowledge.networks.clone(),
+        corrector: scene.knowledge.corrector.clone(),
         map_source: match arguments.map_source() {
             MapSource::Sensed => closed_loop::MapSource::Sensed,
             MapSource::Oracle => closed_loop::MapSource::Oracle,
@@ -127,7 +146,7 @@ fn follow(
     let [x_m, y_m, _] = scene.task.start;
     let progress = ProgressLine::new(scene.task.distance_to_goal_m(x_m, y_m));
     let known = KnownRisk::new(&scene.task.world, scene.config.risk_resolution_m(), &scene.vehicle.limits);
-    let mut kept = Kept { tally: Tally::default(), known };
+    let mut kept = Kept { tally: Tally::default(), known, walked: Vec::new() };
     let began = Instant::now();
     while closed.episode.outcome().is_none() {
         let measured = closed.episode.observe().clone();
@@ -139,6 +158,7 @@ fn follow(
         if let Some(map) = closed.navigator.risk_map().filter(|_| cycle.map_ms.is_some()) {
             kept.known.update(&map);
         }
+        kept.note_walkers(closed.episode.walkers());
         recording.cycle(closed, &cycle, &measured)?;
         progress.update(&told(closed, &cycle));
         kept.tally.is_interrupted = interrupt::interrupted();
@@ -194,7 +214,7 @@ fn summarise(
     let goal_m = scene.task.goal_m;
     Summary {
         outcome,
-        reason: reason(outcome, tally, (&pose, scene.script.is_some())),
+        reason: reason(episode, outcome, tally, scene.script.is_some()),
         time_to_goal_s: (outcome == Outcome::Goal).then(|| episode.time_s()),
         duration_s: episode.time_s(),
         path_length_m: episode.path_length_m(),
@@ -209,6 +229,10 @@ fn summarise(
         localisation_jumps: closed.navigator.n_jumps(),
         measurements_refused: closed.navigator.refused().clone(),
         scans: *closed.navigator.scans(),
+        walkers: arguments.walkers,
+        walked_into: episode.n_walked_into(),
+        was_avoidable: episode.strike().map(|strike| strike.was_avoidable),
+        correction: closed.navigator.corrector().map(|corrector| corrector.counts().clone()),
         seed: arguments.seed,
         vehicle: scene.vehicle.name.clone(),
         world: scene.task.world.name.clone(),
@@ -220,14 +244,15 @@ fn summarise(
         deviations: arguments.deviation.iter().map(|asked| asked.words.clone()).collect(),
         unfamiliar_share: has_density.then(|| kept.known.unfamiliar_share()),
         isa: format!("{:?}", closed.navigator.controller().diagnostics().isa).to_lowercase(),
-        threads: arguments.n_threads(),
+        threads: arguments.kernels.threads.count(),
         config_hash,
         revision: revision().to_owned(),
     }
 }
 
 /// Why it did not end at the goal, for a person.
-fn reason(outcome: Outcome, tally: &Tally, (pose, is_scripted): (&terrain::Pose, bool)) -> String {
+fn reason(episode: &Episode, outcome: Outcome, tally: &Tally, is_scripted: bool) -> String {
+    let pose = episode.motion().pose;
     let place = format!("at ({:.1}, {:.1}) m", pose.x_m, pose.y_m);
     match outcome {
         Outcome::Goal => String::new(),
@@ -242,19 +267,22 @@ fn reason(outcome: Outcome, tally: &Tally, (pose, is_scripted): (&terrain::Pose,
             Some((reason, count)) => format!("{reason:?} in {count} cycles {place}"),
             None => place,
         },
+        Outcome::WalkerStruck => match episode.strike() {
+            Some(strike) if strike.was_avoidable => format!("{place}, a stop would have avoided it"),
+            _ => format!("{place}, no stop would have avoided it"),
+        },
         Outcome::Stuck | Outcome::OutOfBounds | Outcome::Timeout | Outcome::Collision | Outcome::InWater => {
             place
         }
     }
 }
 
-fn draw(
+fn drawn(
     scene: &Scene,
     closed: &ClosedLoop,
-    known: &KnownRisk,
+    Kept { known, walked, .. }: &Kept,
     summary: &Summary,
-    files: &OutputFiles,
-) -> anyhow::Result<()> {
+) -> Result<Vec<u8>, report::EncodeError> {
     let driven = path_samples(closed);
     let seen = terrain::GridMap::from_values(
         *known.traction.geometry(),
@@ -274,28 +302,26 @@ fn draw(
     )];
     let failure = summary.outcome.to_string();
     let [x_m, y_m, _] = scene.task.start;
-    Ok(draw_drive(
-        &DrivePicture {
-            title: &title,
-            subtitles: &subtitles,
-            world: &scene.task.world,
-            risk: Some(RiskLayer {
-                values: &known.traction,
-                label: "worst traction [-]",
-                harmless: 0.9,
-                worst: 0.0,
-            }),
-            known: seen.as_ref(),
-            unfamiliar: Some(&known.unfamiliar),
-            driven: &driven,
-            planned: &[],
-            areas: Some(&scene.config.areas),
-            start_m: [x_m, y_m],
-            goal_m: scene.task.goal_m,
-            goal_radius_m: scene.task.goal_tolerance_m,
-            failure: (summary.outcome != Outcome::Goal).then_some(failure.as_str()),
-            vehicle: &scene.vehicle,
-        },
-        &files.picture,
-    )?)
+    report::drive::picture(&DrivePicture {
+        title: &title,
+        subtitles: &subtitles,
+        world: &scene.task.world,
+        risk: Some(RiskLayer {
+            values: &known.traction,
+            label: "worst traction [-]",
+            harmless: 0.9,
+            worst: 0.0,
+        }),
+        known: seen.as_ref(),
+        unfamiliar: Some(&known.unfamiliar),
+        driven: &driven,
+        walked,
+        planned: &[],
+        areas: Some(&scene.config.areas),
+        start_m: [x_m, y_m],
+        goal_m: scene.task.goal_m,
+        goal_radius_m: scene.task.goal_tolerance_m,
+        failure: (summary.outcome != Outcome::Goal).then_some(failure.as_str()),
+        vehicle: &scene.vehicle,
+    })
 }

@@ -6,7 +6,6 @@ mod diagnose;
 mod drives;
 mod effects;
 mod follow_up;
-mod html;
 mod machine;
 mod outputs;
 mod predictions;
@@ -14,7 +13,6 @@ mod progress;
 mod request;
 mod score;
 mod seal;
-pub(crate) mod told;
 mod workers;
 
 use crate::arguments::GapCommand;

@@ -13,10 +13,8 @@ use crate::drive::read_checkpoint;
 
 pub(crate) fn run(arguments: &InspectArguments) -> anyhow::Result<()> {
     let found = look(&arguments.file)?;
-    if let Some(json) = &arguments.json {
-        crate::output::prepare_json(json)?;
-        formats::write_json_atomic(json, &found)?;
-    }
+    arguments.copy.prepare()?;
+    arguments.copy.write(&found)?;
     // Whoever reads only the first lines has read enough.
     match writeln!(std::io::stdout(), "{}", serde_json::to_string_pretty(&found)?) {
         Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => Err(error.into()),

@@ -24,6 +24,7 @@
 //!
 //! - [`kinodynamics`]: which command does what is wanted on the ground that the inertial measurement unit feels.
 //! - [`route`](::route): a route over kilometres of measured ground, and the speeds along it.
+//! - [`tracking`]: what moves, how, and where it will be.
 //! - [`scenarios`]: the truth that all of it is tested against: worlds, a plant of rigid bodies and tyres, sensors,
 //!   episodes.
 //! - [`bus`]: the contract with a vehicle: messages in shared memory, channels, ages, watchdog.
@@ -31,7 +32,9 @@
 //! - [`simulator`]: the simulated vehicle as one driver of that contract.
 //! - [`sim_to_real`]: which effect separates recorded drives of a robot from those of its simulator.
 //! - [`formats`]: every file that is read or written.
+//! - [`python`](../surefoot_native/index.html): the planner as a wheel for Python, over NumPy arrays.
 //! - [`bench`](::bench): timings, the published tables, and plant and planner in a closed loop.
+//! - [`report`]: what came of all this, as text, pictures and pages.
 //!
 //! ## Where to begin
 //!
@@ -40,6 +43,7 @@
 //! | to | run |
 //! |---|---|
 //! | bring a map of your own | `cargo run -p terrain --example own_map` |
+//! | follow a person through scans | `cargo run -p tracking --example track_a_walker` |
 //! | bring a vehicle of your own | `cargo run -p bicycle --example own_vehicle`, from a file `cargo run -p formats --example own_files` |
 //! | bring a risk map of your own | `cargo run -p traversability --example own_risk_map` |
 //! | ask physics about ground | `cargo run -p physics_prior --example judge_a_ramp` |
@@ -54,6 +58,7 @@
 //! | send and read messages of a run | `cargo run -p bus --example publish_and_read` |
 //! | learn how old messages may be | `cargo run -p runtime --example limits_of_rates` |
 //! | command the simulated vehicle from a program of your own | `cargo run -p simulator --example command_the_plant` |
+//! | draw a drive of your own | `cargo run -p report --example draw_a_drive` |
 //! | find out why simulator and robot disagree | `cargo run -p sim_to_real --example diagnose_a_delay` |
 //!
 //! Those who come to read code begin with [`navigator::Navigator`], then [`traversability::RiskMapView`], then
@@ -73,7 +78,7 @@
 //!
 //! ## This crate
 //!
-//! The one binary, `surefoot`: arguments, progress, pictures and reports around the crates that do the work. [`run`]
+//! The one binary, `surefoot`: arguments, progress and files around the crates that do the work. [`run`]
 //! reads the arguments, calls the command's handler and turns its result into an exit code: 0 success, 1 the work
 //! failed, 2 bad usage or input. Errors are printed here and nowhere else, one line each.
 
@@ -87,7 +92,6 @@ mod inspect;
 pub mod interrupt;
 mod orders;
 pub mod output;
-pub mod picture;
 pub mod progress;
 mod replay;
 mod route;
@@ -165,6 +169,7 @@ fn dispatch(command: Command) -> anyhow::Result<()> {
         Command::Bench { command: BenchCommand::Kinodynamics(kinodynamics) } => {
             bench::run_kinodynamics(&kinodynamics)
         }
+        Command::Bench { command: BenchCommand::Crossings(crossings) } => bench::run_crossings(&crossings),
         Command::Bench { command: BenchCommand::Plant(plant) } => bench::run_plant(&plant),
         Command::Bench { command: BenchCommand::Gap(gap) } => bench::run_gap(&gap),
         Command::Bench { command: BenchCommand::Learning(learning) } => bench::run_learning(&learning),

@@ -5,6 +5,17 @@ use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressStyle};
 
+/// A bar that counts to `n` on standard error; draws nothing where that is not a terminal. `beside` is what stands
+/// right of it, in the template's words of `indicatif`.
+pub(crate) fn bar(n: u64, beside: &str) -> ProgressBar {
+    let bar = if std::io::stderr().is_terminal() { ProgressBar::new(n) } else { ProgressBar::hidden() };
+    // The templates are constants but for a word: were one wrong, the plain bar would do.
+    if let Ok(style) = ProgressStyle::with_template(&format!("  {{bar:28.green/black.bright}} {beside}")) {
+        bar.set_style(style.progress_chars("━╸━"));
+    }
+    bar
+}
+
 /// How far a drive has come.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DriveProgress {
@@ -28,15 +39,7 @@ pub struct ProgressLine {
 impl ProgressLine {
     /// A bar that is full at the goal; `start_distance_m` from the goal it is empty.
     pub fn new(start_distance_m: f64) -> Self {
-        let bar = if std::io::stderr().is_terminal() {
-            ProgressBar::new(centimetres(start_distance_m))
-        } else {
-            ProgressBar::hidden()
-        };
-        // The template is a constant: were it wrong, the plain bar would do.
-        if let Ok(style) = ProgressStyle::with_template("  {bar:28.green/black.bright} {msg}") {
-            bar.set_style(style.progress_chars("━╸━"));
-        }
+        let bar = bar(centimetres(start_distance_m), "{msg}");
         bar.enable_steady_tick(Duration::from_millis(200));
         Self { bar, start_distance_m }
     }

@@ -8,10 +8,9 @@ use evidential::{Checkpoint, shipped};
 use navigator::Belief;
 use runtime::replay::{self, Knowledge, ReplayReport};
 use runtime::setup::{MachineSetup, RecordedSetup};
-use sha2::{Digest, Sha256};
 
 use crate::arguments::ReplayArguments;
-use crate::drive::read_checkpoint;
+use crate::drive::{read_checkpoint, read_inverse_model};
 use crate::{UsageError, WorkFailed};
 
 /// Every method that a recording may name.
@@ -26,17 +25,16 @@ const METHODS: [Method; 7] = [
 ];
 
 pub(crate) fn run(arguments: &ReplayArguments) -> anyhow::Result<()> {
-    if let Some(json) = &arguments.json {
-        crate::output::prepare_json(json)?;
-    }
+    arguments.copy.prepare()?;
     let records = replay::read(&arguments.files).map_err(UsageError::from_input)?;
     let Some(setup) = &records.setup else { return Ok(()) };
     let machine = MachineSetup::read(setup).map_err(UsageError::from_input)?;
-    let knowledge = knowledge(setup, &machine, arguments.weights.as_deref())?;
+    let knowledge = Knowledge {
+        corrector: corrector(setup, arguments.kinodynamics_weights.as_deref())?,
+        ..knowledge(setup, &machine, arguments.weights.as_deref())?
+    };
     let report = replay::replay(&records, &knowledge).map_err(UsageError::from_input)?;
-    if let Some(json) = &arguments.json {
-        formats::write_json_atomic(json, &report)?;
-    }
+    arguments.copy.write(&report)?;
     show(&report);
     Ok(verdict(&report)?)
 }
@@ -46,6 +44,9 @@ fn show(report: &ReplayReport) {
         "{} of {} decisions made again to the last bit, from {} maps of the ground and {} risk maps",
         report.n_identical, report.n_decisions, report.n_surfaces, report.n_risk_maps
     );
+    if report.n_corrections > 0 {
+        println!("commands of {} decisions corrected for the ground again", report.n_corrections);
+    }
     println!("localisation of {} maps of the ground made out again from the odometry", report.n_localised);
     if report.n_unverified > 0 {
         println!("  not verified: that of {}, for want of", report.n_unverified);
@@ -77,6 +78,31 @@ fn verdict(report: &ReplayReport) -> Result<(), WorkFailed> {
     }
 }
 
+/// The networks that corrected commands in the recording, and no others.
+fn corrector(
+    setup: &RecordedSetup,
+    weights: Option<&Path>,
+) -> Result<Option<Arc<kinodynamics::Checkpoint>>, UsageError> {
+    let expected = &setup.corrector_sha256;
+    if expected.is_empty() {
+        return Ok(None);
+    }
+    let Some(folder) = weights else {
+        return Err(UsageError(format!(
+            "--kinodynamics-weights: expected the networks with SHA-256 {expected}, which corrected commands, found none"
+        )));
+    };
+    let checkpoint = read_inverse_model(folder)?;
+    let found = &checkpoint.sidecar().weights_sha256;
+    if found != expected {
+        return Err(UsageError(format!(
+            "--kinodynamics-weights {}: expected networks with SHA-256 {expected}, found {found}",
+            folder.display()
+        )));
+    }
+    Ok(Some(Arc::new(checkpoint)))
+}
+
 /// The networks that the recording names, found by their hash and no others.
 fn knowledge(
     setup: &RecordedSetup,
@@ -89,14 +115,14 @@ fn knowledge(
     })?;
     let Some((training, unfamiliar)) = method.learned() else {
         let belief = if method == Method::Nominal { Belief::Nominal } else { Belief::Physics };
-        return Ok(Knowledge { belief, checkpoint: 0 });
+        return Ok(Knowledge { belief, checkpoint: 0, corrector: None });
     };
     let checkpoint: Checkpoint = match weights {
         Some(folder) => read_checkpoint(folder)?,
         None => shipped(training, &machine.vehicle.geometry).map_err(UsageError::from_input)?,
     };
-    let digest = Sha256::digest(checkpoint.weights_bytes()?);
-    let found: String = digest.iter().map(|byte| format!("{byte:02x}")).collect();
+    let digest = checkpoint.digest()?;
+    let found = digest.hexadecimal();
     if found != setup.checkpoint_sha256 {
         let expected = &setup.checkpoint_sha256;
         return Err(UsageError(format!(
@@ -104,6 +130,5 @@ fn knowledge(
         ))
         .into());
     }
-    let hash = digest.iter().take(8).fold(0, |word, byte| word << 8 | u64::from(*byte));
-    Ok(Knowledge::learned(Arc::new(checkpoint), unfamiliar, hash))
+    Ok(Knowledge::learned(Arc::new(checkpoint), unfamiliar, digest.short()))
 }

@@ -5,14 +5,12 @@ use ::route::{
 };
 use bicycle::Vehicle;
 use formats::{read_elevation, read_vehicle};
+use report::route::RoutePicture;
 use serde::Serialize;
 
 use crate::arguments::{BareGround, RouteArguments};
-use crate::picture::{RoutePicture, draw_route};
-use crate::{UsageError, WorkFailed, output, summary};
+use crate::{UsageError, WorkFailed, summary};
 
-/// Room that must be free beforehand [bytes].
-const ROOM_BYTES: u64 = 16 << 20;
 /// Share of the attitude limits that a route may use; the rest is for what no map shows.
 const ATTITUDE_SHARE: f64 = 0.9;
 /// Room beside the vehicle, in all [m].
@@ -23,9 +21,7 @@ pub(crate) fn run(arguments: &RouteArguments) -> anyhow::Result<()> {
     let limits = speed_limits(&vehicle, arguments);
     limits.validate().map_err(UsageError::from_input)?;
     let planner = planner(&vehicle, arguments)?;
-    formats::prepare_out_dir(&arguments.out, ROOM_BYTES)
-        .map_err(|error| UsageError(format!("--out: {}", UsageError::from_input(error))))?;
-    arguments.json.as_deref().map_or(Ok(()), output::prepare_json)?;
+    arguments.results.prepare()?;
     let start = arguments.start;
     let goal_m = [arguments.goal.x_m, arguments.goal.y_m];
     let route = planner.route(([start.x_m, start.y_m], start.yaw_rad), goal_m, &limits).map_err(failed)?;
@@ -171,17 +167,16 @@ fn write(
     summary: &Summary,
     arguments: &RouteArguments,
 ) -> anyhow::Result<()> {
-    let places = [Some(arguments.out.join("route.json")), arguments.json.clone()];
-    places.iter().flatten().try_for_each(|path| formats::write_json_atomic(path, summary))?;
-    formats::write_bytes_atomic(&arguments.out.join("route.csv"), csv(route).as_bytes())?;
+    arguments.results.write_json("route.json", summary)?;
+    arguments.results.write("route.csv", csv(route).as_bytes())?;
     let title = format!("{}: {:.0} m in {:.0} s", summary.vehicle, summary.length_m, summary.duration_s);
     let subtitle = format!(
         "{}, climb {:.0} m, steepest {:.0} deg, tightest radius {:.1} m",
         summary.world, summary.climb_m, summary.steepest_deg, summary.tightest_radius_m
     );
     let picture = RoutePicture { title: &title, subtitle: &subtitle, ground: planner.ground(), route };
-    draw_route(&picture, &arguments.out.join("route.png"))?;
-    println!("\n  route.png, route.csv and route.json in {}", arguments.out.display());
+    arguments.results.write("route.png", &report::route::picture(&picture)?)?;
+    println!("\n  route.png, route.csv and route.json in {}", arguments.results.out.display());
     Ok(())
 }
 

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::fmt;
 
 use bicycle::StopReason;
+use kinodynamics::CorrectionCounts;
 use navigator::ScanTally;
 use serde::{Deserialize, Serialize};
 
@@ -72,6 +73,18 @@ pub struct Summary {
     /// What became of the scans and their points.
     #[serde(default)]
     pub scans: ScanTally,
+    /// People who walked about.
+    #[serde(default)]
+    pub walkers: usize,
+    /// How often one of them walked into the standing vehicle.
+    #[serde(default)]
+    pub walked_into: u64,
+    /// Whether a stop would have spared whom the vehicle struck; null when it struck nobody.
+    #[serde(default)]
+    pub was_avoidable: Option<bool>,
+    /// What became of the commands on their way to the vehicle; null where nobody corrects them.
+    #[serde(default)]
+    pub correction: Option<CorrectionCounts>,
     /// Decides everything random.
     pub seed: u64,
     /// Name of the machine.
@@ -137,15 +150,9 @@ fn told_counts(counts: &BTreeMap<StopReason, u64>) -> String {
     let told: Vec<String> = counts
         .iter()
         .filter(|(_, count)| **count > 0)
-        .map(|(reason, count)| format!("{} {count}x", name_of(*reason)))
+        .map(|(reason, count)| format!("{reason} {count}x"))
         .collect();
     if told.is_empty() { "none".to_owned() } else { told.join(", ") }
-}
-
-/// A reason as it stands in the JSON, with spaces.
-pub(crate) fn name_of(reason: StopReason) -> String {
-    let name = serde_json::to_string(&reason).unwrap_or_default();
-    name.trim_matches('"').replace('_', " ")
 }
 
 impl fmt::Display for Summary {
@@ -167,12 +174,18 @@ impl fmt::Display for Summary {
         row("stops", told_counts(&self.stops))?;
         row("localisation", format!("{} jumps", self.localisation_jumps))?;
         row("refused", told_counts(&self.measurements_refused))?;
+        if let Some(correction) = &self.correction {
+            row("correction", correction.to_string())?;
+        }
         row("world", format!("{}, seed {}", self.world, self.seed))?;
         row("start", format!("{:.2},{:.2},{:.3}", self.start.x_m, self.start.y_m, self.start.yaw_rad))?;
         row("goal", format!("{:.2},{:.2}", self.goal.x_m, self.goal.y_m))?;
         row("vehicle", self.vehicle.clone())?;
         if !self.deviations.is_empty() {
             row("departs by", self.deviations.join(" "))?;
+        }
+        if self.walkers > 0 {
+            row("people", format!("{}, {} walked into the vehicle", self.walkers, self.walked_into))?;
         }
         row("method", format!("{}, alpha {}", self.method.name(), self.alpha))?;
         if let Some(share) = self.unfamiliar_share {
@@ -216,6 +229,10 @@ mod tests {
             localisation_jumps: 2,
             measurements_refused: BTreeMap::from([(StopReason::InputOutOfOrder, 5)]),
             scans: ScanTally { fused: 40, blind: 1, ..ScanTally::default() },
+            walkers: 0,
+            walked_into: 0,
+            was_avoidable: None,
+            correction: None,
             seed: 1,
             vehicle: "pietra_full_size".to_owned(),
             world: "rocks".to_owned(),

@@ -5,27 +5,20 @@ mod data;
 mod kinodynamics;
 mod sweep;
 
-use std::io::IsTerminal;
 use std::ops::ControlFlow;
-use std::path::Path;
 use std::time::Instant;
 
 use evidential::{
     Epoch, Method, Outcome, PARAMETER_NAMES, Percentiles, Phase, Selections, Settings, TrainError,
     TrainingEnd,
 };
-use formats::{write_bytes_atomic, write_json_atomic};
-use indicatif::{ProgressBar, ProgressStyle};
+use indicatif::ProgressBar;
 use serde::Serialize;
 
 use crate::arguments::TrainArguments;
-use crate::picture::draw_loss_curves;
-use crate::{UsageError, WorkFailed, interrupt, output, summary};
+use crate::{UsageError, WorkFailed, interrupt, progress, summary};
 use data::Data;
 pub(crate) use kinodynamics::run_kinodynamics;
-
-/// Room that must be free beforehand: weights, curves and trials take less [bytes].
-const ROOM_BYTES: u64 = 16 << 20;
 
 /// The content of `training.json`.
 #[derive(Serialize)]
@@ -43,9 +36,7 @@ struct Written<'a> {
 }
 
 pub(crate) fn run(arguments: &TrainArguments) -> anyhow::Result<()> {
-    formats::prepare_out_dir(&arguments.out, ROOM_BYTES)
-        .map_err(|error| UsageError(format!("--out: {}", UsageError::from_input(error))))?;
-    arguments.json.as_deref().map_or(Ok(()), output::prepare_json)?;
+    arguments.results.prepare()?;
     let data = Data::read(arguments)?;
     interrupt::catch_interrupts()?;
     if arguments.sweep {
@@ -62,7 +53,7 @@ pub(crate) fn run(arguments: &TrainArguments) -> anyhow::Result<()> {
 fn train_one(arguments: &TrainArguments, data: &Data, method: Method) -> anyhow::Result<()> {
     let settings = arguments.settings(method, &Selections::shipped()?);
     let began = Instant::now();
-    let bar = bar(&settings);
+    let bar = progress::bar(settings.epochs_max as u64, "{pos}/{len} passes   {msg}");
     let trained =
         evidential::train(&data.training, &data.validation, &settings, summary::revision(), &mut |epoch| {
             show(&bar, epoch);
@@ -75,7 +66,7 @@ fn train_one(arguments: &TrainArguments, data: &Data, method: Method) -> anyhow:
     print!("{}", told_outcome(data, &settings, &outcome, took_s));
     println!(
         "  weights.safetensors, weights.json, training.json and training.png in {}",
-        arguments.out.display()
+        arguments.results.out.display()
     );
     match outcome.end {
         TrainingEnd::Finished => Ok(()),
@@ -100,19 +91,6 @@ fn told(error: TrainError) -> anyhow::Error {
     }
 }
 
-/// Counts passes on standard error; draws nothing where that is not a terminal.
-fn bar(settings: &Settings) -> ProgressBar {
-    let n = settings.epochs_max as u64;
-    let bar = if std::io::stderr().is_terminal() { ProgressBar::new(n) } else { ProgressBar::hidden() };
-    // The template is a constant: were it wrong, the plain bar would do.
-    if let Ok(style) =
-        ProgressStyle::with_template("  {bar:28.green/black.bright} {pos}/{len} passes   {msg}")
-    {
-        bar.set_style(style.progress_chars("━╸━"));
-    }
-    bar
-}
-
 fn show(bar: &ProgressBar, epoch: &Epoch) {
     bar.set_position(epoch.epoch as u64);
     bar.set_message(match epoch.phase {
@@ -130,10 +108,9 @@ fn write(
     outcome: &Outcome,
     took_s: f64,
 ) -> anyhow::Result<()> {
-    let file = |name: &str| arguments.out.join(name);
     // The sidecar holds the hash of the weights: a half-written pair is refused when it is read.
-    write_bytes_atomic(&file("weights.safetensors"), &outcome.checkpoint.weights_bytes()?)?;
-    write_bytes_atomic(&file("weights.json"), &outcome.checkpoint.sidecar_bytes()?)?;
+    arguments.results.write("weights.safetensors", &outcome.checkpoint.weights_bytes()?)?;
+    arguments.results.write("weights.json", &outcome.checkpoint.sidecar_bytes()?)?;
     let written = Written {
         revision: summary::revision(),
         settings,
@@ -146,12 +123,10 @@ fn write(
         took_s,
         curves: &outcome.curves,
     };
-    for path in [Some(file("training.json")), arguments.json.clone()].iter().flatten() {
-        write_json_atomic(path, &written)?;
-    }
+    arguments.results.write_json("training.json", &written)?;
     let title = format!("Training of {}, seed {}", settings.method.name(), settings.seed);
-    draw_loss_curves(&title, &outcome.curves, Path::new(&file("training.png")))?;
-    Ok(())
+    let png = report::training::picture(&title, &outcome.curves)?;
+    Ok(arguments.results.write("training.png", &png)?)
 }
 
 fn told_outcome(data: &Data, settings: &Settings, outcome: &Outcome, took_s: f64) -> String {

@@ -37,7 +37,7 @@ fn refuse_what_has_no_meaning(arguments: &UpArguments) -> Result<(), UsageError>
     arguments.drive.bush_height_m()?;
     refuse_what_needs_one_process(arguments)?;
     refuse_what_concerns_another_role(arguments)?;
-    match arguments.drive.threads {
+    match arguments.drive.kernels.threads.threads {
         Some(n @ 2..) if arguments.realtime => Err(UsageError(format!(
             "--threads: expected 1 with --realtime, where control has one core of its own, found {n}"
         ))),
@@ -66,7 +66,7 @@ fn refuse_what_concerns_another_role(arguments: &UpArguments) -> Result<(), Usag
         ("--standby", *standby, &[UpRole::Plant, UpRole::Mission]),
         ("--learn", *learn, &[UpRole::Learning]),
         ("--validation", validation.is_some(), &[UpRole::Learning]),
-        ("--json", drive.json.is_some(), &[UpRole::Plant]),
+        ("--json", drive.results.copy.json.is_some(), &[UpRole::Plant]),
         (
             "--realtime",
             *realtime,
@@ -142,7 +142,7 @@ fn supervise(arguments: &UpArguments) -> anyhow::Result<()> {
         lines.iter().for_each(|line| println!("  {line}"));
     });
     supervisor.unended().iter().for_each(|why| crate::report(why));
-    keep(&supervisor.report(), &arguments.drive.out)?;
+    keep(&supervisor.report(), &arguments.drive.results.out)?;
     match end {
         RunEnd::Plant(0) => {
             let time_s = supervisor.mission().map_or(0.0, |mission| mission.time_s);

@@ -109,6 +109,38 @@ fn navigation_writes_table_and_picture() {
 }
 
 #[test]
+fn crossings_write_table_and_picture_and_refuse_what_cannot_be_driven() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let out = folder.path().join("out");
+    let mut words = vec!["bench", "crossings", "--runs", "1", "--seed", "1000", "--threads", "1"];
+    words.extend(["--time-limit", "1", "--isa", "portable", "--out", out.to_str().expect("UTF-8")]);
+    let output = surefoot(&words);
+    assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+    let told = String::from_utf8_lossy(&output.stdout);
+    assert!(told.contains("tracked") && told.contains("time limit passed after 1.0 s"), "{told}");
+    let table: Value =
+        serde_json::from_slice(&std::fs::read(out.join("crossings.json")).expect("the table")).expect("JSON");
+    for (row, handling) in ["tracked", "mapped"].into_iter().enumerate() {
+        let row = &table["rows"][row];
+        assert_eq!((&row["handling"], &row["n_other"]), (&handling.into(), &1.into()), "{table}");
+    }
+    let moment = &table["runs"][0]["trail"][0];
+    assert_eq!(moment["walkers_m"].as_array().map(Vec::len), Some(2), "{moment}");
+    assert!(std::fs::read(out.join("crossings.png")).expect("the picture").starts_with(b"\x89PNG"));
+    for (words, part) in [
+        (["--runs", "0"], "--runs: expected a number of runs from 1 to 1000, found \"0\""),
+        (["--walkers", "17"], "--walkers: expected a number of walkers from 1 to 16, found \"17\""),
+        (["--handling", "luck"], "--handling: expected tracked, mapped, found \"luck\""),
+        (["--out", "/dev/null"], "--out: "),
+    ] {
+        let output = surefoot(&[["bench", "crossings"].as_slice(), &words].concat());
+        let told = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{told}");
+        assert!(told.contains(part) && told.lines().count() == 1, "{told}");
+    }
+}
+
+#[test]
 fn navigation_refuses_what_cannot_be_driven() {
     for (words, part) in [
         (["--seeds", "0"], "--seeds: expected a number of seeds from 1 to 1000, found \"0\""),

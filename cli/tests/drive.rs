@@ -123,6 +123,24 @@ fn summary_holds_every_promised_field() {
     assert!(!json["revision"].as_str().unwrap().is_empty());
 }
 
+#[test]
+fn a_drive_among_people_tells_of_them_in_summary_and_settings() {
+    let folder = tempfile::tempdir().unwrap();
+    let words = ["--seed", "5", "--time-limit", "1", "--method", "physics", "--walkers", "2"];
+    let output = drive(folder.path(), &words).output().unwrap();
+    assert_not_there(&output, "time limit passed");
+    assert!(text(&output.stdout).contains("people          2, 0 walked into the vehicle"));
+    let among = read_summary(folder.path());
+    assert_eq!((among.walkers, among.walked_into, among.was_avoidable), (2, 0, None));
+    let output = drive(folder.path(), &words[..6]).output().unwrap();
+    assert!(!text(&output.stdout).contains("people"));
+    assert_ne!(
+        read_summary(folder.path()).config_hash,
+        among.config_hash,
+        "that they are tracked is a setting"
+    );
+}
+
 /// A gyroscope that is off by 1 rad/s: from one cycle to the next the heading turns 0.1 rad less than it says, give or take
 /// its noise, and more than that is a jump.
 #[test]

@@ -43,6 +43,26 @@ fn random_driving_is_recorded_and_learned_from() {
     assert!((0.08..0.18).contains(&latency_s), "{latency_s}");
     let sidecar = json(&here.join("weights/kinodynamics.json"));
     assert_eq!((&sidecar["vehicle"]["name"], &sidecar["format"]), (&"ut_automata".into(), &1.into()));
+    what_was_learned_corrects_a_drive(here);
+}
+
+fn what_was_learned_corrects_a_drive(here: &Path) {
+    let drive = ["drive", "--method", "physics", "--time-limit", "3", "--threads", "1", "--vehicle"];
+    let correct = ["--correct", "kinodynamics", "--kinodynamics-weights", "weights"];
+    let run = |vehicle: &str, words: &[&str]| surefoot(&[&drive[..], &[vehicle], words].concat(), here);
+    let (code, told, failed) = run("ut_automata", &correct);
+    assert!(code == 1 && failed.contains("time limit passed"), "{failed}");
+    let counts = &json(&here.join("surefoot-out/summary.json"))["correction"];
+    let count = |name: &str| counts[name].as_u64().expect("a count");
+    assert!(count("commands") > 10 && count("corrected") + count("bounded") > 0, "{counts}");
+    assert!(told.contains(" commands, ") && told.contains("correction"), "{told}");
+    let (code, _, failed) = run("rc_car", &correct);
+    assert!(code == 2 && failed.contains("vehicle of the inverse model: expected"), "{failed}");
+    let (code, _, failed) = run("ut_automata", &correct[..2]);
+    assert!(code == 2 && failed.contains("--kinodynamics-weights"), "{failed}");
+    let (code, _, failed) =
+        run("ut_automata", &["--correct", "kinodynamics", "--kinodynamics-weights", "none"]);
+    assert!(code == 2 && failed.contains("kinodynamics.safetensors: expected a readable file"), "{failed}");
 }
 
 #[test]

@@ -125,6 +125,7 @@ fn record_setup(path: &Path, change: impl FnOnce(&mut serde_json::Map<String, Va
         ages,
         method: "physics".to_owned(),
         checkpoint_sha256: String::new(),
+        corrector_sha256: String::new(),
         alpha: 0.6,
         seed: "1".to_owned(),
         revision: String::new(),

@@ -34,6 +34,7 @@ fn help_names_every_option_of_drive_with_units_files_and_exit_codes() {
     for option in [
         "--world",
         "--bush-height",
+        "--walkers",
         "--start",
         "--goal",
         "--vehicle",
@@ -77,6 +78,7 @@ fn every_command_has_help() {
         &["bench", "--help"],
         &["bench", "control", "--help"],
         &["bench", "prior-map", "--help"],
+        &["bench", "crossings", "--help"],
     ] {
         let output = surefoot(words);
         assert_eq!(output.status.code(), Some(0), "{words:?}");
@@ -120,7 +122,7 @@ fn places_with_a_wrong_shape_are_refused() {
 
 #[test]
 fn other_bad_values_are_refused_with_what_would_do() {
-    let cases: [(&[&str], &[&str]); 11] = [
+    let cases: [(&[&str], &[&str]); 13] = [
         (&["drive", "--world", "moon"], &["--world", "rocks, arena", ".npz", "moon"]),
         (&["drive", "--seed", "-1"], &["--seed", "whole number", "-1"]),
         (&["drive", "--seed", "1e3"], &["--seed", "whole number", "1e3"]),
@@ -139,6 +141,8 @@ fn other_bad_values_are_refused_with_what_would_do() {
         (&["drive", "--isa", "sse9"], &["--isa", "auto, avx512, avx2, portable", "sse9"]),
         (&["drive", "--pace", "slow"], &["--pace", "fast, real", "slow"]),
         (&["bench", "control", "--updates", "0"], &["--updates", "from 1", "0"]),
+        (&["drive", "--walkers", "17"], &["--walkers", "from 1 to 16", "17"]),
+        (&["up", "--robot", "mine.toml", "--walkers", "1"], &["--robot", "--walkers"]),
     ];
     for (words, parts) in cases {
         assert_refused(words, parts);

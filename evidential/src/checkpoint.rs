@@ -7,17 +7,8 @@ use std::collections::BTreeMap;
 use physics_prior::PriorConfig;
 use serde::{Deserialize, Serialize};
 
+use crate::weights::Tensor;
 use crate::{Architecture, FeatureLayout, Method, Standardisation};
-pub use file::CheckpointError;
-
-/// An array of a checkpoint.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Tensor {
-    /// Lengths of its axes.
-    pub shape: Vec<usize>,
-    /// Row-major values.
-    pub values: Vec<f32>,
-}
 
 /// Logarithms of the flow's density over the training data, for normalising and for judging what is unlike it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]

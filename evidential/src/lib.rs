@@ -32,10 +32,11 @@ mod standardise;
 mod sweep;
 mod training;
 mod vehicle;
+pub mod weights;
 
 pub use architecture::Architecture;
 pub use belief_map::{AVOIDED_METRES, BeliefMap, BeliefMapError, Learned, PoseBelief, Unfamiliar};
-pub use checkpoint::{Checkpoint, CheckpointError, DensityRange, Sidecar, Tensor};
+pub use checkpoint::{Checkpoint, DensityRange, Sidecar};
 pub use dataset::{
     Dataset, DatasetError, DatasetFileError, DatasetOrigin, Example, PARAMETER_BINS, PARAMETER_NAMES,
     Surveyor, SurveyorError,
@@ -47,8 +48,10 @@ pub use method::{Method, Prior};
 pub use predictor::{Evidence, Prediction, Predictor, PredictorError};
 pub use shipped::{ShippedData, ShippedError, shipped, shipped_data};
 pub use sweep::{Grid, Selection, SelectionError, Selections, Trial, fingerprint};
+pub use terrain::SettingError;
 pub use training::{
-    Assessment, Epoch, Outcome, Percentiles, Phase, Refined, Refinement, Settings, SettingsError, TrainError,
-    TrainingEnd, assess, refine, train,
+    Assessment, Epoch, Outcome, Percentiles, Phase, Refined, Refinement, Settings, TrainError, TrainingEnd,
+    assess, refine, train,
 };
 pub use vehicle::VehicleMismatch;
+pub use weights::{CheckpointError, Tensor, WeightsDigest};

@@ -11,7 +11,7 @@ use traversability::N_BINS;
 
 use crate::flow::LogDensity;
 use crate::random::stream;
-use crate::{Architecture, Checkpoint, checkpoint};
+use crate::{Architecture, Checkpoint, weights};
 use dense::{Activation, Dense};
 
 /// Key of the random stream that initialises the networks.
@@ -188,11 +188,11 @@ impl Network {
     }
 
     /// The weights under the names of [`Architecture`].
-    pub(crate) fn tensors(&self) -> Result<BTreeMap<String, checkpoint::Tensor>> {
+    pub(crate) fn tensors(&self) -> Result<BTreeMap<String, weights::Tensor>> {
         let mut tensors = BTreeMap::new();
         let mut put = |name: String, tensor: &Tensor| -> Result<()> {
             let values = tensor.contiguous()?.flatten_all()?.to_vec1()?;
-            tensors.insert(name, checkpoint::Tensor { shape: tensor.dims().to_vec(), values });
+            tensors.insert(name, weights::Tensor { shape: tensor.dims().to_vec(), values });
             Ok(())
         };
         for (name, layer) in self.named_layers() {

@@ -1,5 +1,6 @@
 //! The search for the parameters of a method on validation data alone, and what it found.
 
+use data_encoding::HEXLOWER;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
@@ -115,7 +116,7 @@ pub fn fingerprint(training: &Dataset, validation: &Dataset) -> Result<String, D
     let mut hash = Sha256::new();
     hash.update(training.to_bytes()?);
     hash.update(validation.to_bytes()?);
-    Ok(hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect())
+    Ok(HEXLOWER.encode(&hash.finalize()))
 }
 
 impl Selection {

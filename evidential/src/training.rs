@@ -27,7 +27,7 @@ use evaluation::Evaluation;
 pub use evaluation::Percentiles;
 pub use refinement::{Assessment, Refined, Refinement, assess, refine};
 use samples::{Samples, gather};
-pub use settings::{Settings, SettingsError};
+pub use settings::Settings;
 use steps::{Best, Place, RunningMean, adam, order, pass};
 
 /// Keys of the random streams that order the examples.

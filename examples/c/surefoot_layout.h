@@ -1,4 +1,4 @@
-/* Messages of Surefoot, layout version 6. Written from its types; do not edit. */
+/* Messages of Surefoot, layout version 7. Written from its types; do not edit. */
 #ifndef SUREFOOT_LAYOUT_H
 #define SUREFOOT_LAYOUT_H
 
@@ -6,7 +6,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#define SUREFOOT_LAYOUT_VERSION 6u
+#define SUREFOOT_LAYOUT_VERSION 7u
 
 /* First field of every header: whose message it is, and of when. Known to the channels as surefoot.Stamp. */
 typedef struct SurefootStamp {
@@ -183,6 +183,46 @@ static_assert(offsetof(SurefootSurfaceHeader, shift_m) == 296, "SurfaceHeader.sh
 static_assert(offsetof(SurefootSurfaceHeader, shift_yaw_rad) == 320, "SurfaceHeader.shift_yaw_rad");
 static_assert(offsetof(SurefootSurfaceHeader, content_hash) == 328, "SurfaceHeader.content_hash");
 
+/* Header of what moves; the payload is one TrackRecord for each thing, the nearest first, at most TRACKS_MAX. Known to the channels as surefoot.TracksHeader. */
+typedef struct SurefootTracksHeader {
+    /* Whose and of when: valid_at_ns is that of the scan. */
+    SurefootStamp stamp;
+    /* The scan that shows where they are. */
+    SurefootSource scan;
+    /* When the odometry was measured in whose frame they lie [ns]. */
+    uint64_t frame_at_ns;
+} SurefootTracksHeader;
+static_assert(sizeof(SurefootTracksHeader) == 64, "TracksHeader");
+static_assert(offsetof(SurefootTracksHeader, stamp) == 0, "TracksHeader.stamp");
+static_assert(offsetof(SurefootTracksHeader, scan) == 40, "TracksHeader.scan");
+static_assert(offsetof(SurefootTracksHeader, frame_at_ns) == 56, "TracksHeader.frame_at_ns");
+
+/* A thing that moves. Known to the channels as surefoot.Track. */
+typedef struct SurefootTrackRecord {
+    /* Counts the things that mapping has seen, from 1. */
+    uint64_t number;
+    /* Centre in the map frame, east and north [m]. */
+    double position_m[2];
+    /* Velocity, east and north [m/s]. */
+    double velocity_mps[2];
+    /* Variance of the position along each axis [m2]. */
+    double position_m2;
+    /* Covariance of position and velocity along each axis [m2/s]. */
+    double cross_m2ps;
+    /* Variance of the velocity along each axis [m2/s2]. */
+    double velocity_m2ps2;
+    /* Radius of the thing [m]. */
+    double radius_m;
+} SurefootTrackRecord;
+static_assert(sizeof(SurefootTrackRecord) == 72, "TrackRecord");
+static_assert(offsetof(SurefootTrackRecord, number) == 0, "TrackRecord.number");
+static_assert(offsetof(SurefootTrackRecord, position_m) == 8, "TrackRecord.position_m");
+static_assert(offsetof(SurefootTrackRecord, velocity_mps) == 24, "TrackRecord.velocity_mps");
+static_assert(offsetof(SurefootTrackRecord, position_m2) == 40, "TrackRecord.position_m2");
+static_assert(offsetof(SurefootTrackRecord, cross_m2ps) == 48, "TrackRecord.cross_m2ps");
+static_assert(offsetof(SurefootTrackRecord, velocity_m2ps2) == 56, "TrackRecord.velocity_m2ps2");
+static_assert(offsetof(SurefootTrackRecord, radius_m) == 64, "TrackRecord.radius_m");
+
 /* Header of a risk map; the payload is risks, grounds and times to the goal, see docs/runtime.md. Known to the channels as surefoot.RiskHeader. */
 typedef struct SurefootRiskHeader {
     /* Whose and of when: valid_at_ns is that of the scan. */
@@ -266,6 +306,8 @@ typedef struct SurefootDecisionRecord {
     SurefootSource learned;
     /* The newest map of physics alone that there was to choose from. */
     SurefootSource physics;
+    /* What was known last of what moves; none where nothing is tracked. */
+    SurefootSource tracks;
     /* Where to go [m]. */
     double goal_m[2];
     /* How near counts as there [m]. */
@@ -276,12 +318,24 @@ typedef struct SurefootDecisionRecord {
     double elapsed_s;
     /* State that it was made for: x, y [m], yaw [rad], speed [m/s], steering [rad]. */
     double state[5];
+    /* The message of the IMU that was taken in last; none where nobody corrects commands. */
+    SurefootSource imu;
+    /* How many were taken in since the decision before, without a gap up to the last. */
+    uint64_t n_imu;
+    /* How the command was corrected: 0 = by nobody, else what became of it; see docs/runtime.md. */
+    uint32_t correction;
+    /* Share that the correction had, 0 to 1. */
+    float correction_share;
+    /* Curvature that it added [1/m]. */
+    float curvature_change_per_m;
+    /* Angle of the front wheels before it [rad]. */
+    float planned_steering_rad;
     /* Time that the decision took [ns]. */
     uint64_t duration_ns;
     /* By how much the cycle began after its deadline [ns]. */
     uint64_t lateness_ns;
 } SurefootDecisionRecord;
-static_assert(sizeof(SurefootDecisionRecord) == 240, "DecisionRecord");
+static_assert(sizeof(SurefootDecisionRecord) == 296, "DecisionRecord");
 static_assert(offsetof(SurefootDecisionRecord, command) == 0, "DecisionRecord.command");
 static_assert(offsetof(SurefootDecisionRecord, cycle) == 32, "DecisionRecord.cycle");
 static_assert(offsetof(SurefootDecisionRecord, decided_at_ns) == 40, "DecisionRecord.decided_at_ns");
@@ -292,13 +346,20 @@ static_assert(offsetof(SurefootDecisionRecord, author) == 88, "DecisionRecord.au
 static_assert(offsetof(SurefootDecisionRecord, mission) == 96, "DecisionRecord.mission");
 static_assert(offsetof(SurefootDecisionRecord, learned) == 112, "DecisionRecord.learned");
 static_assert(offsetof(SurefootDecisionRecord, physics) == 128, "DecisionRecord.physics");
-static_assert(offsetof(SurefootDecisionRecord, goal_m) == 144, "DecisionRecord.goal_m");
-static_assert(offsetof(SurefootDecisionRecord, tolerance_m) == 160, "DecisionRecord.tolerance_m");
-static_assert(offsetof(SurefootDecisionRecord, n_rollouts) == 168, "DecisionRecord.n_rollouts");
-static_assert(offsetof(SurefootDecisionRecord, elapsed_s) == 176, "DecisionRecord.elapsed_s");
-static_assert(offsetof(SurefootDecisionRecord, state) == 184, "DecisionRecord.state");
-static_assert(offsetof(SurefootDecisionRecord, duration_ns) == 224, "DecisionRecord.duration_ns");
-static_assert(offsetof(SurefootDecisionRecord, lateness_ns) == 232, "DecisionRecord.lateness_ns");
+static_assert(offsetof(SurefootDecisionRecord, tracks) == 144, "DecisionRecord.tracks");
+static_assert(offsetof(SurefootDecisionRecord, goal_m) == 160, "DecisionRecord.goal_m");
+static_assert(offsetof(SurefootDecisionRecord, tolerance_m) == 176, "DecisionRecord.tolerance_m");
+static_assert(offsetof(SurefootDecisionRecord, n_rollouts) == 184, "DecisionRecord.n_rollouts");
+static_assert(offsetof(SurefootDecisionRecord, elapsed_s) == 192, "DecisionRecord.elapsed_s");
+static_assert(offsetof(SurefootDecisionRecord, state) == 200, "DecisionRecord.state");
+static_assert(offsetof(SurefootDecisionRecord, imu) == 240, "DecisionRecord.imu");
+static_assert(offsetof(SurefootDecisionRecord, n_imu) == 256, "DecisionRecord.n_imu");
+static_assert(offsetof(SurefootDecisionRecord, correction) == 264, "DecisionRecord.correction");
+static_assert(offsetof(SurefootDecisionRecord, correction_share) == 268, "DecisionRecord.correction_share");
+static_assert(offsetof(SurefootDecisionRecord, curvature_change_per_m) == 272, "DecisionRecord.curvature_change_per_m");
+static_assert(offsetof(SurefootDecisionRecord, planned_steering_rad) == 276, "DecisionRecord.planned_steering_rad");
+static_assert(offsetof(SurefootDecisionRecord, duration_ns) == 280, "DecisionRecord.duration_ns");
+static_assert(offsetof(SurefootDecisionRecord, lateness_ns) == 288, "DecisionRecord.lateness_ns");
 
 /* Where the vehicle got stuck. Known to the channels as surefoot.Stuck. */
 typedef struct SurefootStuckRecord {

@@ -31,7 +31,7 @@ class Quad(ctypes.Structure):
 # Name: header, element, depth, readers of the run's own, messages that late ones are given.
 CHANNELS = {
     "odometry": (layout.Stamp, layout.OdometryRecord, 32, 6, 0),
-    "imu": (layout.Stamp, layout.ImuRecord, 32, 2, 0),
+    "imu": (layout.Stamp, layout.ImuRecord, 32, 3, 0),
     "scan": (layout.ScanHeader, layout.PointRecord, 2, 2, 0),
     "risk": (layout.RiskHeader, Quad, 1, 4, 0),
     "command": (layout.Stamp, layout.CommandRecord, 4, 4, 0),

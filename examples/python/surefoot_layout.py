@@ -1,8 +1,8 @@
-"""Messages of Surefoot, layout version 6. Written from its types; do not edit."""
+"""Messages of Surefoot, layout version 7. Written from its types; do not edit."""
 
 import ctypes
 
-LAYOUT_VERSION = 6
+LAYOUT_VERSION = 7
 
 
 class Stamp(ctypes.Structure):
@@ -252,6 +252,64 @@ assert SurfaceHeader.shift_yaw_rad.offset == 320
 assert SurfaceHeader.content_hash.offset == 328
 
 
+class TracksHeader(ctypes.Structure):
+    """Header of what moves; the payload is one TrackRecord for each thing, the nearest first, at most TRACKS_MAX."""
+
+    _fields_ = [
+        # Whose and of when: valid_at_ns is that of the scan.
+        ("stamp", Stamp),
+        # The scan that shows where they are.
+        ("scan", Source),
+        # When the odometry was measured in whose frame they lie [ns].
+        ("frame_at_ns", ctypes.c_uint64),
+    ]
+
+    @staticmethod
+    def type_name() -> str:
+        return "surefoot.TracksHeader"
+
+
+assert ctypes.sizeof(TracksHeader) == 64
+assert TracksHeader.stamp.offset == 0
+assert TracksHeader.scan.offset == 40
+assert TracksHeader.frame_at_ns.offset == 56
+
+
+class TrackRecord(ctypes.Structure):
+    """A thing that moves."""
+
+    _fields_ = [
+        # Counts the things that mapping has seen, from 1.
+        ("number", ctypes.c_uint64),
+        # Centre in the map frame, east and north [m].
+        ("position_m", ctypes.c_double * 2),
+        # Velocity, east and north [m/s].
+        ("velocity_mps", ctypes.c_double * 2),
+        # Variance of the position along each axis [m2].
+        ("position_m2", ctypes.c_double),
+        # Covariance of position and velocity along each axis [m2/s].
+        ("cross_m2ps", ctypes.c_double),
+        # Variance of the velocity along each axis [m2/s2].
+        ("velocity_m2ps2", ctypes.c_double),
+        # Radius of the thing [m].
+        ("radius_m", ctypes.c_double),
+    ]
+
+    @staticmethod
+    def type_name() -> str:
+        return "surefoot.Track"
+
+
+assert ctypes.sizeof(TrackRecord) == 72
+assert TrackRecord.number.offset == 0
+assert TrackRecord.position_m.offset == 8
+assert TrackRecord.velocity_mps.offset == 24
+assert TrackRecord.position_m2.offset == 40
+assert TrackRecord.cross_m2ps.offset == 48
+assert TrackRecord.velocity_m2ps2.offset == 56
+assert TrackRecord.radius_m.offset == 64
+
+
 class RiskHeader(ctypes.Structure):
     """Header of a risk map; the payload is risks, grounds and times to the goal, see docs/runtime.md."""
 
@@ -355,6 +413,8 @@ class DecisionRecord(ctypes.Structure):
         ("learned", Source),
         # The newest map of physics alone that there was to choose from.
         ("physics", Source),
+        # What was known last of what moves; none where nothing is tracked.
+        ("tracks", Source),
         # Where to go [m].
         ("goal_m", ctypes.c_double * 2),
         # How near counts as there [m].
@@ -365,6 +425,18 @@ class DecisionRecord(ctypes.Structure):
         ("elapsed_s", ctypes.c_double),
         # State that it was made for: x, y [m], yaw [rad], speed [m/s], steering [rad].
         ("state", ctypes.c_double * 5),
+        # The message of the IMU that was taken in last; none where nobody corrects commands.
+        ("imu", Source),
+        # How many were taken in since the decision before, without a gap up to the last.
+        ("n_imu", ctypes.c_uint64),
+        # How the command was corrected: 0 = by nobody, else what became of it; see docs/runtime.md.
+        ("correction", ctypes.c_uint32),
+        # Share that the correction had, 0 to 1.
+        ("correction_share", ctypes.c_float),
+        # Curvature that it added [1/m].
+        ("curvature_change_per_m", ctypes.c_float),
+        # Angle of the front wheels before it [rad].
+        ("planned_steering_rad", ctypes.c_float),
         # Time that the decision took [ns].
         ("duration_ns", ctypes.c_uint64),
         # By how much the cycle began after its deadline [ns].
@@ -376,7 +448,7 @@ class DecisionRecord(ctypes.Structure):
         return "surefoot.DecisionRecord"
 
 
-assert ctypes.sizeof(DecisionRecord) == 240
+assert ctypes.sizeof(DecisionRecord) == 296
 assert DecisionRecord.command.offset == 0
 assert DecisionRecord.cycle.offset == 32
 assert DecisionRecord.decided_at_ns.offset == 40
@@ -387,13 +459,20 @@ assert DecisionRecord.author.offset == 88
 assert DecisionRecord.mission.offset == 96
 assert DecisionRecord.learned.offset == 112
 assert DecisionRecord.physics.offset == 128
-assert DecisionRecord.goal_m.offset == 144
-assert DecisionRecord.tolerance_m.offset == 160
-assert DecisionRecord.n_rollouts.offset == 168
-assert DecisionRecord.elapsed_s.offset == 176
-assert DecisionRecord.state.offset == 184
-assert DecisionRecord.duration_ns.offset == 224
-assert DecisionRecord.lateness_ns.offset == 232
+assert DecisionRecord.tracks.offset == 144
+assert DecisionRecord.goal_m.offset == 160
+assert DecisionRecord.tolerance_m.offset == 176
+assert DecisionRecord.n_rollouts.offset == 184
+assert DecisionRecord.elapsed_s.offset == 192
+assert DecisionRecord.state.offset == 200
+assert DecisionRecord.imu.offset == 240
+assert DecisionRecord.n_imu.offset == 256
+assert DecisionRecord.correction.offset == 264
+assert DecisionRecord.correction_share.offset == 268
+assert DecisionRecord.curvature_change_per_m.offset == 272
+assert DecisionRecord.planned_steering_rad.offset == 276
+assert DecisionRecord.duration_ns.offset == 280
+assert DecisionRecord.lateness_ns.offset == 288
 
 
 class StuckRecord(ctypes.Structure):

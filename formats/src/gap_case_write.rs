@@ -5,9 +5,8 @@ use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
-use sha2::{Digest, Sha256};
 
-use crate::results::write_atomic;
+use crate::results::{sha256, write_atomic};
 use crate::{
     ConfigError, GapCase, GapGround, GapLabel, GapVehicle, OutputError, parse_gap_labels, write_bytes_atomic,
     write_json_atomic,
@@ -188,10 +187,6 @@ fn read_seal(set: &Path) -> Result<Option<GapSeal>, ConfigError> {
         expected: "n_cases and labels_sha256".to_owned(),
         found: error.to_string(),
     })
-}
-
-fn sha256(bytes: &[u8]) -> String {
-    Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
 #[cfg(test)]

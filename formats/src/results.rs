@@ -4,6 +4,7 @@ use std::fs::File;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
+use data_encoding::HEXLOWER;
 use serde::Serialize;
 use sha2::{Digest, Sha256};
 use tempfile::NamedTempFile;
@@ -84,7 +85,12 @@ pub fn write_json_atomic(path: &Path, value: &impl Serialize) -> Result<(), Outp
 /// Errors: the value has no form in JSON, e.g. a map whose keys are no strings.
 pub fn config_hash(config: &impl Serialize) -> Result<String, serde_json::Error> {
     let canonical = serde_json::to_string(&serde_json::to_value(config)?)?;
-    Ok(Sha256::digest(canonical.as_bytes()).iter().map(|byte| format!("{byte:02x}")).collect())
+    Ok(sha256(canonical.as_bytes()))
+}
+
+/// SHA-256 as 64 hexadecimal digits.
+pub(crate) fn sha256(bytes: &[u8]) -> String {
+    HEXLOWER.encode(&Sha256::digest(bytes))
 }
 
 /// Lets `write` fill a temporary file beside `path` and puts it in place once it is on the disk.

@@ -1,5 +1,6 @@
 //! A robot in TOML: what it is, which processes of it run here, how often and how late they may speak, where it may be.
 
+use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
@@ -31,6 +32,8 @@ pub struct RobotFile {
     /// How the ground is judged.
     #[serde(default)]
     pub ground: RobotGround,
+    /// What corrects commands for the ground under the wheels.
+    pub correction: Option<RobotCorrection>,
     /// How often its parts speak.
     #[serde(default)]
     pub rates: RobotRates,
@@ -61,6 +64,25 @@ pub struct RobotGround {
     pub weights: Option<PathBuf>,
     /// Share of the worst outcomes to plan for, in (0, 1].
     pub alpha: Option<f64>,
+}
+
+/// Decisions per second that the parts of a run keep up with [Hz].
+pub const CONTROL_RATES_HZ: RangeInclusive<f64> = 1.0..=50.0;
+/// Odometries per second that they keep up with [Hz].
+pub const ODOMETRY_RATES_HZ: RangeInclusive<f64> = 2.0..=400.0;
+/// Scans per second that they keep up with [Hz].
+pub const SCAN_RATES_HZ: RangeInclusive<f64> = 0.5..=50.0;
+/// Most readers of somebody else's that memory is reserved for.
+pub const THIRD_PARTIES_MAX: usize = 16;
+
+/// What corrects commands for the ground under the wheels.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RobotCorrection {
+    /// As `--correct` names it.
+    pub method: String,
+    /// Folder of its networks.
+    pub weights: PathBuf,
 }
 
 /// Messages per second [Hz].
@@ -159,8 +181,12 @@ pub fn parse_robot(text: &ConfigText) -> Result<RobotFile, ConfigError> {
     if robot.format != FORMAT {
         return Err(text.refuse("format", format_args!("version {FORMAT}"), robot.format));
     }
-    if let Some((field, [least, most], found)) = robot.first_out_of_range() {
-        return Err(text.refuse(field, format_args!("a number from {least} to {most}"), found));
+    if let Some((field, range, found)) = robot.first_out_of_range() {
+        return Err(text.refuse(
+            field,
+            format_args!("a number from {} to {}", range.start(), range.end()),
+            found,
+        ));
     }
     if let Some((field, found)) = robot.first_not_positive() {
         return Err(text.refuse(field, "a finite number > 0", found));
@@ -182,17 +208,17 @@ pub fn parse_robot(text: &ConfigText) -> Result<RobotFile, ConfigError> {
 }
 
 impl RobotFile {
-    /// Rates that no process keeps to, and more readers than memory is reserved for: the ranges of `surefoot up`.
-    fn first_out_of_range(&self) -> Option<(&'static str, [f64; 2], f64)> {
+    /// Rates that no process keeps to, and more readers than memory is reserved for.
+    fn first_out_of_range(&self) -> Option<(&'static str, RangeInclusive<f64>, f64)> {
         let rates = &self.rates;
         let numbers = [
-            ("rates.control_hz", [1.0, 50.0], rates.control_hz),
-            ("rates.odometry_hz", [2.0, 400.0], rates.odometry_hz),
-            ("rates.scan_hz", [0.5, 50.0], rates.scan_hz),
-            ("third_parties", [0.0, 16.0], self.third_parties.map(|n| n as f64)),
+            ("rates.control_hz", CONTROL_RATES_HZ, rates.control_hz),
+            ("rates.odometry_hz", ODOMETRY_RATES_HZ, rates.odometry_hz),
+            ("rates.scan_hz", SCAN_RATES_HZ, rates.scan_hz),
+            ("third_parties", 0.0..=THIRD_PARTIES_MAX as f64, self.third_parties.map(|n| n as f64)),
         ];
         let given = numbers.into_iter().filter_map(|(field, range, value)| Some((field, range, value?)));
-        given.into_iter().find(|(_, [least, most], value)| !(*least..=*most).contains(value))
+        given.into_iter().find(|(_, range, value)| !range.contains(value))
     }
 
     /// Rates, ages and limits are all of one kind.
@@ -222,6 +248,9 @@ impl RobotFile {
         for path in [&mut self.model, &mut self.config, &mut self.ground.weights].into_iter().flatten() {
             *path = folder.join(&path);
         }
+        if let Some(correction) = &mut self.correction {
+            correction.weights = folder.join(&correction.weights);
+        }
         self
     }
 }
@@ -240,6 +269,10 @@ roles = ["mapping", "control"]
 [ground]
 method = "physics"
 alpha = 0.4
+
+[correction]
+method = "kinodynamics"
+weights = "wheels"
 
 [rates]
 odometry_hz = 100.0
@@ -280,6 +313,7 @@ speed_max_mps = 0.8
         let robot = read_robot(&path).unwrap();
         assert_eq!(robot.vehicle, folder.path().join("mine.toml").display().to_string());
         assert_eq!(robot.config, Some(folder.path().join("settings.toml")));
+        assert_eq!(robot.correction.unwrap().weights, folder.path().join("wheels"));
         assert_eq!((robot.ground.alpha, robot.rates.odometry_hz), (Some(0.4), Some(100.0)));
         assert_eq!(robot.sensors[1].mount.own_body[0].max_m, [0.0, 0.3, 0.5]);
         assert_eq!((robot.mission.goals_m.len(), robot.areas.keep_out_m[0].len()), (2, 3));
@@ -292,7 +326,7 @@ speed_max_mps = 0.8
     fn what_cannot_be_is_refused_by_line_and_field() {
         assert_eq!(
             told(&WHOLE.replace("speed_max_mps = 0.8", "speed_max_mps = -0.8")),
-            "robot.toml:36: safety.speed_max_mps: expected a finite number > 0, found -0.8"
+            "robot.toml:40: safety.speed_max_mps: expected a finite number > 0, found -0.8"
         );
         assert!(
             told(&WHOLE.replace("odometry_hz = 100.0", "odometry_hz = nan")).contains("rates.odometry_hz")

@@ -3,10 +3,8 @@
 use std::collections::BTreeMap;
 
 use evidential::RadialFlow;
-use safetensors::SafeTensors;
-use safetensors::tensor::{Dtype, SafeTensorError, TensorView};
+use evidential::weights::{self, CheckpointError, Tensor, WeightsDigest, require};
 use serde::{Deserialize, Serialize};
-use sha2::{Digest, Sha256};
 
 use crate::architecture::{AXES, Architecture, LayerShape};
 use crate::dense::Dense;
@@ -53,56 +51,11 @@ pub struct Sidecar {
     pub weights_sha256: String,
 }
 
-/// Weights with their shape, row-major.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Tensor {
-    /// Lengths.
-    pub shape: Vec<usize>,
-    /// Values.
-    pub values: Vec<f32>,
-}
-
 /// Weights and what they mean.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Checkpoint {
     sidecar: Sidecar,
     tensors: BTreeMap<String, Tensor>,
-}
-
-/// Why there is no checkpoint.
-#[derive(Debug, thiserror::Error)]
-pub enum CheckpointError {
-    /// The sidecar is not what it should be.
-    #[error("sidecar: expected that of an inverse model, found: {0}")]
-    Json(#[source] serde_json::Error),
-    /// The weights are truncated or something else.
-    #[error("weights: expected safetensors, found: {0}")]
-    Container(#[from] SafeTensorError),
-    /// Something does not fit.
-    #[error("{what}: expected {expected}, found {found}")]
-    Mismatch {
-        /// What.
-        what: String,
-        /// What would do.
-        expected: String,
-        /// What is there.
-        found: String,
-    },
-}
-
-fn require<T: PartialEq + std::fmt::Debug>(
-    what: &str,
-    expected: &T,
-    found: &T,
-) -> Result<(), CheckpointError> {
-    if expected == found {
-        return Ok(());
-    }
-    Err(CheckpointError::Mismatch {
-        what: what.to_owned(),
-        expected: format!("{expected:?}"),
-        found: format!("{found:?}"),
-    })
 }
 
 impl Checkpoint {
@@ -113,7 +66,7 @@ impl Checkpoint {
     pub fn new(sidecar: Sidecar, tensors: BTreeMap<String, Tensor>) -> Result<Self, CheckpointError> {
         let mut checkpoint = Self { sidecar: Sidecar { format: FORMAT, ..sidecar }, tensors };
         checkpoint.validate()?;
-        checkpoint.sidecar.weights_sha256 = sha256(&checkpoint.weights_bytes()?);
+        checkpoint.sidecar.weights_sha256 = WeightsDigest::of(&checkpoint.weights_bytes()?).hexadecimal();
         Ok(checkpoint)
     }
 
@@ -132,21 +85,8 @@ impl Checkpoint {
     /// # Errors
     /// Other bytes, another format or hash, weights that are missing, not finite or of another shape than the architecture's.
     pub fn from_bytes(weights: &[u8], sidecar: &[u8]) -> Result<Self, CheckpointError> {
-        #[derive(Deserialize)]
-        struct Version {
-            format: u32,
-        }
-        let Version { format } = serde_json::from_slice(sidecar).map_err(CheckpointError::Json)?;
-        require("format", &FORMAT, &format)?;
-        let sidecar: Sidecar = serde_json::from_slice(sidecar).map_err(CheckpointError::Json)?;
-        require("SHA-256 of the weights", &sidecar.weights_sha256, &sha256(weights))?;
-        let mut tensors = BTreeMap::new();
-        for (name, view) in SafeTensors::deserialize(weights)?.tensors() {
-            require(&format!("type of {name}"), &Dtype::F32, &view.dtype())?;
-            let values =
-                view.data().as_chunks::<4>().0.iter().map(|&bytes| f32::from_le_bytes(bytes)).collect();
-            tensors.insert(name, Tensor { shape: view.shape().to_vec(), values });
-        }
+        let sidecar: Sidecar = weights::read_sidecar(sidecar, FORMAT)?;
+        let tensors = weights::from_bytes(weights, &sidecar.weights_sha256)?;
         let checkpoint = Self { sidecar, tensors };
         checkpoint.validate()?;
         Ok(checkpoint)
@@ -157,13 +97,7 @@ impl Checkpoint {
     /// # Errors
     /// A tensor whose shape contradicts its number of values.
     pub fn weights_bytes(&self) -> Result<Vec<u8>, CheckpointError> {
-        let bytes = |tensor: &Tensor| tensor.values.iter().flat_map(|value| value.to_le_bytes()).collect();
-        let data: Vec<Vec<u8>> = self.tensors.values().map(bytes).collect();
-        let mut views = Vec::with_capacity(data.len());
-        for ((name, tensor), data) in self.tensors.iter().zip(&data) {
-            views.push((name.as_str(), TensorView::new(Dtype::F32, tensor.shape.clone(), data)?));
-        }
-        Ok(safetensors::serialize(views, None)?)
+        weights::to_bytes(&self.tensors)
     }
 
     /// The sidecar as indented JSON.
@@ -171,9 +105,7 @@ impl Checkpoint {
     /// # Errors
     /// Numbers that JSON cannot hold.
     pub fn sidecar_bytes(&self) -> Result<Vec<u8>, CheckpointError> {
-        let mut text = serde_json::to_vec_pretty(&self.sidecar).map_err(CheckpointError::Json)?;
-        text.push(b'\n');
-        Ok(text)
+        weights::sidecar_bytes(&self.sidecar)
     }
 
     /// Refuses weights of another vehicle: steering angles mean other curvatures there.
@@ -185,19 +117,7 @@ impl Checkpoint {
     }
 
     fn validate(&self) -> Result<(), CheckpointError> {
-        let mut expected = self.tensor_shapes();
-        expected.sort();
-        let names: Vec<&String> = expected.iter().map(|(name, _)| name).collect();
-        require("names of the weights", &names, &self.tensors.keys().collect())?;
-        for ((name, shape), tensor) in expected.iter().zip(self.tensors.values()) {
-            require(&format!("shape of {name}"), shape, &tensor.shape)?;
-            require(&format!("number of values of {name}"), &shape.iter().product(), &tensor.values.len())?;
-            require(
-                &format!("finite values of {name}"),
-                &true,
-                &tensor.values.iter().all(|v| v.is_finite()),
-            )?;
-        }
+        weights::check(self.tensor_shapes(), &self.tensors)?;
         let Standardisation { mean, deviation } = self.sidecar.standardisation;
         let is_sound = mean.iter().all(|mean| mean.is_finite())
             && deviation.iter().all(|deviation| deviation.is_finite() && *deviation > 0.0);
@@ -250,8 +170,4 @@ impl Checkpoint {
             (self.values("flow.mean")?.to_vec(), self.values("flow.deviation")?.to_vec());
         Ok(Familiarity::new(means, deviations, flow, self.sidecar.fade))
     }
-}
-
-fn sha256(bytes: &[u8]) -> String {
-    Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
 }

@@ -11,6 +11,7 @@
 //! and fades it out where the unit is silent or the moment unlike the training. `examples/learn_understeer.rs` trains a
 //! model and asks it.
 
+mod agreement;
 mod architecture;
 mod checkpoint;
 mod correction;
@@ -25,10 +26,9 @@ mod split;
 mod training;
 
 pub use architecture::{AXES, Answer, Architecture, CURVATURE_MAX_PER_M, SPEED_MAX_MPS, Sensing, WINDOW};
-pub use checkpoint::{Checkpoint, CheckpointError, Sidecar, Standardisation, Tensor};
-pub use correction::{
-    Corrected, CorrectionConfig, CorrectionConfigError, CorrectionCounts, Corrector, Uncorrected,
-};
+pub use checkpoint::{Checkpoint, Sidecar, Standardisation};
+pub use correction::{Corrected, CorrectionConfig, CorrectionCounts, Corrector, Effect, Reason, Uncorrected};
+pub use evidential::{CheckpointError, Tensor};
 pub use familiarity::Fade;
 pub use history::{ImuCounts, ImuFault, ImuHistory, ImuRange, PERIOD_NS};
 pub use label::{Example, LabelConfig, LabelCounts, SpeedSource, label};

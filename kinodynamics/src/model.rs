@@ -2,8 +2,9 @@
 
 use bicycle::lanes::Instructions;
 
+use crate::CheckpointError;
 use crate::architecture::{AXES, Answer, CURVATURE_MAX_PER_M, SPEED_MAX_MPS, WINDOW};
-use crate::checkpoint::{Checkpoint, CheckpointError};
+use crate::checkpoint::Checkpoint;
 use crate::dense::Dense;
 use crate::familiarity::Familiarity;
 

@@ -181,7 +181,7 @@ impl Default for Config {
 impl Config {
     /// The work of the hand-written speed bound: time to goal with latch, attitude limits, white noise on the
     /// controls, instant actuators, fixed temperature.
-    pub fn bound() -> Self {
+    pub fn minimal() -> Self {
         Self {
             sampling: Sampling {
                 space: SampleSpace::Controls,

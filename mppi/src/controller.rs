@@ -362,10 +362,10 @@ impl<M: Driven, S: StepCost, R: RolloutCost> Controller<M, S, R> {
             self.is_fresh = true;
             return Decision::Stop(StopReason::NonFiniteResult);
         }
-        if !self.may_drive(input, self.plan.nominal.iter().copied()) {
+        if let Err(reason) = self.check(input, self.plan.nominal.iter().copied()) {
             let Some((chunk, lane)) = self.best_that_may_be_driven(input) else {
                 self.plan.hold(M::Command::from(self.plan.nominal[0]).at_standstill().into());
-                return Decision::Stop(StopReason::NoFeasibleRollout);
+                return Decision::Stop(reason);
             };
             let controls = self.chunks[chunk].controls_of(lane);
             self.plan.nominal.iter_mut().zip(controls).for_each(|(nominal, control)| *nominal = control);
@@ -379,21 +379,30 @@ impl<M: Driven, S: StepCost, R: RolloutCost> Controller<M, S, R> {
         let mut ranking = std::mem::take(&mut self.ranking);
         let best = ranking
             .first(MOST_JUDGED, &self.chunks[..self.n_used])
-            .find(|&(chunk, lane)| self.may_drive(input, self.chunks[chunk].controls_of(lane)));
+            .find(|&(chunk, lane)| self.check(input, self.chunks[chunk].controls_of(lane)).is_ok());
         self.ranking = ranking;
         best
     }
 
-    /// Whether controls keep the limits of attitude for as long as the vehicle would need to stop.
-    fn may_drive(
+    /// Whether controls keep the limits of attitude for as long as the vehicle would need to stop, and lead nowhere that is
+    /// forbidden; else the reason to stop.
+    fn check(
         &self,
         input: &Input<'_, MotionState>,
         controls: impl Iterator<Item = Control> + Clone,
-    ) -> bool {
+    ) -> Result<(), StopReason> {
         let judge = self.judge_over(input.map);
         let n_steps = self.steps_to_stop(controls.clone().next().unwrap_or_default());
         let mut memory = self.slots.map(f64::from);
-        !judge.breaks_limits(&self.start, controls.take(n_steps), &mut memory)
+        if judge.breaks_limits(&self.start, controls.clone().take(n_steps), &mut memory) {
+            return Err(StopReason::NoFeasibleRollout);
+        }
+        let Some(foresight_s) = self.step_cost.foresight_s() else { return Ok(()) };
+        let n_steps = n_steps + (foresight_s / self.config.step_s).ceil() as usize;
+        let mut memory = self.slots.map(f64::from);
+        let is_forbidden = |t: usize, state: &MotionState| self.step_cost.forbids(t, state);
+        let meets = judge.leads(&self.start, controls.take(n_steps), &mut memory, is_forbidden);
+        if meets { Err(StopReason::MovingObstacle) } else { Ok(()) }
     }
 
     /// The reference model over a map.

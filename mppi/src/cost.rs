@@ -148,6 +148,18 @@ pub trait StepCost: Send + Sync {
         end.lanes().real(0.0)
     }
 
+    /// Whether a plan that leads to this state with its step `t`, counted from 0, may not be driven. Asked in double
+    /// precision, where [`StepCost::foresight_s`] says so. Where no plan is left the decision is to stop, for
+    /// [`bicycle::StopReason::MovingObstacle`].
+    fn forbids(&self, _t: usize, _state: &MotionState) -> bool {
+        false
+    }
+
+    /// How far beyond the time that it takes to stop plans are to be looked at [s]; `None` where nothing is forbidden.
+    fn foresight_s(&self) -> Option<f64> {
+        None
+    }
+
     /// Rolls out some futures.
     #[doc(hidden)]
     fn roll_out<M: Driven>(job: Job<'_, M::Stepper, Self>)

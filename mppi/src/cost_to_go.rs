@@ -195,7 +195,7 @@ impl CostToGo {
         }
         self.queue.restart((self.geometry.resolution_m / f64::from(self.speed_max_mps)) as f32);
         self.seed(goal_m);
-        self.settle();
+        self.search_outwards();
         for (row, seconds) in self.seconds.chunks_exact_mut(self.n_cols).enumerate() {
             let start = (row + PADDING) * (self.n_cols + 2 * PADDING) + PADDING;
             seconds.copy_from_slice(&self.labels_s[start..start + self.n_cols]);
@@ -324,7 +324,7 @@ impl CostToGo {
     }
 
     /// Dijkstra's algorithm from the goal outwards: an edge leads from `from` to the cell just taken out.
-    fn settle(&mut self) {
+    fn search_outwards(&mut self) {
         let stride = (self.n_cols + 2 * PADDING) as isize;
         let resolution_m = self.geometry.resolution_m as f32;
         let edges = self.edges();

@@ -1,5 +1,6 @@
 //! Which motion models a controller can drive.
 
+use crate::discs::MovingDiscs;
 use crate::rollout::Job;
 use bicycle::{Model, MotionModel, SkidSteer};
 
@@ -11,16 +12,30 @@ pub trait Driven: MotionModel {
     fn roll_out(job: Job<'_, Self::Stepper, ()>) {
         job.run();
     }
+
+    /// The same among discs that move.
+    #[doc(hidden)]
+    fn roll_out_among(job: Job<'_, Self::Stepper, MovingDiscs>) {
+        job.run();
+    }
 }
 
 impl Driven for Model {
     fn roll_out(job: Job<'_, Self::Stepper, ()>) {
         job.run();
     }
+
+    fn roll_out_among(job: Job<'_, Self::Stepper, MovingDiscs>) {
+        job.run();
+    }
 }
 
 impl Driven for SkidSteer {
     fn roll_out(job: Job<'_, Self::Stepper, ()>) {
+        job.run();
+    }
+
+    fn roll_out_among(job: Job<'_, Self::Stepper, MovingDiscs>) {
         job.run();
     }
 }

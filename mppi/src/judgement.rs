@@ -60,6 +60,21 @@ impl<S: MotionStepper> Judge<'_, S> {
         self.map.risk_at(state.x_m, state.y_m, state.yaw_rad)
     }
 
+    /// Whether a step of the controls leads where `is_there` says, asked of each with its number.
+    pub(crate) fn leads(
+        &self,
+        start: &MotionState,
+        controls: impl Iterator<Item = Control>,
+        memory: &mut [f64],
+        is_there: impl Fn(usize, &MotionState) -> bool,
+    ) -> bool {
+        let mut state = *start;
+        controls.enumerate().any(|(t, control)| {
+            state = self.step(&state, control, memory, t);
+            is_there(t, &state)
+        })
+    }
+
     /// Whether the controls lead over a limit of attitude. A vehicle that stands beyond a limit may leave: its first
     /// poses count only where the ground leans beyond the limit and more than where it stands. What blocks a pose is no
     /// leaning: who leaves an obstacle does not come onto steeper ground for it.

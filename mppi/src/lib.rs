@@ -5,7 +5,7 @@
 //! A [`Controller`] takes an [`Input`] every cycle, state, risk map and [`Objective`], and gives a decision. It
 //! allocates nothing after its first cycle, and the decision is a function of the inputs, the [`Config`] and the seed,
 //! bit for bit, for any number of threads. The vehicle's model is a type, [`bicycle::Model`] unless another is given;
-//! costs of one's own plug in as [`StepCost`] and [`RolloutCost`]; settings may change between decisions, see
+//! costs of one's own plug in as [`StepCost`] and [`RolloutCost`], [`MovingDiscs`] is one of what moves; settings may change between decisions, see
 //! [`Controller::set_config`]. [`CostToGo`] finds the least time to the goal over the same map.
 //! `examples/drive_constant_map.rs` drives a whole way, `examples/own_costs.rs` with costs of its own.
 //!
@@ -46,6 +46,7 @@ mod controller;
 mod cost;
 mod cost_to_go;
 mod diagnostics;
+mod discs;
 mod driven;
 mod judgement;
 mod kernel;
@@ -67,6 +68,7 @@ pub use controller::{Controller, Phase};
 pub use cost::{Future, Place, RolloutCost, Step, StepCost};
 pub use cost_to_go::{CostToGo, CostToGoConfig, CostToGoError, CostToGoView, Neighbourhood};
 pub use diagnostics::{CostTerm, Diagnostics};
+pub use discs::{Disc, DiscPrices, MovingDiscs, Outline};
 pub use driven::Driven;
 pub use objective::{Input, Objective, ReferencePath, Terminal};
 pub use replay::Rollout;

@@ -12,6 +12,8 @@ use traversability::RiskMapView;
 pub struct Rollout<S = State> {
     /// Its cost [s].
     pub cost_s: f32,
+    /// Its share in the average of all rollouts of the cycle; the shares of all sum to one.
+    pub weight: f32,
     /// Its states, the start first.
     pub states: Vec<S>,
 }
@@ -35,8 +37,9 @@ impl<M: Driven, S: StepCost, R: RolloutCost> Controller<M, S, R> {
         }
         order.sort_by(|a, b| a.0.total_cmp(&b.0));
         let rollout = |&(cost_s, index, lane): &(f32, usize, usize)| {
-            let states = self.trajectory(map, self.chunks[index].controls_of(lane));
-            Rollout { cost_s, states }
+            let chunk = &self.chunks[index];
+            let weight = chunk.weights.0[lane] / self.diagnostics().normalizer;
+            Rollout { cost_s, weight, states: self.trajectory(map, chunk.controls_of(lane)) }
         };
         order.iter().take(n).map(rollout).collect()
     }

@@ -41,6 +41,15 @@ pub(crate) struct Scene<'a, S, C> {
     pub(crate) keeps_ends: bool,
 }
 
+impl<S, C> Scene<'_, S, C> {
+    /// The same with another cost.
+    pub(crate) fn with_cost<'b, D>(&'b self, cost: &'b D) -> Scene<'b, S, D> {
+        let Self { stepper, grid, start, leaning_start_rad, slots, prices, task, frame, keeps_ends, .. } =
+            *self;
+        Scene { stepper, grid, start, leaning_start_rad, slots, prices, task, cost, frame, keeps_ends }
+    }
+}
+
 /// The risk map in numbers of cells.
 #[derive(Clone, Copy)]
 pub(crate) struct Grid<'a> {
@@ -313,9 +322,9 @@ fn roll_packs<K: Kernel, P: MotionStepper, C: StepCost, S: Stage<K>, M: Motion, 
                 fly.step::<M>(&mut flights[1], &mut memory[1], first + K::WIDTH);
             }
         }
-        settle::<K, P, C, S, M>((scene, stage), flights[0], chunk, first);
+        store_costs::<K, P, C, S, M>((scene, stage), flights[0], chunk, first);
         if G == 2 {
-            settle::<K, P, C, S, M>((scene, stage), flights[1], chunk, first + K::WIDTH);
+            store_costs::<K, P, C, S, M>((scene, stage), flights[1], chunk, first + K::WIDTH);
         }
     }
 }
@@ -420,7 +429,7 @@ fn watch_attitude<K: Kernel, P, C, M: Motion>(
 
 /// Writes the costs of a pack that has arrived.
 #[inline(always)]
-fn settle<K: Kernel, P, C: StepCost, S: Stage<K>, M: Motion>(
+fn store_costs<K: Kernel, P, C: StepCost, S: Stage<K>, M: Motion>(
     (scene, stage): (&Scene<'_, P, C>, &S),
     flight: Flight<K>,
     chunk: &mut Chunk,

@@ -4,7 +4,10 @@ mod fixture;
 
 use bicycle::effect::{CATALOGUE, SpeedLag, SteerDelay};
 use bicycle::{Decision, Effect, State};
-use mppi::{Config, Controller, CostToGo, CostToGoConfig, Costs, Input, Objective, Terminal};
+use mppi::{
+    Config, Controller, CostToGo, CostToGoConfig, Costs, Disc, DiscPrices, Input, MovingDiscs, Objective,
+    Outline, Terminal,
+};
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -46,7 +49,7 @@ fn a_decision_allocates_nothing() {
     with_all.effects = every.collect();
     let delayed = Config { delay_s: 0.15, n_iterations: 2, n_threads: 3, ..Config::default() };
     let cases = [
-        (Config::bound(), fixture::model()),
+        (Config::minimal(), fixture::model()),
         (Config::default(), fixture::model()),
         (Config { n_threads: 2, ..Config::default() }, with_effects.clone()),
         (delayed, with_effects),
@@ -56,12 +59,21 @@ fn a_decision_allocates_nothing() {
     for (config, model) in cases {
         let mut field = CostToGo::new(CostToGoConfig::default(), &model.limits, 160, 160).unwrap();
         field.update(map.view(), [15.0, 10.0]).unwrap();
-        let mut controller = Controller::new(config, model, 1).unwrap();
+        let prices = DiscPrices { touch_s: 1.0, near_s: 0.1, foresight_s: 0.5 };
+        let discs = MovingDiscs::new(Outline::default(), prices, 4, config.n_steps);
+        let mut controller = Controller::with_costs(config, model, (discs, ()), 1).unwrap();
         let mut n_drives = 0;
         let mut decide = |cycle: u64| {
             let terminal = Terminal::CostToGo(field.view());
             let objective = Objective::Goal { goal_m: [15.0, 10.0], tolerance_m: 0.5, terminal };
             let input = Input { state: State::default(), elapsed_s: 0.1, map: map.view(), objective, cycle };
+            // Something crosses every other cycle.
+            let discs = controller.step_cost_mut();
+            discs.clear();
+            if cycle.is_multiple_of(2) {
+                let at = |t: usize| [3.0, 0.1 * t as f64 - 2.0];
+                discs.add(|t| Disc { centre_m: at(t), radius_m: 0.3, margin_m: 0.5 });
+            }
             n_drives += usize::from(matches!(controller.decide(&input), Decision::Drive(_)));
         };
         decide(0);

@@ -29,7 +29,7 @@ fn commands(config: &Config, model: &Model, map: &RiskMap) -> Vec<[u32; 2]> {
 #[test]
 fn any_number_of_threads_gives_the_same_bits() {
     let map = rough(5);
-    for base in [Config::default(), Config::bound()] {
+    for base in [Config::default(), Config::minimal()] {
         for model in [model(), with_effects()] {
             let of = |n_threads: usize| commands(&Config { n_threads, ..base.clone() }, &model, &map);
             let alone = of(1);

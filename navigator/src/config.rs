@@ -1,12 +1,13 @@
 //! Settings of the whole pipeline, and the ones that fit a machine.
 
 use bicycle::{Geometry, Vehicle};
+use kinodynamics::CorrectionConfig;
 use mppi::CostToGoConfig;
 use physics_prior::{PriorConfig, SlopeLaw};
 use serde::{Deserialize, Serialize};
 use terrain::{BodyBox, ElevationConfig, Mount};
 
-use crate::{Areas, GuardConfig, NavigatorError};
+use crate::{Areas, GuardConfig, MovingConfig, NavigatorError};
 
 /// Vehicles below this length cannot look over what hides ground from them [m].
 const SMALL_LENGTH_M: f64 = 1.0;
@@ -39,6 +40,12 @@ pub struct Config {
     /// Range sensors whose scans come in their own frames, numbered from 1; scans of number 0 come in the body frame.
     #[serde(default)]
     pub sensors: Vec<Mount>,
+    /// What moves: left out, nothing is taken to.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub moving: Option<MovingConfig>,
+    /// How far whoever corrects commands for the ground may go.
+    #[serde(default)]
+    pub correction: CorrectionConfig,
 }
 
 /// Window of the risk map; its cells are whole multiples of the elevation map's.
@@ -107,6 +114,8 @@ impl Config {
             attitude_share: 0.9,
             areas: Areas::default(),
             sensors: Vec::new(),
+            moving: None,
+            correction: CorrectionConfig::default(),
         }
     }
 
@@ -115,11 +124,17 @@ impl Config {
         self.elevation.resolution_m * self.risk_map.elevation_cells as f64
     }
 
-    /// Refuses the first field of this crate's own that is out of range.
-    pub(crate) fn validate(&self) -> Result<(), NavigatorError> {
+    /// Refuses the first field of this crate's own that is out of range; the parts are checked by whoever is made of them.
+    ///
+    /// # Errors
+    /// The field, with what would do and what was found.
+    pub fn validate(&self) -> Result<(), NavigatorError> {
         match self.first_invalid() {
             Some((field, expected, found)) => Err(NavigatorError::Config { field, expected, found }),
-            None => self.areas.validate(),
+            None => {
+                self.correction.validate().map_err(NavigatorError::Correction)?;
+                self.areas.validate()
+            }
         }
     }
 
@@ -153,6 +168,7 @@ impl Config {
                 .iter()
                 .find_map(Mount::first_invalid)
                 .map(|(field, found)| (field, "a finite number", found)))
+            .or(self.moving.as_ref().and_then(MovingConfig::first_invalid))
     }
 }
 

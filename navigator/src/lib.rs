@@ -14,6 +14,7 @@ mod areas;
 mod assessor;
 mod choice;
 mod config;
+mod correction;
 mod frame;
 mod guard;
 mod input_ledger;
@@ -21,6 +22,7 @@ mod jump;
 mod leader;
 mod message;
 mod mission;
+mod moving;
 mod navigator;
 mod pilot;
 mod risk;
@@ -37,13 +39,16 @@ pub use guard::{Admitted, Guard, GuardConfig};
 pub use jump::Jump;
 pub use leader::Leader;
 pub use message::{
-    Activity, DecisionMessage, MessageId, MissionMessage, OdometryMessage, PathWindow, RiskAuthor,
-    RiskHeader, RiskMessage, RiskMessages, ScanMessage, StuckMessage, SurfaceHeader, TIMELESS_NS,
+    Activity, Correction, DecisionMessage, MessageId, MissionMessage, OdometryMessage, PathWindow,
+    RiskHeader, RiskMapSource, RiskMessage, RiskMessages, ScanMessage, StuckMessage, SurfaceHeader,
+    TIMELESS_NS, TracksMessage,
 };
 pub use mission::{Instruction, Mission, Order, OrderRefusal, Said, Stage, Target};
+pub use moving::MovingConfig;
 pub use navigator::{Navigator, NavigatorError, Setup, Surface};
 pub use pilot::{Destination, Pilot, PilotAges};
 pub use risk::{Belief, RiskOracle, StuckPose};
+pub use risk_estimator::RiskEstimator;
 pub use route::{CORNERS_MAX, Route, RouteError};
 pub use surveyor::{ScanTally, Surveyor};
 pub use track::Whereabouts;

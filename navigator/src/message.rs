@@ -2,8 +2,10 @@
 //! whatever carries them. Times are nanoseconds on the clock of the measurements.
 
 use bicycle::{Applied, Command, Decision, HoldReason, MotionCommand, Odometry, State, StopReason};
+use kinodynamics::Corrected;
 use mppi::{CostToGoView, ReferencePath};
 use terrain::Scan;
+use tracking::{TRACKS_MAX, Track};
 use traversability::{CvarLevel, RiskMapView};
 
 use crate::{CORNERS_MAX, Destination, Instruction, Jump, Mission, Stage, StuckPose, Target};
@@ -66,6 +68,45 @@ pub struct SurfaceHeader {
     pub shift: Jump,
 }
 
+/// What moves, as the last scan shows it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TracksMessage {
+    /// Its name.
+    pub id: MessageId,
+    /// When the scan was taken [ns].
+    pub valid_at_ns: u64,
+    /// The scan.
+    pub scan: MessageId,
+    /// When the odometry was measured in whose frame they lie [ns].
+    pub frame_at_ns: u64,
+    n: usize,
+    tracks: [Track; TRACKS_MAX],
+}
+
+impl TracksMessage {
+    /// Of these tracks; of more than there is room for, the first. Those that are no numbers are left out: nothing can be
+    /// said of where such a thing will be.
+    pub fn new(
+        id: MessageId,
+        (scan, valid_at_ns): (MessageId, u64),
+        frame_at_ns: u64,
+        moving: &[Track],
+    ) -> Self {
+        let tracks = [Track::default(); TRACKS_MAX];
+        let mut message = Self { id, valid_at_ns, scan, frame_at_ns, n: 0, tracks };
+        for (room, track) in message.tracks.iter_mut().zip(moving.iter().filter(|track| track.is_sound())) {
+            *room = *track;
+            message.n += 1;
+        }
+        message
+    }
+
+    /// The tracks, in the map frame.
+    pub fn tracks(&self) -> &[Track] {
+        &self.tracks[..self.n]
+    }
+}
+
 /// What a risk map says of itself.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RiskHeader {
@@ -103,7 +144,7 @@ pub struct RiskMessages<'a> {
 
 /// Who made a risk map.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum RiskAuthor {
+pub enum RiskMapSource {
     /// Whoever judges the ground as the method says.
     Learned,
     /// Physics alone.
@@ -166,10 +207,19 @@ pub struct MissionMessage {
     pub level: Option<CvarLevel>,
 }
 
+/// How a command was corrected for the ground.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Correction<C = Command> {
+    /// The command as the controller planned it.
+    pub planned: C,
+    /// What became of it.
+    pub corrected: Corrected,
+}
+
 /// A decision with all that it was made from.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DecisionMessage<C = Command> {
-    /// What was decided.
+    /// What was decided, as it goes to the vehicle.
     pub decision: Decision<C>,
     /// Number of the decision since the pilot began.
     pub cycle: u64,
@@ -180,9 +230,11 @@ pub struct DecisionMessage<C = Command> {
     /// When the odometry was measured that it was decided on [ns]; 0 = none.
     pub odometry_at_ns: u64,
     /// The risk map that it was made on.
-    pub risk: Option<(RiskAuthor, RiskHeader)>,
+    pub risk: Option<(RiskMapSource, RiskHeader)>,
     /// The newest risk map of each author that there was to choose from: learned, physics.
     pub held: [MessageId; 2],
+    /// What was known last of what moves.
+    pub tracks: MessageId,
     /// What was said last of where to go.
     pub mission: MessageId,
     /// Where to go; nowhere to stand.
@@ -191,6 +243,11 @@ pub struct DecisionMessage<C = Command> {
     pub n_rollouts: usize,
     /// Time since the decision before [s].
     pub elapsed_s: f64,
+    /// What whoever corrects commands for the ground made of the planned one; none of a decision to stand.
+    pub correction: Option<Correction<C>>,
+    /// The message of the inertial measurement unit that was taken in last, and how many were since the decision before,
+    /// without a gap up to the last.
+    pub imu: (MessageId, u64),
     /// Where the vehicle was found stuck, and when the odometry was measured that says so [ns].
     pub stuck: Option<(u64, StuckPose)>,
     /// State that it was made for.

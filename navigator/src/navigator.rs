@@ -5,8 +5,9 @@ mod risk_publisher;
 
 use std::collections::BTreeMap;
 
-use bicycle::{Applied, AppliedBy, Decision, Geometry, Model, Odometry, StopReason};
-use mppi::{Controller, Driven};
+use bicycle::{Applied, AppliedBy, Decision, Geometry, ImuSample, Model, Odometry, StopReason};
+use kinodynamics::Corrector;
+use mppi::{Controller, Driven, MovingDiscs};
 use terrain::{GridMap, Scan, SurfaceCell};
 use traversability::{CvarLevel, RiskMapView};
 
@@ -63,11 +64,14 @@ pub enum NavigatorError {
         found: f64,
     },
     /// The elevation map refused its settings.
-    #[error(transparent)]
-    Elevation(#[from] terrain::ElevationConfigError),
+    #[error("elevation map: {0}")]
+    Elevation(#[from] terrain::SettingError),
     /// The window of the risk map cannot be placed there.
     #[error(transparent)]
     Distant(#[from] terrain::DistantPosition),
+    /// What moves cannot be tracked so.
+    #[error(transparent)]
+    Tracking(#[from] tracking::TrackingConfigError),
     /// The elevation map refused a pose.
     #[error(transparent)]
     Fuse(#[from] terrain::FuseError),
@@ -77,6 +81,12 @@ pub enum NavigatorError {
     /// The cost-to-go field cannot be made.
     #[error(transparent)]
     CostToGo(#[from] mppi::CostToGoError),
+    /// What corrects commands for the ground refused its settings.
+    #[error("correction.{0}")]
+    Correction(terrain::SettingError),
+    /// What corrects commands for the ground cannot be made of these networks.
+    #[error(transparent)]
+    Corrector(#[from] kinodynamics::CheckpointError),
     /// The controller refused its settings.
     #[error(transparent)]
     Controller(#[from] mppi::ConfigError),
@@ -115,6 +125,17 @@ pub struct Navigator<M: Driven = Model> {
     n_missions: u64,
     n_orders: u64,
     n_stuck: u64,
+    n_imu: u64,
+}
+
+impl Navigator<Model> {
+    /// The same with somebody who corrects commands for the ground; see [`Pilot::with_corrector`].
+    ///
+    /// # Errors
+    /// Networks or settings that make no corrector.
+    pub fn with_corrector(self, checkpoint: &kinodynamics::Checkpoint) -> Result<Self, NavigatorError> {
+        Ok(Self { pilot: self.pilot.with_corrector(checkpoint)?, ..self })
+    }
 }
 
 impl<M: Driven> Navigator<M> {
@@ -129,7 +150,8 @@ impl<M: Driven> Navigator<M> {
             leader: Leader::new(mission, &config.guard, sensors, MISSION_PERIOD_NS),
             surveyor: Surveyor::new(geometry, config.elevation, config.guard, surface)?
                 .with_sensors(sensors)
-                .with_mounts(config.sensors.clone()),
+                .with_mounts(config.sensors.clone())
+                .with_moving(config.moving.as_ref())?,
             learned: RiskPublisher::new(Assessor::new(
                 geometry,
                 model.motion_limits(),
@@ -146,6 +168,7 @@ impl<M: Driven> Navigator<M> {
             n_missions: 0,
             n_orders: 1,
             n_stuck: 0,
+            n_imu: 0,
         })
     }
 
@@ -195,6 +218,15 @@ impl<M: Driven> Navigator<M> {
             self.assess()?;
         }
         Ok(decision)
+    }
+
+    /// Hands what the inertial measurement unit measured to whoever corrects commands, in the order of time.
+    pub fn hear_imu(&mut self, samples: &[ImuSample]) {
+        self.n_imu += 1;
+        let id = MessageId { epoch_ns: EPOCH_NS, sequence: self.n_imu };
+        if self.pilot.corrector().is_some() {
+            self.mail.imu(id, samples.to_vec());
+        }
     }
 
     /// Hands odometry to all parts.
@@ -263,6 +295,7 @@ impl<M: Driven> Navigator<M> {
         let id = MessageId { epoch_ns: EPOCH_NS, sequence: self.n_surfaces };
         let header = SurfaceHeader { id, ..header };
         self.mail.surface(header);
+        self.mail.tracks_to_pilot = self.surveyor.tracks(&header).or(self.mail.tracks_to_pilot);
         let Some((physics, stand_in)) = &mut self.physics else { return Ok(()) };
         physics.hear_surface(&header);
         if stand_in.is_needed(now_ns) {
@@ -292,8 +325,14 @@ impl<M: Driven> Navigator<M> {
         for message in self.mail.to_pilot.drain(..) {
             self.pilot.hear_odometry(&message);
         }
+        for (id, samples) in self.mail.to_corrector.drain(..) {
+            self.pilot.hear_imu(id, samples);
+        }
         if let Some(mission) = self.mail.mission_to_pilot.take() {
             self.pilot.hear_mission(&mission);
+        }
+        if let Some(tracks) = self.mail.tracks_to_pilot.take() {
+            self.pilot.hear_tracks(&tracks);
         }
         let maps = RiskMessages {
             learned: self.learned.message(),
@@ -340,8 +379,13 @@ impl<M: Driven> Navigator<M> {
     }
 
     /// The controller, for its diagnostics and rollouts.
-    pub fn controller(&self) -> &Controller<M> {
+    pub fn controller(&self) -> &Controller<M, MovingDiscs> {
         self.pilot.controller()
+    }
+
+    /// Whoever corrects commands for the ground, for what became of them.
+    pub fn corrector(&self) -> Option<&Corrector> {
+        self.pilot.corrector()
     }
 
     /// How often the localisation corrected itself by a jump.

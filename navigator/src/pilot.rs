@@ -2,19 +2,25 @@
 
 use std::collections::BTreeMap;
 
-use bicycle::{Applied, AppliedBy, Decision, HoldReason, Model, MotionState, Odometry, StopReason};
-use mppi::{Controller, CostToGoView, Driven, Input, Objective, ReferencePath, Terminal};
+use bicycle::lanes::Instructions;
+use bicycle::{
+    Applied, AppliedBy, Decision, HoldReason, ImuSample, Model, MotionState, Odometry, StopReason,
+};
+use kinodynamics::{Checkpoint, Corrector};
+use mppi::{Controller, CostToGoView, Driven, Input, MovingDiscs, Objective, ReferencePath, Terminal};
 use traversability::RiskMapView;
 
 use crate::choice::is_learned;
+use crate::correction::Between;
 use crate::guard::Admitted;
 use crate::input_ledger::InputLedger;
 use crate::message::TIMELESS_NS;
+use crate::moving::{Horizon, MovingConfig, lay_out};
 use crate::risk::StuckPose;
 use crate::route::PATH_END_SHARE;
 use crate::{
-    CORNERS_MAX, Config, DecisionMessage, Instruction, Jump, MissionMessage, NavigatorError, OdometryMessage,
-    RiskAuthor, RiskHeader, RiskMessage, RiskMessages, Target,
+    CORNERS_MAX, Config, DecisionMessage, Instruction, Jump, MessageId, MissionMessage, NavigatorError,
+    OdometryMessage, RiskHeader, RiskMapSource, RiskMessage, RiskMessages, Target, TracksMessage,
 };
 
 /// What the pilot drives on.
@@ -60,7 +66,12 @@ pub struct Pilot<M: Driven = Model> {
     ledger: InputLedger,
     ages: PilotAges,
     mission: Option<MissionMessage>,
-    controller: Controller<M>,
+    controller: Controller<M, MovingDiscs>,
+    /// How what moves is dealt with, and how old it may be that is known of it [s].
+    moving: Option<(MovingConfig, f64)>,
+    tracks: Option<TracksMessage>,
+    correction: kinodynamics::CorrectionConfig,
+    between: Between,
     /// Of the map that the controller was asked on last, in whose frame it remembers places [ns].
     map_frame_at_ns: Option<u64>,
     /// Corners of a path in the frame of the map; their memory is kept.
@@ -71,16 +82,36 @@ pub struct Pilot<M: Driven = Model> {
     stuck: Option<StuckPose>,
 }
 
+impl Pilot<Model> {
+    /// The same with somebody between the controller and the vehicle who corrects commands for the ground under the wheels,
+    /// as far as the configuration lets it.
+    ///
+    /// # Errors
+    /// Networks that make no corrector, and an instruction set that this machine lacks.
+    pub fn with_corrector(self, checkpoint: &Checkpoint) -> Result<Self, NavigatorError> {
+        let isa = self.controller.config().isa;
+        let instructions = Instructions::find(isa).map_err(mppi::ConfigError::from)?;
+        let corrector = Corrector::new(checkpoint, self.correction, instructions)?;
+        Ok(Self { between: Between::new(Some(corrector)), ..self })
+    }
+}
+
 impl<M: Driven> Pilot<M> {
     /// A pilot that knows nothing yet.
     pub fn new(model: M, config: &Config, seed: u64) -> Result<Self, NavigatorError> {
         config.validate()?;
         let model = model.with_attitude_share(config.attitude_share);
+        let (own_body, n_steps) = (&config.elevation.own_body, config.controller.n_steps);
+        let discs = config.moving.map_or_else(MovingDiscs::default, |moving| moving.discs(own_body, n_steps));
         Ok(Self {
             ledger: InputLedger::new(&config.guard, model.sensors()),
             ages: PilotAges::default(),
             mission: None,
-            controller: Controller::new(config.controller.clone(), model, seed)?,
+            controller: Controller::with_costs(config.controller.clone(), model, (discs, ()), seed)?,
+            moving: config.moving.map(|moving| (moving, config.guard.scan_age_max_s)),
+            tracks: None,
+            correction: config.correction,
+            between: Between::new(None),
             map_frame_at_ns: None,
             corners_m: Vec::with_capacity(CORNERS_MAX),
             decided_at_ns: None,
@@ -99,9 +130,25 @@ impl<M: Driven> Pilot<M> {
     /// decision.
     pub fn hear_odometry(&mut self, message: &OdometryMessage<M::Command>) {
         self.note_applied(&message.applied);
-        if let Ok(Admitted::ClockSetBack) = self.ledger.take(message) {
-            self.map_frame_at_ns = None;
+        if let Ok(admitted) = self.ledger.take(message) {
+            self.between.note(admitted);
+            if admitted == Admitted::ClockSetBack {
+                self.map_frame_at_ns = None;
+                self.tracks = None;
+            }
         }
+    }
+
+    /// Takes in what moves. What is older than what is known is no news.
+    pub fn hear_tracks(&mut self, tracks: &TracksMessage) {
+        if self.tracks.is_none_or(|known| known.valid_at_ns < tracks.valid_at_ns) {
+            self.tracks = Some(*tracks);
+        }
+    }
+
+    /// Takes in what the inertial measurement unit measured, in the order of time.
+    pub fn hear_imu(&mut self, id: MessageId, samples: impl IntoIterator<Item = ImuSample>) {
+        self.between.hear_imu(id, samples);
     }
 
     /// Takes in what the vehicle is told to do. It counts until it is said again, or is too old.
@@ -133,6 +180,11 @@ impl<M: Driven> Pilot<M> {
             Instruction::Stand(_) => None,
         };
         let decision = self.decide(now_ns, used.map(|(.., risk)| risk), &instruction);
+        let (decision, correction) = self.between.correct(decision, self.ledger.odometry(), now_ns);
+        if let Decision::Drive(sent) = decision {
+            // The controller goes on from what was sent, not from what it planned.
+            self.controller.note_followed(sent, 0.0);
+        }
         // On maps of before a jump the vehicle was carried to where it stands there; the pose is one of now.
         let odometry_at_ns = self.ledger.frame_at_ns();
         let id_of = |map: &Option<RiskMessage<'_>>| map.map_or_else(Default::default, |map| map.header.id);
@@ -144,23 +196,26 @@ impl<M: Driven> Pilot<M> {
             odometry_at_ns,
             risk: used.map(|(author, header, _)| (author, header)),
             held: [id_of(&maps.learned), id_of(&maps.physics)],
+            tracks: self.tracks.map_or_else(Default::default, |tracks| tracks.id),
             mission: mission.map_or_else(Default::default, |mission| mission.id),
             destination,
             n_rollouts: self.controller.n_rollouts(),
             elapsed_s: self.elapsed_s,
+            correction,
+            imu: self.between.take_count(),
             stuck: self.stuck.take().map(|pose| (odometry_at_ns, pose)),
             state: self.ledger.odometry().map(Odometry::state).unwrap_or_default(),
         }
     }
 
     /// The map to drive on: what was learned while it is fresh, else whatever knows of the younger scan.
-    fn choose<'a>(&self, now_ns: u64, maps: &RiskMessages<'a>) -> Option<(RiskAuthor, RiskMessage<'a>)> {
+    fn choose<'a>(&self, now_ns: u64, maps: &RiskMessages<'a>) -> Option<(RiskMapSource, RiskMessage<'a>)> {
         let [learned_at_ns, physics_at_ns] =
             [maps.learned, maps.physics].map(|map| map.map(|map| map.header.valid_at_ns));
         if is_learned(learned_at_ns, physics_at_ns, now_ns, self.ages.learned_ns) {
-            maps.learned.map(|map| (RiskAuthor::Learned, map))
+            maps.learned.map(|map| (RiskMapSource::Learned, map))
         } else {
-            maps.physics.map(|map| (RiskAuthor::Physics, map))
+            maps.physics.map(|map| (RiskMapSource::Physics, map))
         }
     }
 
@@ -186,7 +241,10 @@ impl<M: Driven> Pilot<M> {
         self.elapsed_s =
             self.decided_at_ns.map_or(0.0, |then_ns| now_ns.saturating_sub(then_ns) as f64 * 1e-9);
         let decision = match self.ready(now_ns, risk, instruction) {
-            Ok((risk, odometry, target)) => self.ask(&risk, &odometry, &target),
+            Ok((risk, odometry, target)) => {
+                self.lay_out_tracks(now_ns, &risk);
+                self.ask(&risk, &odometry, &target)
+            }
             Err(decision) => {
                 self.controller.stand_by(&decision, self.elapsed_s);
                 decision
@@ -207,8 +265,13 @@ impl<M: Driven> Pilot<M> {
         self.controller.use_rollouts(n);
     }
 
+    /// Whoever corrects commands for the ground, for what became of them.
+    pub fn corrector(&self) -> Option<&Corrector> {
+        self.between.corrector()
+    }
+
     /// The controller, for its diagnostics and rollouts.
-    pub fn controller(&self) -> &Controller<M> {
+    pub fn controller(&self) -> &Controller<M, MovingDiscs> {
         &self.controller
     }
 
@@ -249,7 +312,27 @@ impl<M: Driven> Pilot<M> {
         };
         let (risk, odometry) =
             risk.zip(self.ledger.odometry().copied()).ok_or(Decision::Hold(HoldReason::NoMap))?;
+        self.check_tracks(now_ns)?;
         Ok((risk, odometry, target))
+    }
+
+    /// Nobody drives among people of whom nothing is known, or nothing any more.
+    fn check_tracks(&self, now_ns: u64) -> Result<(), Decision<M::Command>> {
+        let Some((_, age_max_s)) = self.moving else { return Ok(()) };
+        let tracks = self.tracks.ok_or(Decision::Hold(HoldReason::NoMap))?;
+        let age_s = now_ns.saturating_sub(tracks.valid_at_ns) as f64 * 1e-9;
+        if age_s > age_max_s { Err(Decision::Stop(StopReason::StaleScan)) } else { Ok(()) }
+    }
+
+    /// Tells the controller where what moves will be, in the frame of the map that it plans on.
+    fn lay_out_tracks(&mut self, now_ns: u64, risk: &RiskInput<'_>) {
+        let Some(((moving, _), tracks)) = self.moving.zip(self.tracks) else { return };
+        let shift = self.ledger.moved_between(tracks.frame_at_ns, risk.odometry_at_ns);
+        let step_s = self.controller.config().step_s;
+        let age_s = now_ns.saturating_sub(tracks.valid_at_ns) as f64 * 1e-9;
+        let begins_s = age_s + self.controller.config().delay_s;
+        let horizon = Horizon { begins_s, step_s, shift: shift.as_ref() };
+        lay_out(self.controller.step_cost_mut(), &tracks, &moving, &horizon);
     }
 
     fn ask(

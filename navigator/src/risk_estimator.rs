@@ -7,8 +7,8 @@ use physics_prior::{Assumption, PriorMap};
 use terrain::{CellRegion, GridGeometry, GridMap, SurfaceCell};
 use traversability::RiskMap;
 
-/// Makes a risk map of the surface and keeps it up to date.
-pub(crate) enum RiskEstimator {
+/// Makes a risk map of a surface and keeps it up to date, whoever judges the ground.
+pub enum RiskEstimator {
     /// The physics prior, or none.
     Prior(Box<PriorMap>),
     /// Networks, fused with a prior.
@@ -17,6 +17,9 @@ pub(crate) enum RiskEstimator {
 
 impl RiskEstimator {
     /// See [`PriorMap::new`].
+    ///
+    /// # Errors
+    /// As there.
     pub fn prior(
         geometry: &Geometry,
         assumption: &Assumption,
@@ -30,6 +33,9 @@ impl RiskEstimator {
     }
 
     /// See [`BeliefMap::new`].
+    ///
+    /// # Errors
+    /// As there.
     pub fn networks(
         geometry: &Geometry,
         learned: &Learned,
@@ -42,6 +48,7 @@ impl RiskEstimator {
         Ok(Self::Networks(Box::new(map)))
     }
 
+    /// The map as of the last update.
     pub fn risk_map(&self) -> &RiskMap {
         match self {
             Self::Prior(map) => map.risk_map(),
@@ -49,6 +56,7 @@ impl RiskEstimator {
         }
     }
 
+    /// Moves the window to another origin on the lattice of risk cells; the next update is a full one.
     pub fn place_at(&mut self, origin: [i64; 2]) {
         match self {
             Self::Prior(map) => map.place_at(origin),
@@ -56,6 +64,10 @@ impl RiskEstimator {
         }
     }
 
+    /// Takes over the whole surface. What lies beyond its window is unknown.
+    ///
+    /// # Errors
+    /// The surface has another resolution than the map was made for.
     pub fn update_all(&mut self, surface: &GridMap<SurfaceCell>) -> Result<(), BeliefMapError> {
         match self {
             Self::Prior(map) => Ok(map.update_all(surface)?),
@@ -63,6 +75,10 @@ impl RiskEstimator {
         }
     }
 
+    /// Takes over the cells of the surface that changed since the last update: the result is that of a full one.
+    ///
+    /// # Errors
+    /// The surface has another resolution than the map was made for.
     pub fn update_dirty(
         &mut self,
         surface: &GridMap<SurfaceCell>,

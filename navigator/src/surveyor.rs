@@ -4,16 +4,20 @@ use std::collections::{BTreeMap, VecDeque};
 
 use bicycle::{Geometry, MotionCommand, Odometry, SensorModel, StopReason};
 use terrain::{
-    AssumedGround, ElevationConfig, ElevationMap, Footprint, FuseError, FuseReport, GridMap, Mount, Pose,
-    Scan, SurfaceCell,
+    AssumedGround, BodyBox, ElevationConfig, ElevationMap, Footprint, FuseError, FuseReport, GridMap, Mount,
+    Pose, Scan, SurfaceCell,
 };
+use tracking::Tracker;
 
 use crate::guard::{Admitted, GuardConfig};
 use crate::input_ledger::InputLedger;
 use crate::jump::Jump;
 use crate::message::TIMELESS_NS;
 use crate::track::Whereabouts;
-use crate::{MessageId, NavigatorError, OdometryMessage, ScanMessage, Surface, SurfaceHeader};
+use crate::{
+    MessageId, MovingConfig, NavigatorError, OdometryMessage, ScanMessage, Surface, SurfaceHeader,
+    TracksMessage,
+};
 
 /// Scans that wait for the odometry after them; of more, the oldest is given up.
 const WAITING_MAX: usize = 4;
@@ -62,6 +66,8 @@ pub struct Surveyor {
     config: GuardConfig,
     ledger: InputLedger,
     mounts: Vec<Mount>,
+    own_body: BodyBox,
+    tracker: Option<Tracker>,
     waiting: VecDeque<Waiting>,
     elevation: ElevationMap,
     given: Option<GridMap<SurfaceCell>>,
@@ -96,6 +102,8 @@ impl Surveyor {
             config: guard,
             ledger: InputLedger::new(&guard, SensorModel::NEUTRAL),
             mounts: Vec::new(),
+            own_body: elevation.own_body,
+            tracker: None,
             waiting: VecDeque::with_capacity(WAITING_MAX),
             elevation: ElevationMap::new(elevation)?,
             given: match surface {
@@ -121,6 +129,12 @@ impl Surveyor {
     /// The same for scans that come in the frames of these sensors, numbered from 1.
     pub fn with_mounts(self, mounts: Vec<Mount>) -> Self {
         Self { mounts, ..self }
+    }
+
+    /// The same that tracks what moves, where somebody has said how.
+    pub fn with_moving(self, config: Option<&MovingConfig>) -> Result<Self, NavigatorError> {
+        let tracker = config.map(|config| Tracker::new(config.tracking, self.own_body)).transpose()?;
+        Ok(Self { tracker, ..self })
     }
 
     /// Takes in where the vehicle is. A jump of the localisation moves what was mapped, and makes a map of its own.
@@ -224,6 +238,19 @@ impl Surveyor {
         }
     }
 
+    /// What moves by the scan that a map ends with, under the map's name; `None` where nothing is tracked, and of a map that
+    /// follows a jump.
+    pub fn tracks(&self, header: &SurfaceHeader) -> Option<TracksMessage> {
+        let tracker = self.tracker.as_ref().filter(|_| header.jump.is_none())?;
+        let frame_at_ns = self.ledger.frame_at_ns();
+        Some(TracksMessage::new(header.id, self.last_scan?, frame_at_ns, tracker.moving()))
+    }
+
+    /// Who follows what moves, where somebody has said how.
+    pub fn tracker(&self) -> Option<&Tracker> {
+        self.tracker.as_ref()
+    }
+
     /// Takes in where the vehicle is; returns the jump of the localisation that it made out, which
     /// [`Surveyor::follow_jump`] then follows. Odometry that cannot be used has its reason.
     pub fn admit(&mut self, odometry: &Odometry) -> Result<Option<Jump>, StopReason> {
@@ -236,6 +263,7 @@ impl Surveyor {
             Admitted::Jumped(jump) => Some(jump),
             Admitted::ClockSetBack => {
                 self.elevation.forget_time();
+                self.tracker.iter_mut().for_each(Tracker::forget);
                 None
             }
             Admitted::Onward | Admitted::Again => None,
@@ -265,13 +293,24 @@ impl Surveyor {
         }
         self.ledger.note_scan(scan.valid_at_ns);
         self.assume_ground(odometry)?;
+        self.track(odometry, scan);
         Ok(true)
+    }
+
+    /// Follows what moves over the ground as it is known with the scan.
+    fn track(&mut self, odometry: &Odometry, scan: &Scan) {
+        let pose = self.pose(odometry);
+        let surface = self.given.as_ref().unwrap_or(self.elevation.surface());
+        if let Some(tracker) = &mut self.tracker {
+            tracker.observe(scan, &pose, surface);
+        }
     }
 
     /// The localisation moved, the vehicle did not: what was mapped moves along.
     pub fn follow_jump(&mut self, odometry: &Odometry, jump: &Jump) -> Result<(), NavigatorError> {
         self.n_jumps += 1;
         self.shift = self.shift.then(jump);
+        self.tracker.iter_mut().for_each(|tracker| tracker.carry(|pose| jump.pose(pose)));
         let after = self.pose(odometry);
         let [x_m, y_m, z_m] = jump.inverse().place_m([after.x_m, after.y_m, after.z_m]);
         let before = Pose { x_m, y_m, z_m, yaw_rad: after.yaw_rad - jump.yaw_rad, ..after };

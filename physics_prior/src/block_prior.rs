@@ -3,7 +3,7 @@
 use bicycle::lanes::Block;
 use traversability::{N_BINS, Risk};
 
-/// Poses of one yaw in cells of a row that lie [`crate::Ratio::n_phases`] apart.
+/// Poses of one yaw in cells of a row that lie [`crate::ResolutionRatio::n_phases`] apart.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PoseLine {
     /// The first one's cell by lattice indices: column, row.

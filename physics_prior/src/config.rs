@@ -2,6 +2,7 @@
 
 use bicycle::{AxleDemand, Geometry, Vehicle};
 use serde::{Deserialize, Serialize};
+use terrain::SettingError;
 
 /// Parameters of the physics prior (PIETRA, equations 15 to 18, and the extensions stated here).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -101,18 +102,6 @@ impl Default for PriorConfig {
     }
 }
 
-/// A parameter that makes no sense.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error("{field}: expected {expected}, found {found}")]
-pub struct PriorConfigError {
-    /// Name of the field.
-    pub field: &'static str,
-    /// The range that would do.
-    pub expected: &'static str,
-    /// The value that was given.
-    pub found: f64,
-}
-
 impl PriorConfig {
     /// The defaults with the height of vegetation scaled to the wheels: the paper's 0.2 m for 0.15 m diameter.
     pub fn for_vehicle(geometry: &Geometry) -> Self {
@@ -121,51 +110,50 @@ impl PriorConfig {
     }
 
     /// Refuses values outside their documented ranges.
-    pub fn validate(&self) -> Result<(), PriorConfigError> {
+    pub fn validate(&self) -> Result<(), SettingError> {
         let shares = [
             ("uniform_weight", self.uniform_weight),
             ("unknown_share_max", self.unknown_share_max),
             ("unknown_traction", self.unknown_traction),
             ("wheel_envelope", self.wheel_envelope),
         ];
-        check(&shares, "a number from 0 to 1", |v| (0.0..=1.0).contains(&v))?;
+        SettingError::check_finite(&shares, "a number from 0 to 1", |v| (0.0..=1.0).contains(&v))?;
         let angles = [
             ("linear_slope_max_rad", self.linear_slope_max_rad),
             ("angular_slope_max_rad", self.angular_slope_max_rad),
             ("attitude_spread_rad", self.attitude_spread_rad),
             ("unknown_attitude_rad", self.unknown_attitude_rad),
         ];
-        check(&angles, "an angle in radians above 0 and below pi/2", |v| {
+        SettingError::check_finite(&angles, "an angle in radians above 0 and below pi/2", |v| {
             v > 0.0 && v < std::f64::consts::FRAC_PI_2
         })?;
         let positive =
             [("vegetation_height_max_m", self.vegetation_height_max_m), ("evidence", self.evidence)];
-        check(&positive, "a finite number > 0", |v| v > 0.0)?;
+        SettingError::check_finite(&positive, "a finite number > 0", |v| v > 0.0)?;
         let clearances = [("high_centred_clearances", self.high_centred_clearances)];
-        check(&clearances, "a finite number > 1", |v| v > 1.0)?;
-        check(&[("obstacle_margin_m", self.obstacle_margin_m)], "a finite number >= 0", |v| v >= 0.0)?;
+        SettingError::check_finite(&clearances, "a finite number > 1", |v| v > 1.0)?;
+        SettingError::check_finite(
+            &[("obstacle_margin_m", self.obstacle_margin_m)],
+            "a finite number >= 0",
+            |v| v >= 0.0,
+        )?;
         let leans = [("lean[0]", self.lean[0]), ("lean[1]", self.lean[1])];
-        check(&leans, "a number from 1 to 10", |v| (1.0..=10.0).contains(&v))?;
+        SettingError::check_finite(&leans, "a number from 1 to 10", |v| (1.0..=10.0).contains(&v))?;
         if let SlopeLaw::Friction { slip_stiffness, axle } = self.slope_law {
             let positive =
                 [("slope_law.slip_stiffness", slip_stiffness), ("slope_law.axle.share", axle.share)];
-            check(&positive, "a finite number > 0", |v| v > 0.0)?;
-            check(&[("slope_law.axle.unloading", axle.unloading)], "a finite number", |_| true)?;
+            SettingError::check_finite(&positive, "a finite number > 0", |v| v > 0.0)?;
+            SettingError::check_finite(
+                &[("slope_law.axle.unloading", axle.unloading)],
+                "a finite number",
+                |_| true,
+            )?;
         }
         let [least, most] = self.friction;
-        check(&[("friction[0]", least)], "a finite number > 0", |v| v > 0.0)?;
-        check(&[("friction[1]", most)], "a finite number above friction[0]", |v| v > least)
-    }
-}
-
-fn check(
-    fields: &[(&'static str, f64)],
-    expected: &'static str,
-    allowed: impl Fn(f64) -> bool,
-) -> Result<(), PriorConfigError> {
-    match fields.iter().find(|(_, value)| !(value.is_finite() && allowed(*value))) {
-        Some(&(field, found)) => Err(PriorConfigError { field, expected, found }),
-        None => Ok(()),
+        SettingError::check_finite(&[("friction[0]", least)], "a finite number > 0", |v| v > 0.0)?;
+        SettingError::check_finite(&[("friction[1]", most)], "a finite number above friction[0]", |v| {
+            v > least
+        })
     }
 }
 

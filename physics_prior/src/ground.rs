@@ -8,7 +8,7 @@ use terrain::{GridGeometry, GridMap, SurfaceCell};
 
 use crate::ball::Ball;
 use crate::lane_ground::LaneGround;
-use crate::lattice::Ratio;
+use crate::lattice::ResolutionRatio;
 use crate::lengths::Lengths;
 
 /// What wheels read of a cell, adjacent so that interpolation runs over all quantities at once.
@@ -81,7 +81,7 @@ struct Area {
 impl ContactGround {
     /// Ground of which nothing is known yet. The gradient is taken over about the diameter of a wheel, which
     /// does not feel what is smaller.
-    pub fn unknown(window: GridGeometry, ratio: Ratio, lengths: &Lengths) -> Self {
+    pub fn unknown(window: GridGeometry, ratio: ResolutionRatio, lengths: &Lengths) -> Self {
         let cells = |length_m: f64| length_m / window.resolution_m;
         // A belly is longest along its diagonal.
         let widest_belly = cells(lengths.belly_diagonal_m()).ceil() as usize + 1;

@@ -5,7 +5,7 @@ use std::ops::Range;
 use terrain::{GridGeometry, GridMap, SurfaceCell, TerrainClass};
 
 use crate::ground::{Contact, is_known};
-use crate::lattice::Ratio;
+use crate::lattice::ResolutionRatio;
 use crate::planes::Planes;
 
 /// Vegetation counts in shares of this.
@@ -27,7 +27,7 @@ pub(crate) struct LaneGround {
 
 impl LaneGround {
     /// Ground of which nothing is known yet.
-    pub fn unknown(window: GridGeometry, ratio: Ratio, n_levels: usize) -> Self {
+    pub fn unknown(window: GridGeometry, ratio: ResolutionRatio, n_levels: usize) -> Self {
         let planes = Planes::new(window, ratio);
         let zeros = || planes.layer(0.0);
         Self {

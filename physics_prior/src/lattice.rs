@@ -3,7 +3,7 @@
 
 /// Resolution of the risk map over that of the surface, `numerator / denominator`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Ratio {
+pub struct ResolutionRatio {
     numerator: i64,
     denominator: i64,
 }
@@ -11,7 +11,7 @@ pub struct Ratio {
 /// Largest number of distinct positions per axis.
 const DENOMINATOR_MAX: i64 = 16;
 
-impl Ratio {
+impl ResolutionRatio {
     /// The ratio of two resolutions; `None` when it is no fraction with a small denominator.
     pub fn new(risk_resolution_m: f64, surface_resolution_m: f64) -> Option<Self> {
         let ratio = risk_resolution_m / surface_resolution_m;
@@ -52,7 +52,7 @@ impl Ratio {
         first + (phase_index as i64 - first).rem_euclid(self.denominator)
     }
 
-    /// How many surface cells the base advances over [`Ratio::n_phases`] risk cells.
+    /// How many surface cells the base advances over [`ResolutionRatio::n_phases`] risk cells.
     pub fn stride(self) -> i64 {
         self.numerator
     }
@@ -72,7 +72,7 @@ mod tests {
     fn positions_agree_with_real_arithmetic() {
         for (risk_m, surface_m) in [(0.1, 0.1), (0.2, 0.1), (0.25, 0.1), (0.1, 0.2), (0.15, 0.1), (0.4, 0.3)]
         {
-            let ratio = Ratio::new(risk_m, surface_m).unwrap();
+            let ratio = ResolutionRatio::new(risk_m, surface_m).unwrap();
             for i in -30..30 {
                 let centre = (i as f64 + 0.5) * risk_m / surface_m;
                 let exact = ratio.base(i) as f64 + ratio.phase(i);
@@ -94,7 +94,7 @@ mod tests {
         for (risk_m, surface_m) in
             [(0.1, 0.0), (f64::NAN, 0.1), (0.1, 0.1 * std::f64::consts::PI), (-0.1, 0.1)]
         {
-            assert_eq!(Ratio::new(risk_m, surface_m), None);
+            assert_eq!(ResolutionRatio::new(risk_m, surface_m), None);
         }
     }
 }

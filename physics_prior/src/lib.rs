@@ -60,8 +60,8 @@ mod triangle;
 
 pub use belief::PriorBelief;
 pub use block_prior::{BlockPrior, PoseLine};
-pub use config::{PriorConfig, PriorConfigError, SlopeLaw};
-pub use lattice::Ratio;
+pub use config::{PriorConfig, SlopeLaw};
+pub use lattice::ResolutionRatio;
 pub use planes::{Planes, span};
 pub use prior_field::PriorField;
 pub use prior_map::{Assumption, PriorMap, PriorMapError};

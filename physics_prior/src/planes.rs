@@ -2,7 +2,7 @@
 
 use terrain::GridGeometry;
 
-use crate::lattice::Ratio;
+use crate::lattice::ResolutionRatio;
 
 /// Numbers of a row of poses that are read at a time: a read may go so far beyond the last one.
 const SPAN: usize = bicycle::lanes::SPAN;
@@ -20,7 +20,7 @@ pub struct Planes {
 
 impl Planes {
     /// An order for a window with one column beyond its last.
-    pub fn new(window: GridGeometry, ratio: Ratio) -> Self {
+    pub fn new(window: GridGeometry, ratio: ResolutionRatio) -> Self {
         let n_planes = ratio.stride() as usize;
         Self { window, n_planes, n_plane_cols: window.n_cols / n_planes + 1 }
     }
@@ -35,14 +35,14 @@ impl Planes {
         vec![value; self.window.n_rows * self.n_planes * self.n_plane_cols + SPAN]
     }
 
-    /// Position of a lattice cell in a layer; the cell that lies [`Ratio::stride`] further east follows it.
+    /// Position of a lattice cell in a layer; the cell that lies [`ResolutionRatio::stride`] further east follows it.
     #[inline(always)]
     pub fn index(&self, lattice: [i64; 2]) -> usize {
         self.place(lattice) as usize
     }
 
     /// How much further a cell lies than the base cell that it is an offset from: the same for every base cell whose
-    /// column leaves the same remainder over [`Ratio::stride`].
+    /// column leaves the same remainder over [`ResolutionRatio::stride`].
     pub fn delta(&self, base: [i64; 2], offset: [i64; 2]) -> isize {
         let cell = [0, 1].map(|axis| base[axis] + offset[axis]);
         self.place(cell) - self.place(base)
@@ -73,7 +73,7 @@ mod tests {
     fn what_adjacent_risk_cells_read_is_adjacent_and_every_cell_has_its_place() {
         let window = GridGeometry { resolution_m: 0.1, origin: [-7, 5], n_rows: 4, n_cols: 11 };
         for (risk_m, surface_m) in [(0.1, 0.1), (0.3, 0.1), (0.15, 0.1), (0.05, 0.1)] {
-            let ratio = Ratio::new(risk_m, surface_m).unwrap();
+            let ratio = ResolutionRatio::new(risk_m, surface_m).unwrap();
             let planes = Planes::new(window, ratio);
             let layer = planes.layer(0.0);
             let mut taken = vec![false; layer.len()];

@@ -7,7 +7,7 @@ use traversability::{Bins, CvarLevel, Ground, GroundFlags, N_BINS};
 use crate::PriorBelief;
 use crate::block_prior::{BlockPrior, PoseLine};
 use crate::ground::{Contact, ContactGround};
-use crate::lattice::Ratio;
+use crate::lattice::ResolutionRatio;
 use crate::lengths::Lengths;
 use crate::outcomes::Equations;
 use crate::pose::Placed;
@@ -36,7 +36,7 @@ pub(crate) struct Poses {
     pub judgement: Judgement,
     pub ground: ContactGround,
     lengths: Lengths,
-    ratio: Ratio,
+    ratio: ResolutionRatio,
     n_yaws: usize,
     /// Shape [row phase, column phase, yaw].
     stencils: Vec<Stencil>,
@@ -48,7 +48,7 @@ impl Poses {
     pub fn new(
         judgement: Judgement,
         lengths: Lengths,
-        (ratio, surface_resolution_m): (Ratio, f64),
+        (ratio, surface_resolution_m): (ResolutionRatio, f64),
         risk: &GridGeometry,
         n_yaws: usize,
         instructions: Instructions,
@@ -88,7 +88,7 @@ impl Poses {
     }
 
     /// How the risk cells lie on those of the surface.
-    pub fn ratio(&self) -> Ratio {
+    pub fn ratio(&self) -> ResolutionRatio {
         self.ratio
     }
 
@@ -299,7 +299,7 @@ impl Tally {
     }
 }
 
-fn stencils(lengths: &Lengths, ratio: Ratio, resolution_m: f64, n_yaws: usize) -> Vec<Stencil> {
+fn stencils(lengths: &Lengths, ratio: ResolutionRatio, resolution_m: f64, n_yaws: usize) -> Vec<Stencil> {
     let phases = 0..ratio.n_phases() as i64;
     let mut stencils = Vec::with_capacity(ratio.n_phases().pow(2) * n_yaws);
     for row in phases.clone() {
@@ -316,7 +316,7 @@ fn stencils(lengths: &Lengths, ratio: Ratio, resolution_m: f64, n_yaws: usize) -
 }
 
 /// The surface cells that the poses of a risk map read.
-fn window(risk: &GridGeometry, ratio: Ratio, reach: Reach, resolution_m: f64) -> GridGeometry {
+fn window(risk: &GridGeometry, ratio: ResolutionRatio, reach: Reach, resolution_m: f64) -> GridGeometry {
     let n = [risk.n_cols, risk.n_rows].map(|n| n as i64);
     let first = |axis: usize| ratio.base(risk.origin[axis]) + reach.min[axis];
     let last = |axis: usize| ratio.base(risk.origin[axis] + n[axis] - 1) + reach.max[axis];
@@ -372,7 +372,7 @@ mod tests {
         let level = CvarLevel::new(0.4).unwrap();
         let tails = Tails::new(&equations);
         let judgement = Judgement::Physics(Box::new(Physics { equations, tails, level, evidence: 12.0 }));
-        let ratio = Ratio::new(0.1, 0.1).unwrap();
+        let ratio = ResolutionRatio::new(0.1, 0.1).unwrap();
         let mut poses = Poses::new(judgement, lengths, (ratio, 0.1), &window, 13, Instructions::Portable);
         poses.ground.read(&bumpy(window), [-100; 2], [100; 2]);
         for (cell, yaw) in [([5, 5], 0), ([1, 11], 5), ([2, 12], 9), ([7, 4], 12)] {

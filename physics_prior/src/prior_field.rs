@@ -4,16 +4,16 @@ use std::ops::Range;
 
 use bicycle::Geometry;
 use bicycle::lanes::Instructions;
-use terrain::{CellRegion, GridGeometry, GridMap, SurfaceCell};
+use terrain::{CellRegion, GridGeometry, GridMap, SettingError, SurfaceCell};
 use traversability::{CvarLevel, Ground, Risk};
 
 use crate::block_prior::{BlockPrior, PoseLine};
-use crate::lattice::Ratio;
+use crate::lattice::ResolutionRatio;
 use crate::lengths::Lengths;
 use crate::outcomes::Equations;
 use crate::poses::{BlockCvar, Judgement, Physics, Poses};
 use crate::tails::Tails;
-use crate::{Assumption, PriorBelief, PriorConfig, PriorConfigError, PriorMapError};
+use crate::{Assumption, PriorBelief, PriorConfig, PriorMapError};
 
 /// Cells across a footprint beyond which nothing is judged in time.
 const FOOTPRINT_CELLS_MAX: f64 = 500.0;
@@ -46,10 +46,9 @@ impl PriorField {
         if n_yaws == 0 {
             return Err(PriorMapError::NoYaws);
         }
-        let ratio = Ratio::new(risk.resolution_m, surface_resolution_m).ok_or(PriorMapError::Resolution {
-            surface_m: surface_resolution_m,
-            risk_m: risk.resolution_m,
-        })?;
+        let ratio = ResolutionRatio::new(risk.resolution_m, surface_resolution_m).ok_or(
+            PriorMapError::Resolution { surface_m: surface_resolution_m, risk_m: risk.resolution_m },
+        )?;
         let (lengths, judgement) = judged(geometry, assumption)?;
         let found = 2.0 * lengths.reach_m() / surface_resolution_m;
         if found.is_nan() || found > FOOTPRINT_CELLS_MAX {
@@ -67,7 +66,7 @@ impl PriorField {
     }
 
     /// How the cells of the window lie on those of the surface.
-    pub fn ratio(&self) -> Ratio {
+    pub fn ratio(&self) -> ResolutionRatio {
         self.poses.ratio()
     }
 
@@ -197,7 +196,7 @@ impl PriorField {
     }
 }
 
-fn judged(geometry: &Geometry, assumption: &Assumption) -> Result<(Lengths, Judgement), PriorConfigError> {
+fn judged(geometry: &Geometry, assumption: &Assumption) -> Result<(Lengths, Judgement), SettingError> {
     match assumption {
         Assumption::Physics { prior, level } => {
             prior.validate()?;

@@ -5,10 +5,10 @@ use std::ops::Range;
 use bicycle::Geometry;
 use bicycle::lanes::{BLOCK, Instructions};
 use rayon::prelude::*;
-use terrain::{CellRegion, GridGeometry, GridMap, SurfaceCell};
+use terrain::{CellRegion, GridGeometry, GridMap, SettingError, SurfaceCell};
 use traversability::{CvarLevel, Risk, RiskMap};
 
-use crate::{BlockPrior, PoseLine, PriorBelief, PriorConfig, PriorConfigError, PriorField};
+use crate::{BlockPrior, PoseLine, PriorBelief, PriorConfig, PriorField};
 
 /// What a [`PriorMap`] takes the ground for.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -33,7 +33,7 @@ pub enum Assumption {
 pub enum PriorMapError {
     /// A parameter of the prior makes no sense.
     #[error("physics prior, {0}")]
-    Config(#[from] PriorConfigError),
+    Config(#[from] SettingError),
     /// The cells of the two maps never line up.
     #[error(
         "resolution of the risk map: expected n/d times the surface's {surface_m} m with d up to 16, found {risk_m} m"

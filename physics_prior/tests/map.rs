@@ -5,12 +5,10 @@ mod surfaces;
 use bicycle::lanes::Instructions;
 use std::f64::consts::PI;
 
-use physics_prior::{
-    Assumption, BlockPrior, PoseLine, PriorConfig, PriorConfigError, PriorField, PriorMap, PriorMapError,
-};
+use physics_prior::{Assumption, BlockPrior, PoseLine, PriorConfig, PriorField, PriorMap, PriorMapError};
 use proptest::prelude::*;
 use surfaces::*;
-use terrain::{Cell, CellRegion, GridGeometry, GridMap, SurfaceCell, TerrainClass};
+use terrain::{Cell, CellRegion, GridGeometry, GridMap, SettingError, SurfaceCell, TerrainClass};
 use traversability::{Bins, GroundFlags, PartialMoments, Risk};
 
 const NOMINAL: Assumption = Assumption::Nominal { obstacle_margin_m: 0.0 };
@@ -331,7 +329,7 @@ fn what_cannot_be_mapped_is_refused() {
     assert!(new(&physics(0.4), 0.1 * PI, 4).is_err());
     let prior = PriorConfig { evidence: -1.0, ..PriorConfig::default() };
     let found = new(&Assumption::Physics { prior, level: level(0.4) }, 0.1, 4);
-    assert!(matches!(found, Err(PriorMapError::Config(PriorConfigError { field: "evidence", .. }))));
+    assert!(matches!(found, Err(PriorMapError::Config(SettingError { field: "evidence", .. }))));
     let mut map = PriorMap::new(&CAR, &physics(0.4), 0.1, geometry, 4, Instructions::widest()).unwrap();
     let error = map.update_all(&level_ground(window(0.2, 10, 10))).unwrap_err();
     assert_eq!(error.to_string(), "resolution of the surface: expected 0.1 m, found 0.2 m");

@@ -1,6 +1,7 @@
 //! What a search and a speed profile weigh.
 
 use serde::{Deserialize, Serialize};
+use terrain::SettingError;
 
 /// Weights of the costs, whose values the paper does not state, and what the vehicle can do.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -44,18 +45,6 @@ impl Default for RouteConfig {
             roll_max_rad: 0.5,
         }
     }
-}
-
-/// A number that is out of range.
-#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-#[error("{field}: expected {expected}, found {found}")]
-pub struct SettingError {
-    /// Name of the field.
-    pub field: &'static str,
-    /// The range that would do.
-    pub expected: &'static str,
-    /// The value that was given.
-    pub found: f64,
 }
 
 impl RouteConfig {

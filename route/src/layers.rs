@@ -1,9 +1,9 @@
 //! From measured elevation and what stands on it to the map that a route is searched on.
 
-use crate::config::{SettingError, check};
+use crate::config::check;
 use crate::{FrictionCurve, GroundCell};
 use rayon::prelude::*;
-use terrain::{Cell, GridGeometry, GridMap, slope_at};
+use terrain::{Cell, GridGeometry, GridMap, SettingError, slope_at};
 
 /// Measured ground; every layer has the elevation's geometry.
 #[derive(Clone, Copy, Debug)]

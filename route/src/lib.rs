@@ -46,7 +46,7 @@ mod smooth;
 mod speed;
 mod tiles;
 
-pub use config::{RouteConfig, SettingError};
+pub use config::RouteConfig;
 pub use edges::Barrier;
 pub use far::{FarRoute, FarRouteError, far_route};
 pub use friction::FrictionCurve;

@@ -1,13 +1,12 @@
 //! From start to goal: search, smooth line, speeds.
 
 use crate::RouteConfig;
-use crate::config::SettingError;
 use crate::edges::{Barrier, Edges, STEPS, stepped};
 use crate::ground::{self, GroundCell, GroundError};
 use crate::line::{self, Gate, Line, heading_of};
 use crate::search::{self, CellPath, Unreachable};
 use crate::speed::{Bend, SpeedError, SpeedLimits};
-use terrain::{Cell, CellRegion, GridMap};
+use terrain::{Cell, CellRegion, GridMap, SettingError};
 
 /// Share of friction that makes ground as good as other ground to smooth a line over, and of roughness likewise.
 const AS_GOOD: f32 = 0.9;

@@ -3,9 +3,10 @@
 //! In squared speeds the friction circle is a second-order cone and the rest is linear, and a segment's time is the
 //! epigraph of a rotated cone: the fastest profile is a convex programme whose answer is the global one.
 
-use crate::config::{SettingError, check};
+use crate::config::check;
 use crate::programme::{Affine, Programme};
 use serde::{Deserialize, Serialize};
+use terrain::SettingError;
 
 /// Standard gravity [m/s2].
 const GRAVITY_MPS2: f64 = 9.806_65;

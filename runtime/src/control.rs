@@ -1,18 +1,24 @@
 //! The controller as a process: a decision at every deadline, on what there is, and never a wait for the map.
 
-use bicycle::{Decision, Model};
+use std::sync::Arc;
+
+use bicycle::{Decision, ImuSample, Model};
 use navigator::{Config, Pilot, PilotAges, RiskMessage, RiskMessages};
 
 use crate::RuntimeError;
 use crate::budget::Budget;
-use crate::convert::{decision_record, mission_message, odometry_message, risk_message};
+use crate::convert::{
+    decision_record, id_of, mission_message, odometry_message, risk_message, tracks_message,
+};
 use bus::ages::AgeLimits;
 use bus::channel::{
-    Bus, COMMAND, DECISION, Inlet, MISSION, Message, ODOMETRY, Outlet, RISK, RISK_PHYSICS, STUCK,
+    Bus, COMMAND, Counts, DECISION, IMU, Inlet, MISSION, Message, ODOMETRY, Outlet, RISK, RISK_PHYSICS,
+    STUCK, TRACKS,
 };
 use bus::clock::{self, Clock, Cycle};
 use bus::message::{
-    CommandRecord, DecisionRecord, MissionRecord, OdometryRecord, RiskHeader, Stamp, StuckRecord,
+    CommandRecord, DecisionRecord, ImuRecord, MissionRecord, OdometryRecord, RiskHeader, Stamp, StuckRecord,
+    TrackRecord, TracksHeader,
 };
 use bus::status::{Health, Meter, Role};
 
@@ -25,6 +31,8 @@ pub struct ControlSetup {
     pub model: Model,
     /// Settings of the pipeline.
     pub config: Config,
+    /// What corrects commands for the ground, if anything does.
+    pub corrector: Option<Arc<kinodynamics::Checkpoint>>,
     /// Decides the samples.
     pub seed: u64,
     /// Time between two decisions [s].
@@ -63,7 +71,10 @@ pub struct Control {
 /// What a decision is made from.
 struct Inputs {
     odometry: Inlet<Stamp, OdometryRecord>,
+    /// `None` where nobody corrects commands.
+    imu: Option<Inlet<Stamp, ImuRecord>>,
     missions: Inlet<Stamp, MissionRecord>,
+    tracks: Inlet<TracksHeader, TrackRecord>,
     learned: MapInput,
     physics: MapInput,
     odometry_at_ns: Option<u64>,
@@ -94,11 +105,13 @@ impl MapInput {
 }
 
 impl Inputs {
-    fn new(bus: &Bus) -> Result<Self, RuntimeError> {
+    fn new(bus: &Bus, corrects: bool) -> Result<Self, RuntimeError> {
         let map = |channel| Ok::<_, RuntimeError>(MapInput { inlet: bus.inlet(channel)?, held: None });
         Ok(Self {
             odometry: bus.inlet(&ODOMETRY)?,
+            imu: if corrects { Some(bus.inlet(&IMU)?) } else { None },
             missions: bus.inlet(&MISSION)?,
+            tracks: bus.inlet(&TRACKS)?,
             learned: map(&RISK)?,
             physics: map(&RISK_PHYSICS)?,
             odometry_at_ns: None,
@@ -113,9 +126,15 @@ impl Inputs {
             pilot.hear_odometry(&odometry_message(stamp, record));
             *newest_ns = Some(stamp.valid_at_ns);
         });
+        if let Some(imu) = &mut self.imu {
+            imu.poll(|stamp, records| {
+                pilot.hear_imu(id_of(stamp.source()), records.iter().map(ImuSample::from));
+            });
+        }
         self.missions.poll(|stamp, records| {
             records.iter().for_each(|record| pilot.hear_mission(&mission_message(stamp, record)));
         });
+        self.tracks.poll(|header, records| pilot.hear_tracks(&tracks_message(header, records)));
         self.learned.take();
         self.physics.take();
     }
@@ -127,14 +146,19 @@ impl Control {
     /// # Errors
     /// A channel that cannot be used, settings that cannot be.
     pub fn new(bus: &Bus, setup: ControlSetup) -> Result<Self, RuntimeError> {
-        let ControlSetup { model, config, seed, period_s, ages } = setup;
+        let ControlSetup { model, config, corrector, seed, period_s, ages } = setup;
         let n_max = config.controller.n_rollouts;
         let ages = PilotAges { learned_ns: ages.learned_ns, mission_ns: ages.mission_ns };
+        let pilot = Pilot::new(model, &config, seed)?.with_ages(ages);
+        let pilot = match &corrector {
+            Some(checkpoint) => pilot.with_corrector(checkpoint)?,
+            None => pilot,
+        };
         Ok(Self {
             clock: bus.clock().clone(),
             budget: Budget::new(n_max, clock::nanoseconds(BUDGET_SHARE * period_s)),
-            pilot: Pilot::new(model, &config, seed)?.with_ages(ages),
-            inputs: Inputs::new(bus)?,
+            inputs: Inputs::new(bus, pilot.corrector().is_some())?,
+            pilot,
             commands: bus.outlet(&COMMAND, 1)?,
             decisions: bus.outlet(&DECISION, 1)?,
             stuck: bus.outlet(&STUCK, 1)?,
@@ -185,6 +209,8 @@ impl Control {
             .with(inputs.learned.inlet.counts())
             .with(inputs.physics.inlet.counts())
             .with(inputs.missions.counts())
+            .with(inputs.tracks.counts())
+            .with(inputs.imu.as_ref().map_or(&Counts::default(), Inlet::counts))
         })?)
     }
 }

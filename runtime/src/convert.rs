@@ -2,16 +2,19 @@
 
 use bus::message::{
     DecisionRecord, Grid, MissionRecord, OdometryRecord, PointRecord, RiskHeader, ScanHeader, Source, Stamp,
-    StuckRecord, SurfaceHeader,
+    StuckRecord, SurfaceHeader, TRACKS_MAX, TrackRecord, TracksHeader,
     mission::{DRIVE, EMERGENCY_STOP, MANUAL, NONE, PAUSED, UNDER_WAY},
 };
 use bus::payload::risk_views;
+use kinodynamics::{Effect, Reason};
 use mppi::CostToGoView;
 use navigator::{
-    Activity, CORNERS_MAX, DecisionMessage, Destination, Jump, MessageId, MissionMessage, OdometryMessage,
-    PathWindow, RiskAuthor, RiskMessage, ScanMessage, StuckMessage, StuckPose,
+    Activity, CORNERS_MAX, Correction, DecisionMessage, Destination, Jump, MessageId, MissionMessage,
+    OdometryMessage, PathWindow, RiskMapSource, RiskMessage, ScanMessage, StuckMessage, StuckPose,
+    TracksMessage,
 };
 use terrain::GridGeometry;
+use tracking::{Track, Variance};
 
 use crate::mapping::{FUSED, JUMPED, LEARNED, PHYSICS};
 
@@ -126,6 +129,36 @@ pub fn surface_header(record: &SurfaceHeader) -> navigator::SurfaceHeader {
     }
 }
 
+// A message holds what a tracker tells of.
+const _: () = assert!(TRACKS_MAX == tracking::TRACKS_MAX);
+
+/// What says of what moves when and of what; its stamp, which its outlet gives it, is left out.
+pub fn tracks_header(message: &TracksMessage) -> TracksHeader {
+    let TracksMessage { scan, frame_at_ns, .. } = *message;
+    TracksHeader { scan: source_of(scan), frame_at_ns, ..TracksHeader::default() }
+}
+
+/// One thing that moves.
+pub fn track_record(track: &Track) -> TrackRecord {
+    let Track { number, position_m, velocity_mps, variance, radius_m } = *track;
+    let Variance { position_m2, cross_m2ps, velocity_m2ps2 } = variance;
+    TrackRecord { number, position_m, velocity_mps, position_m2, cross_m2ps, velocity_m2ps2, radius_m }
+}
+
+/// What moves.
+pub fn tracks_message(header: &TracksHeader, records: &[TrackRecord]) -> TracksMessage {
+    let mut tracks = [Track::default(); TRACKS_MAX];
+    let n = records.len().min(TRACKS_MAX);
+    for (track, record) in tracks.iter_mut().zip(records) {
+        let TrackRecord { number, position_m, velocity_mps, radius_m, .. } = *record;
+        let TrackRecord { position_m2, cross_m2ps, velocity_m2ps2, .. } = *record;
+        let variance = Variance { position_m2, cross_m2ps, velocity_m2ps2 };
+        *track = Track { number, position_m, velocity_mps, variance, radius_m };
+    }
+    let TracksHeader { stamp, scan, frame_at_ns } = *header;
+    TracksMessage::new(id_of(stamp.source()), (id_of(scan), stamp.valid_at_ns), frame_at_ns, &tracks[..n])
+}
+
 /// The jump of the localisation that a map tells of.
 pub fn jump_of(record: &SurfaceHeader) -> Jump {
     Jump { step_m: record.jump_m, yaw_rad: record.jump_yaw_rad }
@@ -163,13 +196,48 @@ pub fn stuck_message(stamp: &Stamp, record: &StuckRecord) -> StuckMessage {
     }
 }
 
+/// Numbers of [`DecisionRecord::correction`]; the reasons of [`Reason::ALL`] follow from [`AS_PLANNED`] on.
+const CORRECTED: u32 = 1;
+const BOUNDED: u32 = 2;
+/// The first of them.
+pub const AS_PLANNED: u32 = 3;
+
+/// What became of a command, as a decision's record tells it; `None` where nobody corrects.
+pub fn correction_effect(record: &DecisionRecord) -> Option<Effect> {
+    match record.correction {
+        CORRECTED => Some(Effect::Corrected),
+        BOUNDED => Some(Effect::Bounded),
+        number => {
+            let place = number.checked_sub(AS_PLANNED)? as usize;
+            Reason::ALL.get(place).copied().map(Effect::AsPlanned)
+        }
+    }
+}
+
+/// With what whoever corrects commands made of the planned one.
+fn with_correction(record: DecisionRecord, correction: &Correction) -> DecisionRecord {
+    let Correction { planned, corrected } = correction;
+    DecisionRecord {
+        correction: match corrected.effect() {
+            Effect::Corrected => CORRECTED,
+            Effect::Bounded => BOUNDED,
+            Effect::AsPlanned(reason) => AS_PLANNED + reason as u32,
+        },
+        correction_share: corrected.share,
+        curvature_change_per_m: corrected.curvature_change_per_m,
+        planned_steering_rad: planned.steering_rad,
+        ..record
+    }
+}
+
 /// A decision; how long it took is left out.
 pub fn decision_record(message: &DecisionMessage) -> DecisionRecord {
     let destination = message.destination.unwrap_or(Destination { goal_m: [0.0; 2], tolerance_m: 0.0 });
     let [learned, physics] = message.held.map(source_of);
     let (odometry, n_odometry) = message.odometry;
     let state = message.state;
-    DecisionRecord {
+    let (imu, n_imu) = message.imu;
+    let record = DecisionRecord {
         command: bus::message::CommandRecord::from(&message.decision)
             .decided_on(message.odometry_at_ns, message.scan_at_ns()),
         cycle: message.cycle,
@@ -181,18 +249,22 @@ pub fn decision_record(message: &DecisionMessage) -> DecisionRecord {
         mission: source_of(message.mission),
         learned,
         physics,
+        tracks: source_of(message.tracks),
         goal_m: destination.goal_m,
         tolerance_m: destination.tolerance_m,
         n_rollouts: message.n_rollouts as u64,
         elapsed_s: message.elapsed_s,
         state: [state.x_m, state.y_m, state.yaw_rad, state.speed_mps, state.steering_rad],
+        imu: source_of(imu),
+        n_imu,
         ..DecisionRecord::default()
-    }
+    };
+    message.correction.as_ref().map_or(record, |correction| with_correction(record, correction))
 }
 
-fn number_of(author: RiskAuthor) -> u64 {
+fn number_of(author: RiskMapSource) -> u64 {
     match author {
-        RiskAuthor::Learned => LEARNED,
-        RiskAuthor::Physics => PHYSICS,
+        RiskMapSource::Learned => LEARNED,
+        RiskMapSource::Physics => PHYSICS,
     }
 }

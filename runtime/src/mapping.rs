@@ -3,18 +3,19 @@
 use std::collections::VecDeque;
 
 use bicycle::{Model, SensorModel, Vehicle};
-use navigator::{Assessor, Belief, Config, MessageId, StandIn, Surface, Surveyor};
+use navigator::{Assessor, Belief, Config, MessageId, StandIn, Surface, Surveyor, TracksMessage};
 use traversability::CvarLevel;
 
 use crate::RuntimeError;
-use crate::convert::{odometry_message, scan_message, surface_record};
+use crate::convert::{odometry_message, scan_message, surface_record, track_record, tracks_header};
 use crate::intake::Intake;
 use crate::risk_maker::RiskMaker;
 use bus::ages::AgeLimits;
-use bus::channel::{Bus, Inlet, MISSION, ODOMETRY, Outlet, RISK, RISK_PHYSICS, SCAN, STUCK, SURFACE};
+use bus::channel::{Bus, Inlet, MISSION, ODOMETRY, Outlet, RISK, RISK_PHYSICS, SCAN, STUCK, SURFACE, TRACKS};
 use bus::clock::{self, Clock};
 use bus::message::{
     MissionRecord, OdometryRecord, PointRecord, RiskHeader, ScanHeader, Stamp, StuckRecord, SurfaceHeader,
+    TRACKS_MAX, TrackRecord, TracksHeader,
 };
 use bus::payload::{self, RiskParts};
 use bus::status::{Health, Meter, Role};
@@ -65,6 +66,8 @@ pub struct Mapping {
     odometry: Inlet<Stamp, OdometryRecord>,
     scans: Inlet<ScanHeader, PointRecord>,
     surfaces: Outlet<SurfaceHeader, [f32; 8]>,
+    /// Where what moves is tracked.
+    tracks: Option<Outlet<TracksHeader, TrackRecord>>,
     fallback: Fallback,
     meter: Meter,
     /// When scans of late were sent [ns].
@@ -95,11 +98,13 @@ impl Mapping {
             clock: bus.clock().clone(),
             surveyor: Surveyor::new(vehicle, config.elevation, config.guard, Surface::Sensed)?
                 .with_sensors(SensorModel::of(&model.effects))
-                .with_mounts(config.sensors.clone()),
+                .with_mounts(config.sensors.clone())
+                .with_moving(config.moving.as_ref())?,
             intake: Intake::default(),
             odometry: bus.inlet(&ODOMETRY)?,
             scans: bus.inlet(&SCAN)?,
             surfaces: bus.outlet(&SURFACE, n_cells)?,
+            tracks: config.moving.map(|_| bus.outlet(&TRACKS, TRACKS_MAX)).transpose()?,
             fallback: Fallback::new(bus, setup)?,
             meter: Meter::new(bus, Role::Mapping)?,
             sent: VecDeque::with_capacity(SCANS_KEPT),
@@ -132,10 +137,23 @@ impl Mapping {
             self.newest_ns[0] = Some(header.valid_at_ns);
             let sent_at_ns = self.sent.iter().find(|(id, _)| *id == header.scan).map(|(_, at_ns)| *at_ns);
             self.meter.count(now_ns.saturating_sub(sent_at_ns.unwrap_or(now_ns)));
+            // First, so that nobody has a map of a scan and not what moves in it.
+            if let Some(message) = self.surveyor.tracks(&header) {
+                self.tell_tracks(&message)?;
+            }
             self.tell(&header, now_ns)?;
         }
         self.fallback.listen(now_ns)?;
         self.report()
+    }
+
+    fn tell_tracks(&mut self, message: &TracksMessage) -> Result<(), RuntimeError> {
+        let Some(outlet) = &mut self.tracks else { return Ok(()) };
+        let tracks = message.tracks();
+        let mut loan = outlet.write(tracks.len(), |place| track_record(&tracks[place]))?;
+        *loan.header_mut() = tracks_header(message);
+        outlet.send(loan, message.valid_at_ns)?;
+        Ok(())
     }
 
     /// Writes the map as it is now where its readers will read it.

@@ -11,7 +11,7 @@ mod memory;
 mod notebook;
 mod school;
 
-pub use background::{Background, Judge, News, hash_of};
+pub use background::{Background, Judge, News};
 pub use learner::{Decision, FORGETTING_MAX, Learner, LearnerSetup, OnlineError, Round};
 pub use memory::{Memory, Part};
 pub use notebook::{Notebook, Stretch};

@@ -9,11 +9,11 @@ use thread_priority::{
 
 use bus::status::Role;
 
-/// Settles this thread, and those that it will start, as a role needs it; says what was done and what was not permitted.
+/// Sets cores, priority and memory of this thread, and of those that it will start, as a role needs them; says what was done and what was not permitted.
 ///
 /// Control has the last core for itself, the others share the rest. SCHED_FIFO goes to those that the vehicle waits for;
 /// learning and the recorder take what is left. To be called before the process starts any other thread.
-pub fn settle(role: Role) -> String {
+pub fn configure_thread(role: Role) -> String {
     [pinned(role), scheduled(role), locked()].join("; ")
 }
 
@@ -96,7 +96,7 @@ mod tests {
     #[test]
     fn it_says_what_was_done_or_why_not() {
         // A thread of its own: it stays settled.
-        let told = std::thread::spawn(|| settle(Role::Learning)).join().unwrap();
+        let told = std::thread::spawn(|| configure_thread(Role::Learning)).join().unwrap();
         let parts: Vec<&str> = told.split("; ").collect();
         assert!(parts[0].contains("pinned"), "{told}");
         assert!(parts.contains(&"ordinary priority"), "{told}");

@@ -12,12 +12,12 @@ use crate::RuntimeError;
 use crate::setup::RecordedSetup;
 use bus::channel::{
     Bus, CHECKPOINT, COMMAND, DECISION, EMERGENCY_STOP, Element, Header, IMU, Inlet, MISSION, ODOMETRY,
-    ORDER, RISK, RISK_PHYSICS, SCAN, STUCK, SURFACE,
+    ORDER, RISK, RISK_PHYSICS, SCAN, STUCK, SURFACE, TRACKS,
 };
 use bus::clock::{self, SECOND_NS};
 use bus::message::{
     CheckpointHeader, CommandRecord, DecisionRecord, ImuRecord, MissionRecord, OdometryRecord, OrderHeader,
-    PointRecord, RiskHeader, ScanHeader, Stamp, StuckRecord, SurfaceHeader,
+    PointRecord, RiskHeader, ScanHeader, Stamp, StuckRecord, SurfaceHeader, TrackRecord, TracksHeader,
 };
 use bus::status::{Health, Meter, Role};
 use file::RotatingFile;
@@ -38,6 +38,8 @@ pub mod topic {
     pub const SCAN: &str = "/channel/scan";
     /// Headers of [`bus::channel::SURFACE`].
     pub const SURFACE: &str = "/channel/surface";
+    /// [`bus::channel::TRACKS`].
+    pub const TRACKS: &str = "/channel/tracks";
     /// Headers of [`bus::channel::RISK`].
     pub const RISK: &str = "/channel/risk";
     /// Headers of [`bus::channel::RISK_PHYSICS`].
@@ -121,6 +123,7 @@ struct Inlets {
     imu: Inlet<Stamp, ImuRecord>,
     scans: Inlet<ScanHeader, PointRecord>,
     surfaces: Inlet<SurfaceHeader, [f32; 8]>,
+    tracks: Inlet<TracksHeader, TrackRecord>,
     risks: [Inlet<RiskHeader, [f32; 4]>; 2],
     stuck: Inlet<Stamp, StuckRecord>,
     missions: Inlet<Stamp, MissionRecord>,
@@ -137,6 +140,7 @@ impl Recorder {
             imu: bus.inlet(&IMU)?,
             scans: bus.inlet(&SCAN)?,
             surfaces: bus.inlet(&SURFACE)?,
+            tracks: bus.inlet(&TRACKS)?,
             risks: [bus.inlet(&RISK)?, bus.inlet(&RISK_PHYSICS)?],
             stuck: bus.inlet(&STUCK)?,
             missions: bus.inlet(&MISSION)?,
@@ -176,6 +180,9 @@ impl Recorder {
         inlets.surfaces.poll(|header, cells| {
             keep(&mut result, write::<_, u8>(file, topic::SURFACE, header, &[], SurfaceHeader::layout));
             keep(&mut result, views.surface(file.recorder(), header, cells));
+        });
+        inlets.tracks.poll(|header, tracks| {
+            keep(&mut result, write(file, topic::TRACKS, header, tracks, TrackRecord::layout));
         });
         for (inlet, name) in inlets.risks.iter_mut().zip([topic::RISK, topic::RISK_PHYSICS]) {
             inlet.poll(|header, payload| {
@@ -238,6 +245,7 @@ impl Inlets {
             + all(&mut self.imu)
             + all(&mut self.scans)
             + all(&mut self.surfaces)
+            + all(&mut self.tracks)
             + all(learned)
             + all(physics)
             + all(&mut self.stuck)

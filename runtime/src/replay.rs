@@ -9,9 +9,10 @@ mod survey;
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use bicycle::ImuSample;
 use bicycle::lanes::{Instructions, IsaAbsent};
 use evidential::Checkpoint;
-use navigator::{Belief, NavigatorError, Pilot, PilotAges, RiskMessages};
+use navigator::{Belief, MessageId, NavigatorError, Pilot, PilotAges, RiskMessages};
 use traversability::CvarLevel;
 
 use crate::convert::{decision_record, odometry_message, risk_message};
@@ -29,7 +30,9 @@ pub struct ReplayReport {
     pub n_decisions: u64,
     /// Of these, made again to the same bits.
     pub n_identical: u64,
-    /// Of these, not made again because something that they need was not recorded.
+    /// Decisions whose command somebody corrected for the ground, or would have; these, too, are made again.
+    pub n_corrections: u64,
+    /// Of the decisions, not made again because something that they need was not recorded.
     pub n_unmade: u64,
     /// Maps of the ground made again, with the recorded hash.
     pub n_surfaces: u64,
@@ -92,12 +95,14 @@ pub struct Knowledge {
     pub belief: Belief,
     /// First 8 bytes of the SHA-256 of the networks' weights; 0 = none.
     pub checkpoint: u64,
+    /// What corrected commands for the ground, if anything did.
+    pub corrector: Option<Arc<kinodynamics::Checkpoint>>,
 }
 
 impl Knowledge {
     /// Of networks.
     pub fn learned(checkpoint: Arc<Checkpoint>, unfamiliar: evidential::Unfamiliar, hash: u64) -> Self {
-        Self { belief: Belief::Learned { checkpoint, unfamiliar }, checkpoint: hash }
+        Self { belief: Belief::Learned { checkpoint, unfamiliar }, checkpoint: hash, corrector: None }
     }
 
     /// What was believed by these networks: the original ones, or some that were learned while driving.
@@ -147,13 +152,15 @@ pub fn replay(records: &Records, knowledge: &Knowledge) -> Result<ReplayReport, 
     for (key, record) in &records.decisions {
         let goes_on = life.as_ref().is_some_and(|life| life.epoch_ns == key.epoch_ns);
         if !goes_on {
+            let ages = PilotAges { learned_ns: setup.ages.learned_ns, mission_ns: setup.ages.mission_ns };
+            let pilot = Pilot::new(machine.model.clone(), &machine.config, seed)?.with_ages(ages);
             life = Some(Life {
                 epoch_ns: key.epoch_ns,
-                pilot: Pilot::new(machine.model.clone(), &machine.config, seed)?.with_ages(PilotAges {
-                    learned_ns: setup.ages.learned_ns,
-                    mission_ns: setup.ages.mission_ns,
-                }),
-                choice: Choice::new(&records.risks, setup.ages.learned_ns, key.epoch_ns),
+                pilot: match &knowledge.corrector {
+                    Some(checkpoint) => pilot.with_corrector(checkpoint)?,
+                    None => pilot,
+                },
+                choice: Choice::new(&records.risks, &records.tracks, setup.ages.learned_ns, key.epoch_ns),
                 is_lost: false,
             });
         }
@@ -167,6 +174,23 @@ pub fn replay(records: &Records, knowledge: &Knowledge) -> Result<ReplayReport, 
     (report.n_localised, report.n_unverified) = (localisation.n_verified, localisation.n_unverified);
     report.unverified = localisation.unverified;
     Ok(report)
+}
+
+/// How a decision that was made again differs: in what went to the vehicle, or in how that was corrected.
+fn difference_of(recorded: &DecisionRecord, made: &DecisionRecord) -> Option<String> {
+    if bytemuck::bytes_of(&made.command) != bytemuck::bytes_of(&recorded.command) {
+        return Some(format!("recorded {:?}, made again {:?}", recorded.command, made.command));
+    }
+    let correction = |record: &DecisionRecord| {
+        let numbers = [record.correction_share, record.curvature_change_per_m, record.planned_steering_rad];
+        (record.correction, numbers.map(f32::to_bits))
+    };
+    let told = |record: &DecisionRecord| {
+        let DecisionRecord { correction, curvature_change_per_m, planned_steering_rad, .. } = *record;
+        format!("{curvature_change_per_m} 1/m on {planned_steering_rad} rad, effect {correction}")
+    };
+    (correction(recorded) != correction(made))
+        .then(|| format!("correction recorded as {}, made again as {}", told(recorded), told(made)))
 }
 
 /// One life of the control process.
@@ -189,8 +213,8 @@ impl Life<'_> {
         if let Err(why) = self.choice.check(record) {
             report.contradictions.push(format!("decision {}: {why}", record.cycle));
         }
-        if let Some(missing) = self.take_odometry(record, records) {
-            self.lose(missing, report);
+        for missing in [self.take_odometry(record, records), self.take_imu(record, records)] {
+            missing.into_iter().for_each(|missing| self.lose(missing, report));
         }
         let map = if record.risk == Source::default() { None } else { Some(maps.risk(record)?) };
         let made = match &map {
@@ -211,6 +235,10 @@ impl Life<'_> {
             Ok(mission) => mission.iter().for_each(|mission| self.pilot.hear_mission(mission)),
             Err(missing) => self.lose(missing, report),
         }
+        match records.tracks(record.tracks) {
+            Ok(tracks) => tracks.iter().for_each(|tracks| self.pilot.hear_tracks(tracks)),
+            Err(missing) => self.lose(missing, report),
+        }
         if self.is_lost {
             report.n_unmade += 1;
             return Ok(());
@@ -223,15 +251,30 @@ impl Life<'_> {
         };
         self.pilot.use_rollouts(record.n_rollouts as usize);
         // A stuck pose was told to learning by a message of its own, which was recorded.
-        let made = decision_record(&self.pilot.answer(record.decided_at_ns, &maps)).command;
-        if bytemuck::bytes_of(&made) == bytemuck::bytes_of(&record.command) {
-            report.n_identical += 1;
-        } else {
-            report.first_difference.get_or_insert_with(|| {
-                format!("decision {}: recorded {:?}, made again {made:?}", record.cycle, record.command)
-            });
+        let made = decision_record(&self.pilot.answer(record.decided_at_ns, &maps));
+        report.n_corrections += u64::from(record.correction > 0);
+        match difference_of(record, &made) {
+            None => report.n_identical += 1,
+            Some(difference) => {
+                let told = || format!("decision {}: {difference}", record.cycle);
+                report.first_difference.get_or_insert_with(told);
+            }
         }
         Ok(())
+    }
+
+    /// Shows the corrector what control took in of the inertial measurement unit; says what of it is missing.
+    fn take_imu(&mut self, record: &DecisionRecord, records: &Records) -> Option<String> {
+        let Source { epoch_ns, sequence } = record.imu;
+        for sequence in sequence.checked_add(1)?.saturating_sub(record.n_imu)..=sequence {
+            let key = Key { epoch_ns, sequence };
+            let Some(samples) = records.imu.get(&key) else {
+                return Some(format!("message {sequence} of the IMU"));
+            };
+            let id = MessageId { epoch_ns, sequence };
+            self.pilot.hear_imu(id, samples.iter().map(ImuSample::from));
+        }
+        None
     }
 
     /// Shows the pilot the odometry that control took in for a decision; says what of it is missing.

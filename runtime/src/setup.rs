@@ -47,6 +47,8 @@ pub struct RecordedSetup {
     pub method: String,
     /// SHA-256 of the networks' weights, in hexadecimal digits; empty without networks.
     pub checkpoint_sha256: String,
+    /// The same of what corrected commands for the ground; empty where nothing did.
+    pub corrector_sha256: String,
     /// Share of the worst outcomes planned for.
     pub alpha: f64,
     /// Decided the samples; as text, because not every reader of JSON knows numbers so large.
@@ -59,7 +61,7 @@ pub struct RecordedSetup {
 
 impl RecordedSetup {
     /// The version that this program writes and reads. The first one did not say which it is.
-    pub const FORMAT: u32 = 3;
+    pub const FORMAT: u32 = 4;
 
     /// The version that a recorded setup is of; `None` for what is no setup.
     pub fn format_of(json: &[u8]) -> Option<u32> {
@@ -148,6 +150,7 @@ mod tests {
             config_toml,
             method: "physics".to_owned(),
             checkpoint_sha256: String::new(),
+            corrector_sha256: String::new(),
             alpha: 0.6,
             seed: u64::MAX.to_string(),
             ages: ages::limits(&Periods::default(), &machine_guard, &AskedAges::default()).unwrap(),

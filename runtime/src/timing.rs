@@ -3,9 +3,12 @@
 use std::collections::BTreeMap;
 
 use bicycle::{Decision, HoldReason, StopReason};
+use kinodynamics::CorrectionCounts;
 use serde::Serialize;
 
 use bus::message::{DecisionRecord, Stamp};
+
+use crate::convert::correction_effect;
 
 /// How a time was distributed [ms].
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -65,6 +68,8 @@ pub struct ControlTiming {
     pub map_age: Option<Percentiles>,
     /// Fewest and most futures that a decision to drive sampled.
     pub n_rollouts: Option<[u64; 2]>,
+    /// What became of the commands on their way to the vehicle; none where nobody corrects them.
+    pub correction: Option<CorrectionCounts>,
 }
 
 impl std::fmt::Display for ControlTiming {
@@ -80,6 +85,9 @@ impl std::fmt::Display for ControlTiming {
         }
         for (reason, n) in &self.stops {
             write!(formatter, ", {n} to stop ({reason:?})")?;
+        }
+        if let Some(correction) = &self.correction {
+            write!(formatter, "\ncorrected for the ground: {correction}")?;
         }
         write!(formatter, "\n{:26} {:>8} {:>8} {:>8} {:>8}", "", "p50", "p99", "p99.9", "max")?;
         let rows = [
@@ -105,6 +113,7 @@ pub struct Timing {
     holds: BTreeMap<HoldReason, u64>,
     stops: BTreeMap<StopReason, u64>,
     n_rollouts: Option<[u64; 2]>,
+    correction: Option<CorrectionCounts>,
     /// Between the deadlines of decisions that follow one another [ms].
     apart_ms: Vec<f32>,
     jitter_ms: Vec<f32>,
@@ -122,6 +131,9 @@ impl Timing {
         let scan_at_ns = decision.command.scan_at_ns;
         if scan_at_ns > 0 {
             self.map_age_ms.push(milliseconds(decision.decided_at_ns.saturating_sub(scan_at_ns)));
+        }
+        if let Some(effect) = correction_effect(decision) {
+            self.correction.get_or_insert_default().count(effect);
         }
         match decision.command.decision() {
             Some(Decision::Drive(_)) => {
@@ -163,6 +175,7 @@ impl Timing {
             decision: Percentiles::of(&self.decision_ms),
             map_age: Percentiles::of(&self.map_age_ms),
             n_rollouts: self.n_rollouts,
+            correction: self.correction.clone(),
         })
     }
 

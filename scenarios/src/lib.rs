@@ -5,7 +5,8 @@
 //!
 //! A [`World`] is ground with heights and materials, made by [`rock_field`], [`arena`], [`world_from_layers`] or
 //! [`World::from_fn`]; a [`Plant`] is a machine on it, a [`Deviation`] what is wrong with that machine; an [`Episode`]
-//! puts both together with sensors and rules and asks for a decision every cycle. `examples/own_world.rs` drives in a
+//! puts both together with sensors and rules and asks for a decision every cycle; [`Walker`]s are people who cross its
+//! way. `examples/own_world.rs` drives in a
 //! world of one's own.
 
 mod arena;
@@ -26,12 +27,13 @@ mod sensor_range;
 mod skyline;
 mod task;
 mod truth;
+mod walker;
 mod world;
 
 pub use arena::{ARENA_GOAL_M, ARENA_START, ArenaConfig, ArenaError, arena};
 pub use deviation::{Deviation, DeviationError};
 pub use episode::{
-    Episode, EpisodeConfig, EpisodeError, Fault, Observation, Outcome, Rules, SensorFault, TraceRow,
+    Episode, EpisodeConfig, EpisodeError, Fault, Observation, Outcome, Rules, SensorFault, Strike, TraceRow,
     drive_log,
 };
 pub use friction::Stribeck;
@@ -49,7 +51,8 @@ pub use sealed::{
 };
 pub use sensor_imu::{IMU_PERIOD_NS, Imu, ImuConfig};
 pub use sensor_odometry::{OdometryConfig, OdometrySensor};
-pub use sensor_range::{RangeSensor, RangeSensorConfig, RangeSensorError};
+pub use sensor_range::{RangeSensor, RangeSensorConfig};
 pub use task::{LayersTaskError, ROCK_FIELD_DISTANCE_M, Task};
 pub use truth::{Traversability, Truth, TruthField};
+pub use walker::{Stride, Walker};
 pub use world::{Bounds, Patch, World, WorldError};

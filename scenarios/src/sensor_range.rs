@@ -6,11 +6,11 @@ use std::sync::Arc;
 use bicycle::Vehicle;
 use nalgebra::{Isometry3, Point3, Vector3};
 use rayon::prelude::*;
-use terrain::{BodyBox, Pose, RangePoint, Scan, TerrainClass};
+use terrain::{BodyBox, Pose, RangePoint, Scan, SettingError, TerrainClass};
 
-use crate::World;
 use crate::random::RayNoise;
 use crate::skyline::Skyline;
+use crate::{Walker, World};
 
 /// Least height of the sensor above the ground [m].
 const MAST_MIN_M: f64 = 0.35;
@@ -46,18 +46,6 @@ pub struct RangeSensorConfig {
     pub own_body: BodyBox,
 }
 
-/// A sensor that cannot be.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error("range sensor {field}: expected {expected}, found {found}")]
-pub struct RangeSensorError {
-    /// Name of the setting.
-    pub field: &'static str,
-    /// The range that would do.
-    pub expected: &'static str,
-    /// The value that was given.
-    pub found: f64,
-}
-
 impl RangeSensorConfig {
     /// A sensor that fits the machine: above its middle at 0.55 of its length, on a small one on a mast of
     /// 0.35 m, seeing seven lengths far, at least 5 m. What looks far for its height strikes the ground at so flat an
@@ -83,8 +71,8 @@ impl RangeSensorConfig {
     }
 
     /// Refuses settings no sensor can have.
-    pub fn validate(&self) -> Result<(), RangeSensorError> {
-        let refuse = |field, expected, found| Err(RangeSensorError { field, expected, found });
+    pub fn validate(&self) -> Result<(), SettingError> {
+        let refuse = |field, expected, found| Err(SettingError { field, expected, found });
         let counts = [("n_azimuths", self.n_azimuths), ("n_beams", self.n_beams)];
         if let Some((field, found)) = counts.into_iter().find(|(_, n)| !(1..=4096).contains(n)) {
             return refuse(field, "from 1 to 4096", found as f64);
@@ -126,14 +114,58 @@ pub struct RangeSensor {
 }
 
 /// Where a ray ended.
+#[derive(Clone, Copy)]
 struct Hit {
     range_m: f64,
     class: TerrainClass,
 }
 
+/// A walker as rays meet it.
+struct Upright {
+    centre_m: [f64; 2],
+    foot_m: f64,
+}
+
+impl Upright {
+    fn of(walker: &Walker, world: &World) -> Self {
+        let centre_m = walker.position_m();
+        Self { centre_m, foot_m: world.height_m(centre_m[0], centre_m[1]) }
+    }
+
+    /// Distance along a ray to its side or its top [m].
+    fn distance_along(&self, origin: &Point3<f64>, direction: &Vector3<f64>) -> Option<f64> {
+        let top_m = self.foot_m + Walker::HEIGHT_M;
+        let from_m = [origin.x - self.centre_m[0], origin.y - self.centre_m[1]];
+        let level = direction.x * direction.x + direction.y * direction.y;
+        let half = from_m[0] * direction.x + from_m[1] * direction.y;
+        let beyond_m2 = from_m[0] * from_m[0] + from_m[1] * from_m[1] - Walker::RADIUS_M * Walker::RADIUS_M;
+        let squared = half * half - level * beyond_m2;
+        if squared < 0.0 || level == 0.0 {
+            return None;
+        }
+        let side_m = (-half - squared.sqrt()) / level;
+        let leaves_m = (-half + squared.sqrt()) / level;
+        let height_m = origin.z + side_m * direction.z;
+        if side_m > 0.0 && (self.foot_m..=top_m).contains(&height_m) {
+            return Some(side_m);
+        }
+        let cap_m = (top_m - origin.z) / direction.z;
+        (cap_m > 0.0 && height_m > top_m && (side_m..=leaves_m).contains(&cap_m)).then_some(cap_m)
+    }
+}
+
+/// The first walker on a ray. A camera names a person an obstacle.
+fn nearest(standing: &[Upright], origin: &Point3<f64>, direction: &Vector3<f64>) -> Option<(usize, Hit)> {
+    let hits = standing.iter().enumerate().filter_map(|(place, upright)| {
+        let range_m = upright.distance_along(origin, direction)?;
+        Some((place, Hit { range_m, class: TerrainClass::Obstacle }))
+    });
+    hits.min_by(|(_, a), (_, b)| a.range_m.total_cmp(&b.range_m))
+}
+
 impl RangeSensor {
     /// Puts the sensor into a world.
-    pub fn new(config: RangeSensorConfig, world: Arc<World>, seed: u64) -> Result<Self, RangeSensorError> {
+    pub fn new(config: RangeSensorConfig, world: Arc<World>, seed: u64) -> Result<Self, SettingError> {
         config.validate()?;
         let skyline = Skyline::of(&world);
         Ok(Self { config, world, skyline, seed })
@@ -146,25 +178,48 @@ impl RangeSensor {
 
     /// The sweep with this number from the true pose of the body, measured in an instant.
     pub fn scan(&self, pose: &Pose, number: u64, valid_at_ns: u64) -> Scan {
+        self.scan_among(&[], pose, number, valid_at_ns).0
+    }
+
+    /// The same with people about, and how many returns came from each of them.
+    pub fn scan_among(
+        &self,
+        walkers: &[Walker],
+        pose: &Pose,
+        number: u64,
+        valid_at_ns: u64,
+    ) -> (Scan, Vec<usize>) {
         let motion = pose.isometry();
+        let standing: Vec<Upright> = walkers.iter().map(|walker| Upright::of(walker, &self.world)).collect();
         // The spin is not locked to the scans: consecutive sweeps look between each other's rays.
         let phase = (number as f64 * 0.618_033_988_75).fract();
-        let per_azimuth: Vec<Vec<RangePoint>> = (0..self.config.n_azimuths)
+        let per_azimuth: Vec<(Vec<RangePoint>, Vec<usize>)> = (0..self.config.n_azimuths)
             .into_par_iter()
             .map(|azimuth| {
                 let turn = TAU * (azimuth as f64 + phase) / self.config.n_azimuths as f64;
-                self.column(&motion, turn, (number, azimuth as u64))
+                self.column(&motion, &standing, turn, (number, azimuth as u64))
             })
             .collect();
-        Scan { valid_at_ns, origin_m: self.config.origin_m.map(|v| v as f32), points: per_azimuth.concat() }
+        let (mut points, mut n_returns) = (Vec::new(), vec![0; walkers.len()]);
+        for (column, hit) in per_azimuth {
+            points.extend(column);
+            hit.into_iter().for_each(|walker| n_returns[walker] += 1);
+        }
+        (Scan { valid_at_ns, origin_m: self.config.origin_m.map(|v| v as f32), points }, n_returns)
     }
 
-    /// The returns of all beams in one direction.
-    fn column(&self, motion: &Isometry3<f64>, turn: f64, (number, azimuth): (u64, u64)) -> Vec<RangePoint> {
+    /// The returns of all beams in one direction, and the walkers that they come from.
+    fn column(
+        &self,
+        motion: &Isometry3<f64>,
+        standing: &[Upright],
+        turn: f64,
+        (number, azimuth): (u64, u64),
+    ) -> (Vec<RangePoint>, Vec<usize>) {
         let config = &self.config;
         let [lowest, highest] = config.elevation_rad;
         let origin = motion * Point3::from(config.origin_m);
-        let mut points = Vec::with_capacity(config.n_beams);
+        let (mut points, mut hit_walkers) = (Vec::with_capacity(config.n_beams), Vec::new());
         for beam in 0..config.n_beams {
             let share = if config.n_beams > 1 { beam as f64 / (config.n_beams - 1) as f64 } else { 0.5 };
             let (up, out) = (lowest + (highest - lowest) * share).sin_cos();
@@ -172,11 +227,21 @@ impl RangeSensor {
             let ray_number = azimuth * config.n_beams as u64 + beam as u64;
             let mut noise = RayNoise::new(self.seed, number, ray_number);
             let depth = -noise.uniform().ln();
-            let hit = self.cast(&origin, &(motion.rotation * ahead), depth);
-            let hit = self.nearer(hit, &ahead);
-            points.extend(hit.and_then(|hit| self.measured(&hit, &ahead, &mut noise)));
+            let direction = motion.rotation * ahead;
+            let hit = self.cast(&origin, &direction, depth);
+            let walker = nearest(standing, &origin, &direction);
+            let walker =
+                walker.filter(|(_, found)| hit.as_ref().is_none_or(|hit| found.range_m < hit.range_m));
+            let hit = self.nearer(walker.as_ref().map(|(_, hit)| *hit).or(hit), &ahead);
+            let is_walker =
+                |hit: &Hit| walker.as_ref().is_some_and(|(_, found)| found.range_m == hit.range_m);
+            let is_walker = hit.as_ref().is_some_and(is_walker);
+            if let Some(point) = hit.and_then(|hit| self.measured(&hit, &ahead, &mut noise)) {
+                points.push(point);
+                hit_walkers.extend(walker.filter(|_| is_walker).map(|(place, _)| place));
+            }
         }
-        points
+        (points, hit_walkers)
     }
 
     /// The vehicle itself where it stands before what a ray would hit. It is as hard as rigid ground, and a camera names

@@ -1,5 +1,7 @@
 //! A world: the shape of the ground and what it is made of.
 
+use std::ops::{Add, Mul, Sub};
+
 use bicycle::Geometry;
 use nalgebra::Vector3;
 use terrain::{Cell, GridGeometry, GridMap, Knowledge, TerrainClass};
@@ -232,13 +234,7 @@ impl World {
     #[inline]
     pub fn height_m(&self, x_m: f64, y_m: f64) -> f64 {
         let square = self.square(x_m, y_m);
-        let [south_west, south_east, north_west, north_east] = self.corners(&square);
-        let (u, v) = (square.u, square.v);
-        if u >= v {
-            south_west + u * (south_east - south_west) + v * (north_east - south_east)
-        } else {
-            south_west + v * (north_west - south_west) + u * (north_east - north_west)
-        }
+        height_on_triangles(self.corners(&square), [square.u, square.v])
     }
 
     /// Height change per metre east and north of the triangle under the point [-].
@@ -328,4 +324,20 @@ impl World {
         let south = &self.heights.values()[square.south_west..];
         [south[0], south[1], south[n_cols], south[n_cols + 1]].map(f64::from)
     }
+}
+
+/// Height in a square of two triangles that meet on the diagonal from south-west to north-east, at these shares of the
+/// way east and north. Corners: south-west, south-east, north-west, north-east.
+#[inline(always)]
+pub(crate) fn height_on_triangles<T>(
+    [south_west, south_east, north_west, north_east]: [T; 4],
+    [u, v]: [T; 2],
+) -> T
+where
+    T: Copy + PartialOrd + Add<Output = T> + Sub<Output = T> + Mul<Output = T>,
+{
+    // Both are computed: a branch would miss half the time.
+    let below = south_west + u * (south_east - south_west) + v * (north_east - south_east);
+    let above = south_west + v * (north_west - south_west) + u * (north_east - north_west);
+    if u >= v { below } else { above }
 }

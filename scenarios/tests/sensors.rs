@@ -192,7 +192,7 @@ proptest! {
 #[test]
 fn a_sensor_that_cannot_be_is_refused() {
     let refused = RangeSensor::new(RangeSensorConfig { dropout: 1.5, ..EXACT }, rocks(), 0).unwrap_err();
-    assert_eq!(refused.to_string(), "range sensor dropout: expected from 0 to 1, found 1.5");
+    assert_eq!(refused.to_string(), "dropout: expected from 0 to 1, found 1.5");
     assert!(RangeSensorConfig { range_m: [1.0, 0.5], ..EXACT }.validate().is_err());
     assert!(RangeSensorConfig { n_beams: 0, ..EXACT }.validate().is_err());
     assert!(RangeSensorConfig { elevation_rad: [0.2, -0.2], ..EXACT }.validate().is_err());

@@ -46,7 +46,7 @@ impl Simulator {
     /// What every row of a drive gives to a rollout that starts there.
     fn rows(&self, drive: &Drive) -> Rows {
         let mut memory = vec![0.0; self.stepper.n_slots()];
-        self.stepper.settle(drive.commands[0], &mut memory);
+        self.stepper.fill_steady_state(drive.commands[0], &mut memory);
         let mut rows = Rows { asked: Vec::new(), held: vec![Vec::new(); self.stepper.n_held()] };
         for (row, command) in drive.commands.iter().enumerate() {
             let asked = self.asked(drive, (row, command), &mut memory);

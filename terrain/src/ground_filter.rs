@@ -5,7 +5,7 @@
 //! more than a slope could is an object. Planes through the cells that are left are the ground and its gradient.
 
 use crate::plane::PlaneSums;
-use crate::{GridGeometry, GridMap};
+use crate::{GridGeometry, GridMap, SettingError};
 
 /// What counts as an object, and over what length the ground counts as flat.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -33,20 +33,8 @@ pub struct FilteredGround {
     pub is_ground: GridMap<bool>,
 }
 
-/// A filter that makes no sense.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error("{field}: expected {expected}, found {found}")]
-pub struct GroundFilterError {
-    /// Name of the field.
-    pub field: &'static str,
-    /// The range that would do.
-    pub expected: &'static str,
-    /// The value that was given.
-    pub found: f64,
-}
-
 impl GroundFilter {
-    fn validate(&self) -> Result<(), GroundFilterError> {
+    fn validate(&self) -> Result<(), SettingError> {
         let steepest_rad = std::f64::consts::FRAC_PI_2;
         let checks = [
             ("widest_object_m", self.widest_object_m, "a finite number > 0", self.widest_object_m > 0.0),
@@ -66,7 +54,7 @@ impl GroundFilter {
             ),
         ];
         match checks.into_iter().find(|(_, found, _, allowed)| !(found.is_finite() && *allowed)) {
-            Some((field, found, expected, _)) => Err(GroundFilterError { field, expected, found }),
+            Some((field, found, expected, _)) => Err(SettingError { field, expected, found }),
             None => Ok(()),
         }
     }
@@ -94,7 +82,7 @@ impl GroundFilter {
 pub fn filter_ground(
     surface_m: &GridMap<f32>,
     filter: &GroundFilter,
-) -> Result<FilteredGround, GroundFilterError> {
+) -> Result<FilteredGround, SettingError> {
     filter.validate()?;
     let geometry = *surface_m.geometry();
     let surface_m = &only_finite(surface_m);

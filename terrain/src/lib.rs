@@ -59,19 +59,19 @@ mod observation;
 mod plane;
 mod region;
 mod sampling;
+mod setting;
 mod slope;
 mod surface;
 
 pub use body::BodyBox;
-pub use elevation::{
-    AssumedGround, ElevationConfig, ElevationConfigError, ElevationMap, FuseError, FuseReport,
-};
+pub use elevation::{AssumedGround, ElevationConfig, ElevationMap, FuseError, FuseReport};
 pub use footprint::{Footprint, WheelLayout, YawFootprint};
 pub use grid::{Cell, DistantPosition, GridGeometry, GridMap, LATTICE_MAX};
-pub use ground_filter::{FilteredGround, GroundFilter, GroundFilterError, filter_ground, height_step_m};
+pub use ground_filter::{FilteredGround, GroundFilter, filter_ground, height_step_m};
 pub use mount::Mount;
 pub use observation::{Pose, RangePoint, Scan, TerrainClass};
 pub use region::CellRegion;
 pub use sampling::{PatchSample, PatchShape, bilinear_height, envelope_height, height_at, wheel_heights_m};
+pub use setting::SettingError;
 pub use slope::{Height, Slope, footprint_unevenness, slope_at, update_slopes};
 pub use surface::{Knowledge, SurfaceCell};

@@ -9,7 +9,7 @@ use std::sync::LazyLock;
 
 /// Every crate with the internal crates that its product may use, and no others. `cli` calls `bench` to run
 /// `surefoot bench`; `tests` may use all, but has no product: it has dev-dependencies only.
-const MAY_USE: [(&str, &[&str]); 18] = [
+const MAY_USE: [(&str, &[&str]); 21] = [
     ("terrain", &[]),
     ("traversability", &["terrain"]),
     ("bicycle", &[]),
@@ -17,8 +17,21 @@ const MAY_USE: [(&str, &[&str]); 18] = [
     ("mppi", &["traversability", "bicycle"]),
     ("evidential", &["terrain", "traversability", "bicycle", "physics_prior"]),
     ("kinodynamics", &["bicycle", "evidential"]),
-    ("navigator", &["terrain", "traversability", "bicycle", "physics_prior", "evidential", "mppi"]),
+    (
+        "navigator",
+        &[
+            "terrain",
+            "traversability",
+            "bicycle",
+            "physics_prior",
+            "evidential",
+            "kinodynamics",
+            "tracking",
+            "mppi",
+        ],
+    ),
     ("route", &["terrain"]),
+    ("tracking", &["terrain"]),
     ("scenarios", &["terrain", "bicycle"]),
     ("sim_to_real", &["terrain", "bicycle"]),
     ("formats", &["terrain", "traversability", "bicycle"]),
@@ -31,6 +44,8 @@ const MAY_USE: [(&str, &[&str]); 18] = [
             "bicycle",
             "physics_prior",
             "evidential",
+            "kinodynamics",
+            "tracking",
             "mppi",
             "navigator",
             "formats",
@@ -39,6 +54,34 @@ const MAY_USE: [(&str, &[&str]); 18] = [
     ),
     ("simulator", &["bicycle", "scenarios", "bus"]),
     ("bench", &LIBRARIES),
+    (
+        "python",
+        &[
+            "terrain",
+            "traversability",
+            "bicycle",
+            "physics_prior",
+            "evidential",
+            "mppi",
+            "navigator",
+            "formats",
+        ],
+    ),
+    (
+        "report",
+        &[
+            "terrain",
+            "traversability",
+            "bicycle",
+            "evidential",
+            "navigator",
+            "route",
+            "scenarios",
+            "sim_to_real",
+            "formats",
+            "bench",
+        ],
+    ),
     ("cli", &LIBRARIES_AND_BENCH),
     ("tests", &[]),
 ];
@@ -55,7 +98,7 @@ const LIBRARIES: [&str; 11] = [
     "sim_to_real",
     "formats",
 ];
-const LIBRARIES_AND_BENCH: [&str; 16] = [
+const LIBRARIES_AND_BENCH: [&str; 17] = [
     "route",
     "terrain",
     "traversability",
@@ -72,6 +115,7 @@ const LIBRARIES_AND_BENCH: [&str; 16] = [
     "runtime",
     "simulator",
     "bench",
+    "report",
 ];
 
 /// Crates that may read a clock: those that talk to a person or measure.

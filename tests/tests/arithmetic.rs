@@ -14,14 +14,16 @@ use terrain::{RangePoint, Scan, TerrainClass};
 use traversability::CvarLevel;
 
 /// Crates, folders and files on the way from scan to command.
-const ON_THE_WAY: [&str; 14] = [
+const ON_THE_WAY: [&str; 16] = [
     "terrain/src",
     "traversability/src",
+    "tracking/src",
     "bicycle/src",
     "physics_prior/src",
     "evidential/src/belief_map.rs",
     "evidential/src/belief_map",
     "evidential/src/predictor",
+    "kinodynamics/src/agreement.rs",
     "kinodynamics/src/correction.rs",
     "kinodynamics/src/dense.rs",
     "kinodynamics/src/familiarity.rs",
@@ -100,14 +102,15 @@ const MAKES_INSTRUCTIONS: [&str; 8] = [
     "is_x86_feature_detected",
     "target_feature",
 ];
-/// Where that is allowed: where the sets are told apart, and where the configuration's is found, for the controller and
-/// for the maps.
-const MAY_MAKE_INSTRUCTIONS: [(&str, &[&str]); 5] = [
+/// Where that is allowed: where the sets are told apart, and where the configuration's is found, for the controller, for
+/// the maps and for whoever corrects commands.
+const MAY_MAKE_INSTRUCTIONS: [(&str, &[&str]); 6] = [
     ("bicycle/src/lanes/instructions.rs", &MAKES_INSTRUCTIONS),
     ("mppi/src/kernel.rs", &["Instructions::Portable"]),
     ("mppi/src/config.rs", &["Instructions::find", "Isa::Auto"]),
     ("mppi/src/controller.rs", &["Instructions::find"]),
     ("navigator/src/assessor.rs", &["Instructions::find"]),
+    ("navigator/src/pilot.rs", &["Instructions::find"]),
 ];
 
 /// Whoever computes between scan and command is handed its instruction set.

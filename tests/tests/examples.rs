@@ -9,8 +9,9 @@ use std::process::{Command, Stdio};
 
 use cargo_metadata::MetadataCommand;
 
-/// Crates whose product is not for others to build on: the binary, and the tests that cross crates.
-const NO_LIBRARIES: [&str; 2] = ["cli", "tests"];
+/// Crates whose product is not for others to build on: the binary, the wheel, whose examples are in Python, and the tests
+/// that cross crates.
+const NO_LIBRARIES: [&str; 3] = ["cli", "python", "tests"];
 
 /// An example as Cargo knows it.
 struct Example {

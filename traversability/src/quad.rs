@@ -1,5 +1,6 @@
-//! The four distributions of one pose side by side, so that their CVaR is one pass over four lanes.
+//! The four distributions of one pose side by side, each from its bad end.
 
+use crate::cvar::tail_mean;
 use crate::{Bins, CvarLevel, N_BINS, Pmf, Risk};
 
 /// Distributions of linear traction, angular traction, |roll| and |pitch| of one pose, interleaved and each
@@ -24,9 +25,6 @@ const VALUES: [[f32; 4]; N_BINS] = {
     values
 };
 
-/// Below this the tail holds one bin whatever the level, and f32 would underflow.
-const LEVEL_MIN: f32 = 1e-20;
-
 impl PmfQuad {
     /// From one distribution per parameter.
     pub fn new(linear: &Pmf, angular: &Pmf, roll: &Pmf, pitch: &Pmf) -> Self {
@@ -44,22 +42,11 @@ impl PmfQuad {
         std::array::from_fn(lane)
     }
 
-    /// The CVaR of every parameter from its bad end (PIETRA, equation 6), equal to [`crate::lower_tail_cvar`]
-    /// and [`crate::upper_tail_cvar`] up to f32 rounding.
-    #[inline]
+    /// The CVaR of every parameter from its bad end (PIETRA, equation 6).
     pub fn risk(&self, level: CvarLevel) -> Risk {
-        let mut left = [(level.get() as f32).max(LEVEL_MIN); 4];
-        let (mut taken, mut sum) = ([0.0f32; 4], [0.0f32; 4]);
-        for (row, values) in self.rows.iter().zip(&VALUES) {
-            for lane in 0..4 {
-                let part = if row[lane] < left[lane] { row[lane] } else { left[lane] };
-                sum[lane] += part * values[lane];
-                taken[lane] += part;
-                left[lane] -= part;
-            }
-        }
-        let mean = |lane: usize| sum[lane] / taken[lane];
-        Risk { linear_traction: mean(0), angular_traction: mean(1), roll_rad: mean(2), pitch_rad: mean(3) }
+        let cvar =
+            |lane: usize| tail_mean(VALUES.iter().zip(&self.rows).map(|(v, p)| (v[lane], p[lane])), level);
+        Risk { linear_traction: cvar(0), angular_traction: cvar(1), roll_rad: cvar(2), pitch_rad: cvar(3) }
     }
 }
 

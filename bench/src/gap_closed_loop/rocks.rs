@@ -56,6 +56,7 @@ impl Rocks {
             episode,
             method: Method::Physics,
             networks: None,
+            corrector: None,
             map_source: MapSource::Sensed,
             level: self.level,
             seed: job.seed,
@@ -96,7 +97,8 @@ fn end(outcome: Outcome) -> End {
         Outcome::OutOfBounds => End::OutOfBounds,
         Outcome::Timeout => End::Timeout,
         Outcome::Stopped => End::Stopped,
-        Outcome::Collision => End::Collision,
+        // Nobody walks about there.
+        Outcome::Collision | Outcome::WalkerStruck => End::Collision,
         Outcome::InWater => End::InWater,
     }
 }

@@ -67,6 +67,7 @@ pub fn name_of_outcome(outcome: Outcome) -> &'static str {
         Outcome::Stopped => "stopped",
         Outcome::Collision => "collision",
         Outcome::InWater => "in water",
+        Outcome::WalkerStruck => "walker struck",
     }
 }
 
@@ -105,6 +106,7 @@ impl Job {
             episode: settings.episode.clone(),
             method: self.method,
             networks: None,
+            corrector: None,
             map_source: MapSource::Sensed,
             level: self.level.unwrap_or(CvarLevel::MEAN),
             seed: self.seed,

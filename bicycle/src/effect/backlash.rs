@@ -21,7 +21,7 @@ impl Definition for Backlash {
         1
     }
 
-    fn settled(&self, command: [f64; 2]) -> f64 {
+    fn steady_state(&self, command: [f64; 2]) -> f64 {
         command[1]
     }
 

@@ -196,7 +196,7 @@ pub(crate) trait Definition: Values {
         None
     }
     /// What the slots hold after `[speed, steering]` were commanded for long.
-    fn settled(&self, _command: [f64; 2]) -> f64 {
+    fn steady_state(&self, _command: [f64; 2]) -> f64 {
         0.0
     }
     #[inline(always)]

@@ -25,7 +25,7 @@ impl Definition for FeedForward {
         1
     }
 
-    fn settled(&self, command: [f64; 2]) -> f64 {
+    fn steady_state(&self, command: [f64; 2]) -> f64 {
         command[0]
     }
 

@@ -39,7 +39,7 @@ impl Definition for Friction {
         1
     }
 
-    fn settled(&self, command: [f64; 2]) -> f64 {
+    fn steady_state(&self, command: [f64; 2]) -> f64 {
         command[1]
     }
 

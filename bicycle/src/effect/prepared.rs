@@ -107,7 +107,7 @@ impl PreparedEffects {
             let command = past((self.n_past - k) as f64 * self.step_s - 0.5 * self.step_s);
             [f64::from(command.speed_mps), f64::from(command.steering_rad)]
         };
-        self.settle(at(0), memory);
+        self.fill_steady_state(at(0), memory);
         for k in 0..self.n_past {
             let asked = Asked::of(at(k).map(|value| Real(Scalar, value)));
             self.pass_command(memory, &mut CommandStep { reached_speed: asked.speed, asked, step: k });
@@ -115,10 +115,10 @@ impl PreparedEffects {
     }
 
     /// Fills the memory as a command leaves it that was given for long.
-    pub(crate) fn settle(&self, command: [f64; 2], memory: &mut [f64]) {
+    pub(crate) fn fill_steady_state(&self, command: [f64; 2], memory: &mut [f64]) {
         for prepared in &self.on_command {
             let slots = prepared.first_slot..prepared.first_slot + prepared.n_slots;
-            memory[slots].fill(prepared.effect.settled(command));
+            memory[slots].fill(prepared.effect.steady_state(command));
         }
     }
 

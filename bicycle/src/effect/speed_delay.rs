@@ -25,7 +25,7 @@ impl Definition for SpeedDelay {
         delay_line::n_slots(self.delay_s, step_s)
     }
 
-    fn settled(&self, command: [f64; 2]) -> f64 {
+    fn steady_state(&self, command: [f64; 2]) -> f64 {
         command[0]
     }
 

@@ -8,7 +8,7 @@ use terrain::{GridGeometry, LATTICE_MAX, Mount, RangePoint, Scan, TerrainClass};
 use super::{CommandRecord, Grid, ImuRecord, OdometryRecord, PointRecord, ScanHeader, Source, Stamp};
 
 /// Reasons to stop; the first has the number 1.
-pub const STOP_REASONS: [StopReason; 12] = [
+pub const STOP_REASONS: [StopReason; 13] = [
     StopReason::StaleOdometry,
     StopReason::StaleScan,
     StopReason::NonFiniteInput,
@@ -21,6 +21,7 @@ pub const STOP_REASONS: [StopReason; 12] = [
     StopReason::InputOutOfOrder,
     StopReason::InputFromFuture,
     StopReason::EmergencyStop,
+    StopReason::MovingObstacle,
 ];
 /// Reasons to hold; the first has the number 1.
 pub const HOLD_REASONS: [HoldReason; 5] =
@@ -267,7 +268,7 @@ mod tests {
 
     #[test]
     fn numbers_that_are_no_decision_are_none() {
-        for (decision, reason) in [(0, 0), (4, 1), (2, 0), (2, 6), (3, 0), (3, 13), (u32::MAX, u32::MAX)] {
+        for (decision, reason) in [(0, 0), (4, 1), (2, 0), (2, 6), (3, 0), (3, 14), (u32::MAX, u32::MAX)] {
             let record = CommandRecord { decision, reason, ..CommandRecord::default() };
             assert_eq!(record.decision(), None, "{decision} {reason}");
         }

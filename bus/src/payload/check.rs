@@ -9,7 +9,7 @@ use crate::channel::{FUTURE_NS, Refusal};
 use crate::message::mission::EMERGENCY_STOP;
 use crate::message::{
     CheckpointHeader, CommandRecord, ImuRecord, MissionRecord, OdometryRecord, OrderHeader, PointRecord,
-    RiskHeader, ScanHeader, Stamp, StuckRecord, SurfaceHeader,
+    RiskHeader, ScanHeader, Stamp, StuckRecord, SurfaceHeader, TRACKS_MAX, TrackRecord, TracksHeader,
 };
 
 fn check_one<T>(payload: &[T]) -> Result<&T, Refusal> {
@@ -67,6 +67,21 @@ pub(crate) fn check_surface(header: &SurfaceHeader, payload: &[[f32; 8]]) -> Res
     let shifts = header.jump_m.iter().chain(&header.shift_m).chain(&turns);
     require(Odometry::is_finite(&at) && shifts.clone().all(|m| m.is_finite()), Refusal::NonFinite)?;
     require(DistantPosition::check([x_m, y_m], geometry.resolution_m).is_ok(), Refusal::Malformed)
+}
+
+/// A place that is none could not be kept away from.
+pub(crate) fn check_tracks(_: &TracksHeader, payload: &[TrackRecord]) -> Result<(), Refusal> {
+    require(payload.len() <= TRACKS_MAX, Refusal::Malformed)?;
+    let numbers = |track: &TrackRecord| {
+        let ([x_m, y_m], [east_mps, north_mps]) = (track.position_m, track.velocity_mps);
+        let amounts = [track.position_m2, track.cross_m2ps, track.velocity_m2ps2, track.radius_m];
+        [x_m, y_m, east_mps, north_mps].iter().chain(&amounts).all(|value| value.is_finite())
+    };
+    require(payload.iter().all(numbers), Refusal::NonFinite)?;
+    let amounts = |track: &TrackRecord| {
+        [track.position_m2, track.velocity_m2ps2, track.radius_m].iter().all(|amount| *amount >= 0.0)
+    };
+    require(payload.iter().all(amounts), Refusal::Malformed)
 }
 
 pub(crate) fn check_risk(header: &RiskHeader, payload: &[[f32; 4]]) -> Result<(), Refusal> {

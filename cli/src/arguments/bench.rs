@@ -21,6 +21,9 @@ pub enum BenchCommand {
     /// Drives over the default rock field, with every method and risk tolerance
     #[command(long_about = NAVIGATION_ABOUT)]
     Navigation(BenchNavigationArguments),
+    /// Drives among people who cross the way
+    #[command(long_about = super::crossings::LONG_ABOUT)]
+    Crossings(super::BenchCrossingsArguments),
     /// The simulated machine: its tyre, what its drives teach, and how fast it runs
     #[command(long_about = super::plant::LONG_ABOUT)]
     Plant(super::BenchPlantArguments),
@@ -39,9 +42,9 @@ pub enum BenchCommand {
 #[derive(Args, Clone, Debug)]
 #[command(after_long_help = CONTROL_AFTER_HELP)]
 pub struct BenchControlArguments {
-    /// Threads of the controller, 1 to 256 [default: the machine's]
-    #[arg(long, value_name = "N", value_parser = values::thread_count, allow_hyphen_values = true)]
-    pub threads: Option<usize>,
+    /// How maps and controller compute.
+    #[command(flatten)]
+    pub kernels: super::KernelArguments,
 
     /// Updates to measure, after a warm-up
     #[arg(long, value_name = "N", value_parser = values::update_count, default_value = "2000",
@@ -52,20 +55,9 @@ pub struct BenchControlArguments {
     #[arg(long = "config", value_enum, default_value_t = BenchWork::Bound)]
     pub work: BenchWork,
 
-    /// Instruction set; auto takes the best the machine has
-    #[arg(long, value_enum, default_value_t = super::InstructionSet::Auto)]
-    pub isa: super::InstructionSet,
-
-    /// Write the result to this file too
-    #[arg(long, value_name = "FILE")]
-    pub json: Option<PathBuf>,
-}
-
-impl BenchControlArguments {
-    /// Threads of the controller: as asked, else as many as the machine runs at once.
-    pub fn n_threads(&self) -> usize {
-        self.threads.unwrap_or_else(values::machine_threads)
-    }
+    /// Where the numbers go, besides the terminal.
+    #[command(flatten)]
+    pub copy: super::JsonArguments,
 }
 
 /// How much the controller has to do.
@@ -82,29 +74,18 @@ pub enum BenchWork {
 /// How to measure the risk map.
 #[derive(Args, Clone, Debug)]
 pub struct BenchPriorMapArguments {
-    /// Threads, 1 to 256 [default: the machine's]
-    #[arg(long, value_name = "N", value_parser = values::thread_count, allow_hyphen_values = true)]
-    pub threads: Option<usize>,
+    /// How maps and controller compute.
+    #[command(flatten)]
+    pub kernels: super::KernelArguments,
 
     /// Maps to build
     #[arg(long, value_name = "N", value_parser = values::update_count, default_value = "50",
           allow_hyphen_values = true)]
     pub updates: usize,
 
-    /// Instruction set; auto takes the best the machine has
-    #[arg(long, value_enum, default_value_t = super::InstructionSet::Auto)]
-    pub isa: super::InstructionSet,
-
-    /// Write the result to this file too
-    #[arg(long, value_name = "FILE")]
-    pub json: Option<PathBuf>,
-}
-
-impl BenchPriorMapArguments {
-    /// Threads: as asked, else as many as the machine runs at once.
-    pub fn n_threads(&self) -> usize {
-        self.threads.unwrap_or_else(values::machine_threads)
-    }
+    /// Where the numbers go, besides the terminal.
+    #[command(flatten)]
+    pub copy: super::JsonArguments,
 }
 
 /// Which drives to do.
@@ -136,28 +117,13 @@ pub struct BenchNavigationArguments {
           allow_hyphen_values = true)]
     pub time_limit: f64,
 
-    /// Drives at a time, 1 to 256 [default: the machine's threads]; the result does not depend on it
-    #[arg(long, value_name = "N", value_parser = values::thread_count, allow_hyphen_values = true)]
-    pub threads: Option<usize>,
+    /// How maps and controller compute.
+    #[command(flatten)]
+    pub kernels: super::KernelArguments,
 
-    /// Instruction set of maps and controller; auto takes the best the machine has
-    #[arg(long, value_enum, default_value_t = super::InstructionSet::Auto)]
-    pub isa: super::InstructionSet,
-
-    /// Folder for navigation.json and navigation.png; made if missing, earlier files are replaced
-    #[arg(long, value_name = "DIR", default_value = "surefoot-out")]
-    pub out: PathBuf,
-
-    /// Write the result to this file too
-    #[arg(long, value_name = "FILE")]
-    pub json: Option<PathBuf>,
-}
-
-impl BenchNavigationArguments {
-    /// Drives at a time: as asked, else as many as the machine runs threads at once.
-    pub fn n_threads(&self) -> usize {
-        self.threads.unwrap_or_else(values::machine_threads)
-    }
+    /// Where the results go.
+    #[command(flatten)]
+    pub results: super::ResultArguments,
 }
 
 /// What to train and judge.
@@ -188,10 +154,9 @@ pub struct BenchLearningArguments {
     #[arg(long, value_name = "N", value_parser = pass_count, allow_hyphen_values = true, help_heading = "Tables")]
     pub epochs: Option<usize>,
 
-    /// Drives and trainings at a time, 1 to 256 [default: the machine's threads]; the result does not depend on it
-    #[arg(long, value_name = "N", value_parser = values::thread_count, allow_hyphen_values = true,
-          help_heading = "Tables")]
-    pub threads: Option<usize>,
+    /// How much is done at a time.
+    #[command(flatten, next_help_heading = "Tables")]
+    pub threads: super::ThreadArguments,
 
     /// Judge the posterior on measured traction instead: a map with measured and predicted distributions, density,
     /// heights and classes (.npz)
@@ -199,20 +164,9 @@ pub struct BenchLearningArguments {
           conflicts_with_all = ["seeds", "seed", "maps", "trials", "epochs", "threads"])]
     pub traction_map: Option<PathBuf>,
 
-    /// Folder for the results; made if missing, earlier files are replaced
-    #[arg(long, value_name = "DIR", default_value = "surefoot-out")]
-    pub out: PathBuf,
-
-    /// Write the numbers to this file too
-    #[arg(long, value_name = "FILE")]
-    pub json: Option<PathBuf>,
-}
-
-impl BenchLearningArguments {
-    /// Drives and trainings at a time: as asked, else as many as the machine runs threads at once.
-    pub fn n_threads(&self) -> usize {
-        self.threads.unwrap_or_else(values::machine_threads)
-    }
+    /// Where the results go.
+    #[command(flatten)]
+    pub results: super::ResultArguments,
 }
 
 fn pass_count(word: &str) -> Result<usize, String> {

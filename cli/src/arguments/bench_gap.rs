@@ -1,7 +1,5 @@
 //! `surefoot bench gap`.
 
-use std::path::PathBuf;
-
 use bench::gap_closed_loop::{Gap, Ground};
 use clap::Args;
 
@@ -26,28 +24,13 @@ pub struct BenchGapArguments {
           allow_hyphen_values = true)]
     pub seeds: u64,
 
-    /// Drives at a time, 1 to 256 [default: the machine's threads]; the result does not depend on it
-    #[arg(long, value_name = "N", value_parser = values::thread_count, allow_hyphen_values = true)]
-    pub threads: Option<usize>,
+    /// How maps and controller compute.
+    #[command(flatten)]
+    pub kernels: super::KernelArguments,
 
-    /// Instruction set of maps and controller; auto takes the best the machine has
-    #[arg(long, value_enum, default_value_t = super::InstructionSet::Auto)]
-    pub isa: super::InstructionSet,
-
-    /// Folder for gap_closed_loop.json and gap_closed_loop.png; made if missing, earlier files are replaced
-    #[arg(long, value_name = "DIR", default_value = "surefoot-out")]
-    pub out: PathBuf,
-
-    /// Write the result to this file too
-    #[arg(long, value_name = "FILE")]
-    pub json: Option<PathBuf>,
-}
-
-impl BenchGapArguments {
-    /// Drives at a time: as asked, else as many as the machine runs threads at once.
-    pub fn n_threads(&self) -> usize {
-        self.threads.unwrap_or_else(values::machine_threads)
-    }
+    /// Where the results go.
+    #[command(flatten)]
+    pub results: super::ResultArguments,
 }
 
 fn ground(word: &str) -> Result<Ground, String> {

@@ -96,10 +96,9 @@ pub struct CollectArguments {
           allow_hyphen_values = true, help_heading = "Run")]
     pub seed: u64,
 
-    /// Threads, 1 to 256 [default: the machine's]; the result does not depend on it
-    #[arg(long, value_name = "N", value_parser = values::thread_count, allow_hyphen_values = true,
-          help_heading = "Run")]
-    pub threads: Option<usize>,
+    /// How much is done at a time.
+    #[command(flatten, next_help_heading = "Run")]
+    pub threads: super::ThreadArguments,
 
     /// The dataset; a picture of it goes beside it, with the ending .png
     #[arg(
@@ -110,9 +109,9 @@ pub struct CollectArguments {
     )]
     pub out: PathBuf,
 
-    /// Write the summary to this file too
-    #[arg(long, value_name = "FILE", help_heading = "Output")]
-    pub json: Option<PathBuf>,
+    /// Where the numbers go, besides the terminal.
+    #[command(flatten, next_help_heading = "Output")]
+    pub copy: super::JsonArguments,
 }
 
 impl CollectArguments {
@@ -124,11 +123,6 @@ impl CollectArguments {
             CollectWorld::Testbed | CollectWorld::Rocks => "pietra_full_size",
         };
         self.vehicle.as_deref().unwrap_or(fitting)
-    }
-
-    /// Threads: as asked, else as many as the machine runs at once.
-    pub fn n_threads(&self) -> usize {
-        self.threads.unwrap_or_else(values::machine_threads)
     }
 }
 

@@ -10,8 +10,8 @@ use super::values::{self, Goal, StartPose, WorldSource};
 use crate::UsageError;
 
 /// What says how to plan: it means nothing where nobody does.
-const PLANNING: [&str; 9] =
-    ["goal", "method", "weights", "model", "alpha", "config", "oracle_map", "threads", "isa"];
+const PLANNING: [&str; 10] =
+    ["goal", "method", "weights", "correct", "model", "alpha", "config", "oracle_map", "threads", "isa"];
 
 /// What to drive, where, and what to believe.
 #[derive(Args, Clone, Debug)]
@@ -46,6 +46,11 @@ pub struct DriveArguments {
           help_heading = "World")]
     pub tolerance: Option<f64>,
 
+    /// People who cross the way to the goal, at most 16; they are tracked and kept away from
+    #[arg(long, value_name = "N", value_parser = walker_count, default_value = "0", allow_hyphen_values = true,
+          help_heading = "World")]
+    pub walkers: usize,
+
     /// The machine that is simulated: a name or a TOML file [default: pietra_full_size; rc_car in the arena]
     ///
     /// Names: pietra_full_size (3.4 x 1.8 m), rc_car (0.33 x 0.25 m), buggy_fifth (1/5 scale), sedan.
@@ -70,6 +75,15 @@ pub struct DriveArguments {
     /// `surefoot train` leaves it
     #[arg(long, value_name = "DIR", help_heading = "Vehicle and controller")]
     pub weights: Option<PathBuf>,
+
+    /// Correct commands between controller and vehicle for the ground under the wheels
+    #[arg(long, value_enum, requires = "kinodynamics_weights", help_heading = "Vehicle and controller")]
+    pub correct: Option<Correct>,
+
+    /// Networks that correct commands: a folder with kinodynamics.safetensors and kinodynamics.json, as `surefoot train
+    /// kinodynamics` leaves it
+    #[arg(long, value_name = "DIR", requires = "correct", help_heading = "Vehicle and controller")]
+    pub kinodynamics_weights: Option<PathBuf>,
 
     /// Risk tolerance in (0, 1]: the share of worst outcomes to plan for; 1 plans for the mean
     #[arg(long, value_name = "LEVEL", value_parser = values::cvar_level, default_value = "0.6",
@@ -98,27 +112,18 @@ pub struct DriveArguments {
     #[arg(long, value_enum, help_heading = "Run")]
     pub pace: Option<Pace>,
 
-    /// Threads of the controller, 1 to 256 [default: the machine's]; the result does not depend on it
-    #[arg(long, value_name = "N", value_parser = values::thread_count, allow_hyphen_values = true,
-          help_heading = "Run")]
-    pub threads: Option<usize>,
+    /// How maps and controller compute.
+    #[command(flatten, next_help_heading = "Run")]
+    pub kernels: super::KernelArguments,
 
-    /// Instruction set of maps and controller; auto takes the best the machine has
-    #[arg(long, value_enum, default_value_t = InstructionSet::Auto, help_heading = "Run")]
-    pub isa: InstructionSet,
-
-    /// Folder for drive.png, drive.mcap and summary.json; made if missing, earlier files are replaced
-    #[arg(long, value_name = "DIR", default_value = "surefoot-out", help_heading = "Output")]
-    pub out: PathBuf,
+    /// Where the results go.
+    #[command(flatten, next_help_heading = "Output")]
+    pub results: super::ResultArguments,
 
     /// Carry out the commands of this drive log (.csv or .mcap: t, cmd_speed, cmd_steer) instead of planning; nothing but
     /// the world's edge, a fall or a standstill ends the drive before they do
     #[arg(long, value_name = "FILE", conflicts_with_all = PLANNING, help_heading = "Run")]
     pub commands: Option<PathBuf>,
-
-    /// Write the summary to this file too
-    #[arg(long, value_name = "FILE", help_heading = "Output")]
-    pub json: Option<PathBuf>,
 }
 
 impl DriveArguments {
@@ -148,11 +153,10 @@ impl DriveArguments {
     pub fn map_source(&self) -> MapSource {
         if self.oracle_map { MapSource::Oracle } else { MapSource::Sensed }
     }
+}
 
-    /// Threads of the controller: as asked, else as many as the machine runs at once.
-    pub fn n_threads(&self) -> usize {
-        self.threads.unwrap_or_else(super::values::machine_threads)
-    }
+fn walker_count(word: &str) -> Result<usize, String> {
+    if word.trim() == "0" { Ok(0) } else { values::count(word, 16, "walkers") }
 }
 
 /// Where the controller's map comes from.
@@ -200,6 +204,14 @@ impl From<Method> for bench::closed_loop::Method {
     }
 }
 
+/// What corrects commands for the ground under the wheels.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Correct {
+    /// The curvature, as half a second of the inertial measurement unit tells: by at most correction.curvature_change_max_per_m
+    /// of the settings, and not at all where the unit is silent, saturated or turned, or the moment unlike the training
+    Kinodynamics,
+}
+
 /// How simulated time passes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Pace {
@@ -207,30 +219,6 @@ pub enum Pace {
     Fast,
     /// One simulated second takes one second
     Real,
-}
-
-/// Instruction set of every kernel between scan and command.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum InstructionSet {
-    /// The best the machine has
-    Auto,
-    /// AVX-512, 16 lanes
-    Avx512,
-    /// AVX2 and FMA, 8 lanes
-    Avx2,
-    /// Plain x86-64 or any other processor
-    Portable,
-}
-
-impl From<InstructionSet> for mppi::Isa {
-    fn from(asked: InstructionSet) -> Self {
-        match asked {
-            InstructionSet::Auto => Self::Auto,
-            InstructionSet::Avx512 => Self::Avx512,
-            InstructionSet::Avx2 => Self::Avx2,
-            InstructionSet::Portable => Self::Portable,
-        }
-    }
 }
 
 pub(super) const LONG_ABOUT: &str = "\
@@ -253,14 +241,19 @@ Examples:
   surefoot drive --deviation steering_delay=0.25 --deviation tyre_grip=0.6
       A robot that is not what its simulator says. Record it, diagnose it with
       `surefoot gap`, and drive again with --model.
+  surefoot drive --correct kinodynamics --kinodynamics-weights wheels
+      Commands are corrected for what the wheels stand on, by networks of
+      `surefoot train kinodynamics` for this vehicle.
   surefoot drive --world hills.npz --start 12,-3,1.57 --goal 60,20
       Real elevation; negative coordinates are fine.
+  surefoot drive --walkers 3
+      Among people who cross the way.
   surefoot drive --goal 30,25 --goal 12,14
       One goal after the other.
 
 Files written to --out:
   drive.png     terrain with hill shading, risk map, vegetation and obstacles,
-                the path driven coloured by speed, start and goal; below it
+                the path driven coloured by speed, people's ways, start and goal; below it
                 speed, roll and pitch over time
   drive.mcap    poses, commands, the drive log of what the sensors said, elevation
                 and risk grids, best rollouts and controller diagnostics; opens
@@ -281,6 +274,9 @@ Outcomes:
                   or Ctrl-C
   collision       body or wheels touched an obstacle
   in_water        a wheel stood in water, whose depth nobody knows
+  walker_struck   the moving vehicle touched somebody who walks; summary.json says with
+                  was_avoidable whether the plant would have stood in time, had it been
+                  told to when it could first be foreseen
 
 Elevation files:
   .npz        elevation [row, col] in metres, row 0 = south, column 0 = west;
@@ -327,7 +323,7 @@ mod tests {
         assert_eq!((drive.alpha, drive.seed, drive.time_limit), (0.6, 1, 120.0));
         assert_eq!((drive.method, drive.map_source()), (None, MapSource::Sensed));
         assert_eq!(drive.vehicle_name_or_path(), "pietra_full_size");
-        assert!(drive.n_threads() >= 1);
+        assert!(drive.kernels.threads.count() >= 1);
     }
 
     #[test]

@@ -68,9 +68,9 @@ pub struct GapDiagnoseArguments {
           help_heading = "Drives without a case file")]
     pub heldout: Vec<PathBuf>,
 
-    /// Write the answer to this file
-    #[arg(long, value_name = "FILE")]
-    pub json: Option<PathBuf>,
+    /// Where the answer goes, besides the folder.
+    #[command(flatten)]
+    pub copy: super::JsonArguments,
 
     /// Folder for the report, its pictures and the answer; made if missing, earlier files are replaced
     /// [default: surefoot-out, unless --json or --predictions is given]
@@ -100,7 +100,7 @@ pub struct GapDiagnoseArguments {
 impl GapDiagnoseArguments {
     /// Folder of the report: as asked, else `surefoot-out` unless the answer goes elsewhere.
     pub fn report_folder(&self) -> Option<PathBuf> {
-        let goes_elsewhere = self.json.is_some() || self.predictions.is_some();
+        let goes_elsewhere = self.copy.json.is_some() || self.predictions.is_some();
         self.out.clone().or_else(|| (!goes_elsewhere).then(|| PathBuf::from("surefoot-out")))
     }
 }

@@ -26,16 +26,9 @@ pub struct GapSealArguments {
     #[arg(long, value_name = "FILE")]
     pub labels: PathBuf,
 
-    /// Drives at a time, 1 to 256 [default: the machine's threads]; the set does not depend on it
-    #[arg(long, value_name = "N", value_parser = values::thread_count, allow_hyphen_values = true)]
-    pub threads: Option<usize>,
-}
-
-impl GapSealArguments {
-    /// Drives at a time: as asked, else as many as the machine runs threads at once.
-    pub fn n_threads(&self) -> usize {
-        self.threads.unwrap_or_else(values::machine_threads)
-    }
+    /// How much is done at a time.
+    #[command(flatten)]
+    pub threads: super::ThreadArguments,
 }
 
 /// Which cases to diagnose, and what to hold the answers against.
@@ -63,13 +56,9 @@ pub struct GapScoreArguments {
           allow_hyphen_values = true)]
     pub threads: usize,
 
-    /// Folder for the score, its pictures and all answers; made if missing, earlier files are replaced
-    #[arg(long, value_name = "DIR", default_value = "surefoot-out")]
-    pub out: PathBuf,
-
-    /// Write the score to this file too
-    #[arg(long, value_name = "FILE")]
-    pub json: Option<PathBuf>,
+    /// Where the results go.
+    #[command(flatten)]
+    pub results: super::ResultArguments,
 }
 
 fn case_count(word: &str) -> Result<usize, String> {

@@ -13,9 +13,9 @@ pub struct InspectArguments {
     #[arg(value_name = "FILE")]
     pub file: PathBuf,
 
-    /// Write what was found to this file too
-    #[arg(long, value_name = "FILE")]
-    pub json: Option<PathBuf>,
+    /// Where the numbers go, besides the terminal.
+    #[command(flatten)]
+    pub copy: super::JsonArguments,
 }
 
 pub(super) const LONG_ABOUT: &str = "\

@@ -42,13 +42,9 @@ pub struct TrainKinodynamicsArguments {
     #[arg(long, value_name = "N", value_parser = values::seed, default_value = "1", allow_hyphen_values = true)]
     pub seed: u64,
 
-    /// Folder for the results; made if missing, earlier files are replaced
-    #[arg(long, value_name = "DIR", default_value = "surefoot-out")]
-    pub out: PathBuf,
-
-    /// Write the summary to this file too
-    #[arg(long, value_name = "FILE")]
-    pub json: Option<PathBuf>,
+    /// Where the results go.
+    #[command(flatten)]
+    pub results: super::ResultArguments,
 }
 
 /// What the model knows of the ground.
@@ -132,24 +128,13 @@ pub struct BenchKinodynamicsArguments {
     #[arg(long, value_name = "FILE", conflicts_with_all = ["rows", "half_width", "tune_walls", "data_minutes", "minutes", "laps"])]
     pub log: Option<PathBuf>,
 
-    /// Laps and trainings at a time, 1 to 256 [default: the machine's threads]; the result does not depend on it
-    #[arg(long, value_name = "N", value_parser = values::thread_count, allow_hyphen_values = true)]
-    pub threads: Option<usize>,
+    /// How much is done at a time.
+    #[command(flatten)]
+    pub threads: super::ThreadArguments,
 
-    /// Folder for the results; made if missing, earlier files are replaced
-    #[arg(long, value_name = "DIR", default_value = "surefoot-out")]
-    pub out: PathBuf,
-
-    /// Write the numbers to this file too
-    #[arg(long, value_name = "FILE")]
-    pub json: Option<PathBuf>,
-}
-
-impl BenchKinodynamicsArguments {
-    /// Laps at a time: as asked, else as many as the machine runs threads at once.
-    pub fn n_threads(&self) -> usize {
-        self.threads.unwrap_or_else(values::machine_threads)
-    }
+    /// Where the results go.
+    #[command(flatten)]
+    pub results: super::ResultArguments,
 }
 
 /// Which models.

@@ -12,9 +12,9 @@ use super::values;
 #[derive(Args, Clone, Debug)]
 #[command(after_long_help = AFTER_HELP)]
 pub struct BenchLearnedMapArguments {
-    /// Threads, 1 to 256 [default: the machine's]
-    #[arg(long, value_name = "N", value_parser = values::thread_count, allow_hyphen_values = true)]
-    pub threads: Option<usize>,
+    /// How maps and controller compute.
+    #[command(flatten)]
+    pub kernels: super::KernelArguments,
 
     /// Maps to build of every network
     #[arg(long, value_name = "N", value_parser = values::update_count, default_value = "50",
@@ -29,20 +29,9 @@ pub struct BenchLearnedMapArguments {
     #[arg(long, value_name = "FILE")]
     pub scan: Option<PathBuf>,
 
-    /// Instruction set; auto takes the best the machine has
-    #[arg(long, value_enum, default_value_t = super::InstructionSet::Auto)]
-    pub isa: super::InstructionSet,
-
-    /// Write the result to this file too
-    #[arg(long, value_name = "FILE")]
-    pub json: Option<PathBuf>,
-}
-
-impl BenchLearnedMapArguments {
-    /// Threads: as asked, else as many as the machine runs at once.
-    pub fn n_threads(&self) -> usize {
-        self.threads.unwrap_or_else(values::machine_threads)
-    }
+    /// Where the numbers go, besides the terminal.
+    #[command(flatten)]
+    pub copy: super::JsonArguments,
 }
 
 /// Widths as they are written: `96-64:16`.

@@ -1,7 +1,5 @@
 //! `surefoot bench plant`.
 
-use std::path::PathBuf;
-
 use clap::Args;
 
 /// Which plant to measure.
@@ -12,13 +10,9 @@ pub struct BenchPlantArguments {
     #[arg(long, value_name = "NAME|FILE", default_value = "pietra_full_size")]
     pub vehicle: String,
 
-    /// Folder for plant.json and plant.png; made if missing, earlier files are replaced
-    #[arg(long, value_name = "DIR", default_value = "surefoot-out")]
-    pub out: PathBuf,
-
-    /// Write the result to this file too
-    #[arg(long, value_name = "FILE")]
-    pub json: Option<PathBuf>,
+    /// Where the results go.
+    #[command(flatten)]
+    pub results: super::ResultArguments,
 }
 
 pub(super) const LONG_ABOUT: &str = "\

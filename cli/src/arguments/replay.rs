@@ -17,16 +17,20 @@ pub struct ReplayArguments {
     #[arg(long, value_name = "DIR")]
     pub weights: Option<PathBuf>,
 
-    /// Write the result to this file too
-    #[arg(long, value_name = "FILE")]
-    pub json: Option<PathBuf>,
+    /// Networks that corrected commands, where some did: a folder with kinodynamics.safetensors and kinodynamics.json
+    #[arg(long, value_name = "DIR")]
+    pub kinodynamics_weights: Option<PathBuf>,
+
+    /// Where the numbers go, besides the terminal.
+    #[command(flatten)]
+    pub copy: super::JsonArguments,
 }
 
 pub(super) const LONG_ABOUT: &str = "\
 Makes every decision of a recording again: the maps from the recorded scans and the networks, checked by their hashes, \
 and the commands from the maps and what control says it used. Every command must come out to the last bit; the first \
 that does not is told. Each decision must also have been made on the newest maps that there were, and on the one of them \
-that is to be driven on. Jumps of the localisation and places of scans are made out again from the recorded odometry and \
+that is to be driven on. What corrected commands for the ground corrects them again. Jumps of the localisation and places of scans are made out again from the recorded odometry and \
 must be those of the maps. What the recording lacks is told too, and what hangs on it is not counted as made again.";
 
 const AFTER_HELP: &str = "\

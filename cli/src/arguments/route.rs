@@ -38,13 +38,9 @@ pub struct RouteArguments {
     #[arg(long, value_name = "M/S", allow_hyphen_values = true)]
     pub speed: Option<f64>,
 
-    /// Folder for route.png, route.csv and route.json; made if missing, earlier files are replaced
-    #[arg(long, value_name = "DIR", default_value = "surefoot-out")]
-    pub out: PathBuf,
-
-    /// Write the numbers to this file too
-    #[arg(long, value_name = "FILE")]
-    pub json: Option<PathBuf>,
+    /// Where the results go.
+    #[command(flatten)]
+    pub results: super::ResultArguments,
 }
 
 /// Grounds that AnyNav states coefficients for.

@@ -39,13 +39,9 @@ pub struct TrainArguments {
     #[arg(long, value_name = "N", value_parser = values::seed, default_value = "1", allow_hyphen_values = true)]
     pub seed: u64,
 
-    /// Folder for the results; made if missing, earlier files are replaced
-    #[arg(long, value_name = "DIR", default_value = "surefoot-out")]
-    pub out: PathBuf,
-
-    /// Write the summary to this file too
-    #[arg(long, value_name = "FILE")]
-    pub json: Option<PathBuf>,
+    /// Where the results go.
+    #[command(flatten)]
+    pub results: super::ResultArguments,
 
     /// Keep the examples up to this percentile of the training data's unevenness, of both datasets; 100 keeps all
     #[arg(long, value_name = "PERCENT", value_parser = percentile, default_value = "50",

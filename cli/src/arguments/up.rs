@@ -1,12 +1,13 @@
 //! `surefoot up`.
 
 use std::net::SocketAddr;
+use std::ops::RangeInclusive;
 
 use bus::ages::Periods;
 use bus::channel::{RunName, THIRD_PARTIES};
 use bus::status::Role;
 use clap::{Args, ValueEnum};
-use formats::RobotFile;
+use formats::{CONTROL_RATES_HZ, ODOMETRY_RATES_HZ, RobotFile, SCAN_RATES_HZ, THIRD_PARTIES_MAX};
 
 use super::DriveArguments;
 use super::values;
@@ -15,9 +16,10 @@ use super::values;
 pub const LIVE_DEFAULT: &str = "127.0.0.1:8765";
 
 /// What describes a simulated vehicle or its world, and what a robot's file says.
-const SIMULATION: [&str; 14] = [
+const SIMULATION: [&str; 16] = [
     "world",
     "bush_height",
+    "walkers",
     "start",
     "vehicle",
     "deviation",
@@ -25,6 +27,7 @@ const SIMULATION: [&str; 14] = [
     "config",
     "method",
     "weights",
+    "correct",
     "time_limit",
     "rate",
     "odometry_rate",
@@ -205,20 +208,26 @@ impl UpRole {
 }
 
 fn rate_hz(word: &str) -> Result<f64, String> {
-    values::number_where(word, "a rate from 1 to 50 Hz", |value| (1.0..=50.0).contains(&value))
+    rate_in(word, &CONTROL_RATES_HZ)
 }
 
 fn odometry_rate_hz(word: &str) -> Result<f64, String> {
-    values::number_where(word, "a rate from 2 to 400 Hz", |value| (2.0..=400.0).contains(&value))
+    rate_in(word, &ODOMETRY_RATES_HZ)
 }
 
 fn scan_rate_hz(word: &str) -> Result<f64, String> {
-    values::number_where(word, "a rate from 0.5 to 50 Hz", |value| (0.5..=50.0).contains(&value))
+    rate_in(word, &SCAN_RATES_HZ)
+}
+
+fn rate_in(word: &str, range: &RangeInclusive<f64>) -> Result<f64, String> {
+    let expected = format!("a rate from {} to {} Hz", range.start(), range.end());
+    values::number_where(word, &expected, |value| range.contains(&value))
 }
 
 fn third_parties(word: &str) -> Result<usize, String> {
-    let places = word.trim().parse().ok().filter(|n| (0..=16).contains(n));
-    places.ok_or_else(|| format!("expected a number of readers from 0 to 16, found {word:?}"))
+    let places = word.trim().parse().ok().filter(|n| *n <= THIRD_PARTIES_MAX);
+    places
+        .ok_or_else(|| format!("expected a number of readers from 0 to {THIRD_PARTIES_MAX}, found {word:?}"))
 }
 
 fn quota_mb(word: &str) -> Result<f64, String> {

@@ -1,26 +1,19 @@
 //! `surefoot bench kinodynamics`: the experiments, a bar meanwhile, and their results as text, JSON, pictures and page.
 #![allow(clippy::disallowed_methods, reason = "people are told how long the benchmark takes")]
 
-mod html;
 mod log;
-mod told;
 
-use std::io::IsTerminal;
 use std::time::Instant;
 
 use ::bench::kinodynamics::{
     HALF_WIDTH_M, KinodynamicsError, Report, Request, Row, Stage, VEHICLE, Watch, data_curve, measure,
     tune_walls,
 };
-use indicatif::{ProgressBar, ProgressStyle};
+use indicatif::ProgressBar;
 use serde::Serialize;
 
 use crate::arguments::{BenchKinodynamicsArguments, KinodynamicsRows};
-use crate::picture::draw_laps;
-use crate::{UsageError, WorkFailed, interrupt, output, summary};
-
-/// Room that must be free beforehand [bytes].
-const ROOM_BYTES: u64 = 32 << 20;
+use crate::{UsageError, WorkFailed, interrupt, progress, summary};
 
 /// The content of `kinodynamics.json`.
 #[derive(Serialize)]
@@ -32,20 +25,14 @@ struct Written<'a> {
 }
 
 pub(crate) fn run_kinodynamics(arguments: &BenchKinodynamicsArguments) -> anyhow::Result<()> {
-    formats::prepare_out_dir(&arguments.out, ROOM_BYTES)
-        .map_err(|error| UsageError(format!("--out: {}", UsageError::from_input(error))))?;
-    arguments.json.as_deref().map_or(Ok(()), output::prepare_json)?;
+    arguments.results.prepare()?;
     interrupt::catch_interrupts()?;
     if let Some(path) = &arguments.log {
         return log::run(arguments, path);
     }
     let request = request(arguments)?;
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(arguments.n_threads()).build()?;
-    let progress = Progress(if std::io::stderr().is_terminal() {
-        ProgressBar::no_length()
-    } else {
-        ProgressBar::hidden()
-    });
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(arguments.threads.count()).build()?;
+    let progress = Progress(progress::bar(0, "{pos}/{len} {msg}"));
     if !arguments.tune_walls.is_empty() {
         let tuned =
             pool.install(|| tune_walls(&request, &arguments.tune_walls, &progress)).map_err(told_error)?;
@@ -60,17 +47,13 @@ pub(crate) fn run_kinodynamics(arguments: &BenchKinodynamicsArguments) -> anyhow
             pool.install(|| data_curve(&request, &arguments.data_minutes, summary::revision(), &progress));
         let points = points.map_err(told_error)?;
         progress.0.finish_and_clear();
-        print!("{}", told::data_curve(&points));
-        let file = arguments.out.join("kinodynamics_data.json");
-        for path in [Some(&file), arguments.json.as_ref()].into_iter().flatten() {
-            formats::write_json_atomic(path, &points)?;
-        }
-        return Ok(());
+        print!("{}", report::kinodynamics::data_curve_text(&points));
+        return Ok(arguments.results.write_json("kinodynamics_data.json", &points)?);
     }
     let began = Instant::now();
     let report = pool.install(|| measure(&request, summary::revision(), &progress)).map_err(told_error)?;
     progress.0.finish_and_clear();
-    print!("{}", told::report(&report));
+    print!("{}", report::kinodynamics::text(&report));
     write(arguments, &report, began.elapsed().as_secs_f64())
 }
 
@@ -101,25 +84,16 @@ fn told_error(error: KinodynamicsError) -> anyhow::Error {
 
 fn write(arguments: &BenchKinodynamicsArguments, report: &Report, took_s: f64) -> anyhow::Result<()> {
     let written = Written { revision: summary::revision(), took_s, report };
-    let out = |name: &str| arguments.out.join(name);
-    for path in [Some(out("kinodynamics.json")), arguments.json.clone()].iter().flatten() {
-        formats::write_json_atomic(path, &written)?;
+    arguments.results.write_json("kinodynamics.json", &written)?;
+    let pictures = report::kinodynamics::pictures(report)?;
+    for picture in &pictures {
+        arguments.results.write(picture.file, &picture.png)?;
     }
-    let pages = [
-        ("kinodynamics_outdoor.png", draw_laps(&report.outdoor, report.half_width_m)),
-        ("kinodynamics_indoor.png", draw_laps(&report.indoor, report.half_width_m)),
-    ];
-    let mut pictures = Vec::new();
-    for (name, page) in pages {
-        let png = page?;
-        formats::write_bytes_atomic(&out(name), &png)?;
-        pictures.push(png);
-    }
-    let page = html::page(report, &pictures, summary::revision());
-    formats::write_bytes_atomic(&out("kinodynamics.html"), page.as_bytes())?;
+    let page = report::kinodynamics::page(report, &pictures, summary::revision());
+    arguments.results.write("kinodynamics.html", page.as_bytes())?;
     println!(
         "\n  {took_s:.0} s; kinodynamics.json, kinodynamics.html, kinodynamics_outdoor.png and kinodynamics_indoor.png in {}",
-        arguments.out.display()
+        arguments.results.out.display()
     );
     Ok(())
 }
@@ -134,10 +108,6 @@ impl Watch for Progress {
             Stage::Training(row, n) => (format!("passes, {}", row.name()), n),
             Stage::Laps(n) => ("laps".to_owned(), n),
         };
-        // The template is a constant: were it wrong, the plain bar would do.
-        if let Ok(style) = ProgressStyle::with_template("  {bar:28.green/black.bright} {pos}/{len} {msg}") {
-            self.0.set_style(style.progress_chars("━╸━"));
-        }
         self.0.set_length(n);
         self.0.set_position(0);
         self.0.set_message(told);

@@ -4,8 +4,8 @@ use ::bench::learned_map::{Report, Request, ScanDrive, ScanDriveReport, measure,
 use serde::Serialize;
 
 use super::{show, told};
+use crate::UsageError;
 use crate::arguments::BenchLearnedMapArguments;
-use crate::{UsageError, output};
 
 /// Scans along the way past what the real one has seen.
 const N_SCANS: usize = 60;
@@ -20,11 +20,10 @@ struct Written {
 }
 
 pub(crate) fn run_learned_map(arguments: &BenchLearnedMapArguments) -> anyhow::Result<()> {
-    let json = arguments.json.as_deref();
-    json.map_or(Ok(()), output::prepare_json)?;
+    arguments.copy.prepare()?;
     let points = arguments.scan.as_deref().map(formats::read_scan_points).transpose();
     let points_m = points.map_err(UsageError::from_input)?;
-    let (n_threads, isa) = (arguments.n_threads(), arguments.isa.into());
+    let (n_threads, isa) = (arguments.kernels.threads.count(), arguments.kernels.isa.into());
     let sizes: Vec<_> = arguments.networks.iter().map(|network| network.0.clone()).collect();
     let scan = match (points_m, sizes.last().cloned()) {
         (Some(points_m), Some(sizes)) => {
@@ -34,5 +33,5 @@ pub(crate) fn run_learned_map(arguments: &BenchLearnedMapArguments) -> anyhow::R
         _ => None,
     };
     let maps = measure(&Request { n_threads, n_updates: arguments.updates, sizes, isa }).map_err(told)?;
-    show(&Written { maps, scan }, json)
+    show(&Written { maps, scan }, &arguments.copy)
 }

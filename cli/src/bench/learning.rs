@@ -1,27 +1,21 @@
 //! `surefoot bench learning`: what was learned, judged on ground unlike that of the training.
 #![allow(clippy::disallowed_methods, reason = "people are told how long the benchmark takes")]
 
-mod html;
 mod progress;
-mod table;
-mod tables;
-mod told;
 mod traction_map;
 
 use std::time::Instant;
 
 use ::bench::learning::{LearningError, Plan, Report, Request, Testbed, Trained, judge};
+use ::report::learning::duration;
 use evidential::{Selections, TrainError};
 use scenarios::RockFieldConfig;
 use serde::Serialize;
 
 use crate::arguments::BenchLearningArguments;
-use crate::picture::{draw_learning, learning_svg};
-use crate::{UsageError, WorkFailed, interrupt, output, summary};
+use crate::{UsageError, WorkFailed, interrupt, summary};
 use progress::Progress;
 
-/// Room that must be free beforehand: numbers, page and picture take less [bytes].
-const ROOM_BYTES: u64 = 16 << 20;
 /// The machine of PIETRA's simulations.
 const VEHICLE: &str = "pietra_full_size";
 
@@ -33,6 +27,18 @@ struct Took {
     judging_s: f64,
     /// What the trainings were expected to take after the first of them.
     trainings_estimated_s: f64,
+}
+
+impl Took {
+    fn told(&self) -> String {
+        format!(
+            "  drives {}, trainings {} (expected {} after the first), judging {}",
+            duration(self.drives_s),
+            duration(self.trainings_s),
+            duration(self.trainings_estimated_s),
+            duration(self.judging_s)
+        )
+    }
 }
 
 /// The content of `learning.json`.
@@ -53,13 +59,11 @@ pub(crate) fn run_learning(arguments: &BenchLearningArguments) -> anyhow::Result
 
 fn run_tables(arguments: &BenchLearningArguments) -> anyhow::Result<()> {
     let request = request(arguments)?;
-    formats::prepare_out_dir(&arguments.out, ROOM_BYTES)
-        .map_err(|error| UsageError(format!("--out: {}", UsageError::from_input(error))))?;
-    arguments.json.as_deref().map_or(Ok(()), output::prepare_json)?;
+    arguments.results.prepare()?;
     let plan = Plan::new(&Selections::shipped()?, arguments.seeds, arguments.epochs);
     let (report, took) = measure(&request, &plan).map_err(told_error)?;
-    print!("{}", told::report(&report));
-    println!("\n{}", told::took(&took));
+    print!("{}", report::learning::text(&report));
+    println!("\n{}", took.told());
     write(arguments, &report, took)
 }
 
@@ -70,7 +74,7 @@ fn request(arguments: &BenchLearningArguments) -> Result<Request, UsageError> {
         seed: arguments.seed,
         n_maps: arguments.maps,
         n_trials: arguments.trials,
-        n_threads: arguments.n_threads(),
+        n_threads: arguments.threads.count(),
     })
 }
 
@@ -81,7 +85,7 @@ fn measure(request: &Request, plan: &Plan) -> Result<(Report, Took), LearningErr
     let testbed = Testbed::drive(request, &|stage| progress.stage(stage, request), &|| progress.step())?;
     progress.finish();
     let drives_s = began.elapsed().as_secs_f64();
-    println!("  drives took {}", told::duration(drives_s));
+    println!("  drives took {}", duration(drives_s));
     let began = Instant::now();
     let trained = train(&testbed, plan, request.n_threads)?;
     let trainings_s = began.elapsed().as_secs_f64();
@@ -119,13 +123,10 @@ fn told_error(error: LearningError) -> anyhow::Error {
 
 fn write(arguments: &BenchLearningArguments, report: &Report, took: Took) -> anyhow::Result<()> {
     let written = Written { revision: summary::revision(), took, report };
-    let out = |name: &str| arguments.out.join(name);
-    for path in [Some(out("learning.json")), arguments.json.clone()].iter().flatten() {
-        formats::write_json_atomic(path, &written)?;
-    }
-    draw_learning(report, &out("learning.png"))?;
-    let page = html::page(report, &told::took(&took), &learning_svg(report));
-    formats::write_bytes_atomic(&out("learning.html"), page.as_bytes())?;
-    println!("\n  learning.json, learning.html and learning.png in {}", arguments.out.display());
+    arguments.results.write_json("learning.json", &written)?;
+    arguments.results.write("learning.png", &report::learning::picture(report)?)?;
+    let page = report::learning::page(report, &took.told());
+    arguments.results.write("learning.html", page.as_bytes())?;
+    println!("\n  learning.json, learning.html and learning.png in {}", arguments.results.out.display());
     Ok(())
 }

@@ -1,13 +1,10 @@
 //! `surefoot collect --teleop-random`: random driving of a small car, to learn inverse kinodynamics from.
 
-use std::io::IsTerminal;
-
 use bench::kinodynamics::{SURFACES, Teleoperation, teleoperate};
-use indicatif::ProgressBar;
 use serde::Serialize;
 
-use crate::UsageError;
 use crate::arguments::CollectArguments;
+use crate::{UsageError, progress};
 
 /// What is told of a recording.
 #[derive(Serialize)]
@@ -24,12 +21,8 @@ pub(super) fn run(arguments: &CollectArguments) -> anyhow::Result<()> {
     let vehicle = formats::read_vehicle(arguments.vehicle_name_or_path()).map_err(UsageError::from_input)?;
     let only = arguments.surface.as_deref().map(surface).transpose()?;
     let asked = Teleoperation { minutes: arguments.minutes, only, seed: arguments.seed };
-    let bar = if std::io::stderr().is_terminal() {
-        ProgressBar::new(u64::from(asked.minutes))
-    } else {
-        ProgressBar::hidden()
-    };
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(arguments.n_threads()).build()?;
+    let bar = progress::bar(u64::from(asked.minutes), "{pos}/{len} minutes");
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(arguments.threads.count()).build()?;
     let recording = pool.install(|| teleoperate(&vehicle, &asked, &|| bar.inc(1)))?;
     bar.finish_and_clear();
     formats::write_bytes_atomic(&arguments.out, &recording.to_bytes()?)?;
@@ -41,7 +34,7 @@ pub(super) fn run(arguments: &CollectArguments) -> anyhow::Result<()> {
         grounds: recording.grounds_driven().into_iter().map(str::to_owned).collect(),
         latency_s: kinodynamics::estimate_latency(&recording)?.seconds,
     };
-    arguments.json.as_deref().map_or(Ok(()), |path| formats::write_json_atomic(path, &summary))?;
+    arguments.copy.write(&summary)?;
     println!(
         "  {}: {} commands and {} samples in {} minutes on {}; latency {:.3} s\n  {}",
         summary.vehicle,

@@ -7,6 +7,7 @@ use bench::closed_loop::Method;
 use bicycle::Vehicle;
 use evidential::{Checkpoint, shipped};
 
+use super::correction;
 use crate::UsageError;
 use crate::arguments::DriveArguments;
 
@@ -23,11 +24,18 @@ pub(crate) struct Knowledge {
     pub networks: Option<Arc<Checkpoint>>,
     /// Why nothing learned is used although nobody asked for that.
     pub why_not_learned: Option<String>,
+    /// What corrects commands for the ground under the wheels, if anything does.
+    pub corrector: Option<Arc<kinodynamics::Checkpoint>>,
 }
 
 impl Knowledge {
     /// Reads what was asked for; refuses networks that do not fit the vehicle or the method.
     pub fn choose(arguments: &DriveArguments, vehicle: &Vehicle) -> Result<Self, UsageError> {
+        let corrector = correction::choose(arguments, vehicle)?;
+        Ok(Self { corrector, ..Self::of_ground(arguments, vehicle)? })
+    }
+
+    fn of_ground(arguments: &DriveArguments, vehicle: &Vehicle) -> Result<Self, UsageError> {
         let asked = arguments.method.map(Method::from);
         if let Some(folder) = &arguments.weights {
             return Self::from_folder(folder, asked, vehicle);
@@ -40,7 +48,7 @@ impl Knowledge {
                     }
                     None => None,
                 };
-                Ok(Self { method, networks: networks.map(Arc::new), why_not_learned: None })
+                Ok(Self::without_corrector(method, networks))
             }
             None => Ok(Self::best_for(vehicle)),
         }
@@ -48,15 +56,16 @@ impl Knowledge {
 
     fn best_for(vehicle: &Vehicle) -> Self {
         match shipped(evidential::Method::Pietra, &vehicle.geometry) {
-            Ok(networks) => {
-                Self { method: Method::Pietra, networks: Some(Arc::new(networks)), why_not_learned: None }
-            }
+            Ok(networks) => Self::without_corrector(Method::Pietra, Some(networks)),
             Err(error) => Self {
-                method: Method::Physics,
-                networks: None,
                 why_not_learned: Some(UsageError::from_input(error).0),
+                ..Self::without_corrector(Method::Physics, None)
             },
         }
+    }
+
+    fn without_corrector(method: Method, networks: Option<Checkpoint>) -> Self {
+        Self { method, networks: networks.map(Arc::new), why_not_learned: None, corrector: None }
     }
 
     fn from_folder(folder: &Path, asked: Option<Method>, vehicle: &Vehicle) -> Result<Self, UsageError> {
@@ -79,7 +88,7 @@ impl Knowledge {
             };
             told(format!("expected networks of method {expected}, found {}", trained.name()))
         })?;
-        Ok(Self { method, networks: Some(Arc::new(checkpoint)), why_not_learned: None })
+        Ok(Self::without_corrector(method, Some(checkpoint)))
     }
 }
 
@@ -91,7 +100,7 @@ pub(crate) fn read_checkpoint(folder: &Path) -> Result<Checkpoint, UsageError> {
 }
 
 /// A whole file, refused when it is too large for networks.
-fn read(path: &Path) -> Result<Vec<u8>, String> {
+pub(super) fn read(path: &Path) -> Result<Vec<u8>, String> {
     let told =
         |error: std::io::Error| format!("{}: expected a readable file, found: {error}", path.display());
     let n_bytes = std::fs::metadata(path).map_err(told)?.len();

@@ -10,7 +10,7 @@ use scenarios::{Observation, TraceRow, World};
 use terrain::{GridGeometry, GridMap, Pose};
 use traversability::{GroundFlags, RiskMapView};
 
-use crate::picture::PathSample;
+use report::drive::PathSample;
 
 /// Rollouts shown per recorded cycle.
 const N_ROLLOUTS: usize = 12;

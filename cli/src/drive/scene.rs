@@ -7,8 +7,8 @@ use bicycle::{Model, Vehicle};
 use formats::{ConfigText, ElevationFile, overlay, read_elevation, read_model, read_vehicle};
 use navigator::{Config, GuardConfig, Route};
 use scenarios::{
-    ArenaConfig, ArenaError, Pair, PairWish, ROCK_FIELD_DISTANCE_M, RockFieldConfig, Task, WorldLayers,
-    check_pair,
+    ArenaConfig, ArenaError, EpisodeConfig, Pair, PairWish, ROCK_FIELD_DISTANCE_M, RockFieldConfig, Task,
+    WorldLayers, check_pair,
 };
 
 use super::knowledge::Knowledge;
@@ -69,7 +69,10 @@ pub(crate) fn machine_of(
         let text = ConfigText::read(path).map_err(UsageError::from_input)?;
         config = overlay(&text, &config).map_err(UsageError::from_input)?;
     }
-    config.controller.n_threads = arguments.n_threads();
+    if arguments.walkers > 0 {
+        config.moving.get_or_insert_default();
+    }
+    config.controller.n_threads = arguments.kernels.threads.count();
     config.controller.isa = isa(arguments, config.controller.isa)?;
     let knowledge = Knowledge::choose(arguments, &vehicle)?;
     Ok(Machine { vehicle, model, config, knowledge })
@@ -78,11 +81,30 @@ pub(crate) fn machine_of(
 /// The instruction set as asked, else as configured; by its name, so that whoever records the settings tells what was
 /// used.
 fn isa(arguments: &DriveArguments, configured: Isa) -> Result<Isa, UsageError> {
-    let wished = match Isa::from(arguments.isa) {
+    let wished = match Isa::from(arguments.kernels.isa) {
         Isa::Auto => configured,
         asked => asked,
     };
     Ok(Instructions::find(wished).map_err(UsageError::from_input)?.isa())
+}
+
+/// Longest that a vehicle waits for people before its drive counts as over [s].
+const WAITING_MAX_S: f64 = 30.0;
+
+/// Lets people walk about in an episode, as many as were asked for.
+pub(crate) fn let_walk(
+    arguments: &DriveArguments,
+    vehicle: &Vehicle,
+    task: &Task,
+    episode: &mut EpisodeConfig,
+) {
+    if arguments.walkers == 0 {
+        return;
+    }
+    episode.walkers = task.crossing_walkers(arguments.walkers, vehicle.limits.speed_max_mps, arguments.seed);
+    let rules = &mut episode.rules;
+    (rules.immobile_s, rules.stopped_s) =
+        (rules.immobile_s.max(WAITING_MAX_S), rules.stopped_s.max(WAITING_MAX_S));
 }
 
 /// Where to drive, from where, where to.

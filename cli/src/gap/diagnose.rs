@@ -3,6 +3,8 @@
 use std::path::Path;
 
 use bicycle::DriveLog;
+use report::Picture;
+use report::gap::{Page, Pictures, Reference};
 use sim_to_real::{
     Answer, Baseline, Diagnosis, Machine, Verification, WithoutSimulator, diagnose,
     diagnose_without_simulator, verify,
@@ -12,10 +14,9 @@ use super::follow_up::Diagnosed;
 use super::outputs::Outputs;
 use super::progress::Progress;
 use super::request::Request;
-use super::{baseline, drives, html, machine, predictions, told};
+use super::{baseline, drives, machine, predictions};
 use crate::arguments::GapDiagnoseArguments;
-use crate::picture::{GapPicture, GapPictures, Reference, draw_gap};
-use crate::{UsageError, WorkFailed, summary};
+use crate::{UsageError, summary};
 
 /// What a diagnosis is made from.
 struct Inputs {
@@ -141,7 +142,7 @@ impl Report<'_> {
         for picture in &pictures {
             formats::write_bytes_atomic(&folder.join(picture.file), &picture.png)?;
         }
-        let page = html::page(&html::Page {
+        let page = report::gap::page(&Page {
             answer: self.answer,
             drives: &self.told_drives(),
             doubts: self.doubts,
@@ -152,19 +153,19 @@ impl Report<'_> {
         Ok(formats::write_bytes_atomic(&folder.join("report.html"), page.as_bytes())?)
     }
 
-    fn pictures(&self, verified: &Verified) -> Result<Vec<GapPicture>, WorkFailed> {
+    fn pictures(&self, verified: &Verified) -> anyhow::Result<Vec<Picture>> {
         let verification = verified.verification.as_ref();
         let names = predictions::run_names(&verified.heldout, &self.request.heldout);
         let strip = verification.and_then(|v| predictions::strip(&v.predictions, &verified.heldout, &names));
-        draw_gap(&GapPictures {
+        let shown = Pictures {
             reference: self.reference(),
             answer: self.answer,
             findings: &self.diagnosis.findings,
             heldout_residuals: verification.map_or(&[], |verification| &verification.residuals),
             ground: self.inputs.machine.ground.as_ref(),
             heldout: strip.as_ref(),
-        })
-        .map_err(|reason| WorkFailed(format!("expected pages to encode as PNG, found: {reason}")))
+        };
+        Ok(report::gap::pictures(&shown)?)
     }
 
     fn reference(&self) -> Reference {
@@ -175,7 +176,7 @@ impl Report<'_> {
         for doubt in self.doubts {
             eprintln!("surefoot: {doubt}");
         }
-        print!("{}", told::answer(self.answer, &self.told_drives()));
+        print!("{}", report::gap::text(self.answer, &self.told_drives()));
         let report = outputs.in_folder("report.html");
         for path in
             [report.as_ref(), outputs.json.as_ref(), outputs.predictions.as_ref()].into_iter().flatten()

@@ -3,9 +3,8 @@
 use std::path::PathBuf;
 
 use bicycle::{Column, DriveLog, Run};
+use report::gap::{HeldOutSample, HeldOutStrip};
 use sim_to_real::{Prediction, PredictionModel};
-
-use crate::picture::{HeldOutSample, HeldOutStrip};
 
 /// The horizon that the strip shows [s].
 const STRIP_HORIZON_S: f64 = 1.2;

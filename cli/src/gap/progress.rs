@@ -1,9 +1,10 @@
 //! How far a diagnosis has come, for a person at a terminal; silence for everyone else.
 
-use std::io::IsTerminal;
 use std::time::Duration;
 
-use indicatif::{ProgressBar, ProgressStyle};
+use indicatif::ProgressBar;
+
+use crate::progress;
 
 /// A bar counts whole numbers.
 const FULL: u64 = 1000;
@@ -25,12 +26,7 @@ impl Progress {
     }
 
     fn new(message: &'static str) -> Self {
-        let bar =
-            if std::io::stderr().is_terminal() { ProgressBar::new(FULL) } else { ProgressBar::hidden() };
-        // The template is a constant: were it wrong, the plain bar would do.
-        if let Ok(style) = ProgressStyle::with_template("  {bar:28.green/black.bright} {spinner} {msg}") {
-            bar.set_style(style.progress_chars("━╸━"));
-        }
+        let bar = progress::bar(FULL, "{spinner} {msg}");
         bar.set_message(message);
         bar.enable_steady_tick(Duration::from_millis(200));
         Self { bar }

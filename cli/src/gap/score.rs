@@ -1,8 +1,6 @@
 //! `surefoot gap score`: every case of a set diagnosed, every answer held against its label.
 #![allow(clippy::disallowed_methods, reason = "how long a diagnosis takes is a part of its score")]
 
-mod page;
-mod told;
 mod unfinished;
 
 use std::collections::BTreeMap;
@@ -18,12 +16,8 @@ use sim_to_real::{Answer, Baseline, Machine, diagnose, verify};
 use super::machine;
 use super::workers::{Bar, work};
 use crate::arguments::GapScoreArguments;
-use crate::picture::draw_gap_score;
-use crate::{UsageError, WorkFailed, output, summary};
+use crate::{UsageError, WorkFailed, summary};
 use unfinished::Unfinished;
-
-/// Room that must be free beforehand: answers, tables and pictures take less [bytes].
-const ROOM_BYTES: u64 = 64 << 20;
 
 /// The content of `score.json`.
 #[derive(Serialize)]
@@ -49,15 +43,13 @@ struct Vehicle {
 
 pub(super) fn run(arguments: &GapScoreArguments) -> anyhow::Result<()> {
     let cases = labelled(arguments)?;
-    formats::prepare_out_dir(&arguments.out, ROOM_BYTES)
-        .map_err(|error| UsageError(format!("--out: {}", UsageError::from_input(error))))?;
-    arguments.json.as_deref().map_or(Ok(()), output::prepare_json)?;
+    arguments.results.prepare()?;
     let (diagnosed, failures) = match &arguments.answers {
         Some(folder) => (read_answers(folder, cases)?, Vec::new()),
         None => diagnose_all(arguments, cases)?,
     };
     let score = score(&diagnosed);
-    print!("{}", told::score(&score));
+    print!("{}", report::gap_score::text(&score));
     write(arguments, &score)?;
     match failures.first() {
         None => Ok(()),
@@ -101,7 +93,7 @@ fn diagnose_all(
     arguments: &GapScoreArguments,
     cases: Vec<Labelled>,
 ) -> anyhow::Result<(Vec<DiagnosedCase>, Vec<String>)> {
-    let answers = arguments.out.join("answers");
+    let answers = arguments.results.file("answers");
     std::fs::create_dir_all(&answers)?;
     let unfinished = Unfinished::resume(arguments, answers)?;
     let missing: Vec<&Labelled> =
@@ -184,19 +176,21 @@ fn read_drives(paths: &[PathBuf]) -> Result<Vec<DriveLog>, UsageError> {
 }
 
 fn write(arguments: &GapScoreArguments, score: &Score) -> anyhow::Result<()> {
-    let title = format!("Diagnoses of {}", arguments.set.display());
+    let folder = arguments.set.file_name().unwrap_or(arguments.set.as_os_str());
+    let title = format!("Diagnoses of {}", folder.display());
     let written = Written { revision: summary::revision(), set: arguments.set.display().to_string(), score };
-    let file = |name: &str| arguments.out.join(name);
-    for path in [Some(file("score.json")), arguments.json.clone()].iter().flatten() {
-        formats::write_json_atomic(path, &written)?;
-    }
-    let pictures = draw_gap_score(score, &title).map_err(WorkFailed)?;
+    arguments.results.write_json("score.json", &written)?;
+    let pictures = report::gap_score::pictures(score, &title)?;
     for picture in &pictures {
-        formats::write_bytes_atomic(&file(picture.file), &picture.png)?;
+        arguments.results.write(picture.file, &picture.png)?;
     }
     let program = format!("surefoot, revision {}", summary::revision());
-    let page = page::page(score, &title, &pictures, &program);
-    formats::write_bytes_atomic(&file("score.html"), page.as_bytes())?;
-    println!("\n  score.html, score.json and {} pictures in {}", pictures.len(), arguments.out.display());
+    let page = report::gap_score::page(score, &title, &pictures, &program);
+    arguments.results.write("score.html", page.as_bytes())?;
+    println!(
+        "\n  score.html, score.json and {} pictures in {}",
+        pictures.len(),
+        arguments.results.out.display()
+    );
     Ok(())
 }

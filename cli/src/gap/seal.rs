@@ -29,13 +29,13 @@ pub(super) fn run(arguments: &GapSealArguments) -> anyhow::Result<()> {
     let places = Places::prepare(arguments)?;
     let n_machines = arguments.cases.div_ceil(CASES_PER_MACHINE);
     let bar = Bar::new(n_machines + arguments.cases, "machines and cases");
-    let machines = work(n_machines, arguments.n_threads(), |index| {
+    let machines = work(n_machines, arguments.threads.count(), |index| {
         let machine = places.make_machine(arguments.seed, index)?;
         bar.step("");
         Ok(machine)
     })?;
     let labels = Mutex::new(BTreeMap::new());
-    work(arguments.cases, arguments.n_threads(), |index| {
+    work(arguments.cases, arguments.threads.count(), |index| {
         let machine = &machines[seed_of(arguments.seed, &[CASE, index as u64]) as usize % n_machines];
         let (name, label) = places.make_case(arguments.seed, index, machine)?;
         labels.lock().map_err(|_| WorkFailed("another drive has failed".to_owned()))?.insert(name, label);
@@ -265,10 +265,11 @@ fn injection(case: &DrawnCase) -> BTreeMap<String, serde_json::Value> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::arguments::ThreadArguments;
 
     fn arguments(out: &Path, labels: &Path) -> GapSealArguments {
         let (out, labels) = (out.to_owned(), labels.to_owned());
-        GapSealArguments { cases: 1, seed: 1, out, labels, threads: Some(1) }
+        GapSealArguments { cases: 1, seed: 1, out, labels, threads: ThreadArguments { threads: Some(1) } }
     }
 
     #[test]

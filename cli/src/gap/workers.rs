@@ -1,27 +1,19 @@
 //! Many like jobs on a few threads, and the bar that counts them.
 
-use std::io::IsTerminal;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Duration;
 
-use indicatif::{ProgressBar, ProgressStyle};
+use indicatif::ProgressBar;
 
-use crate::WorkFailed;
+use crate::{WorkFailed, progress};
 
 /// Counts on standard error; draws nothing where that is not a terminal.
 pub(super) struct Bar(ProgressBar);
 
 impl Bar {
     pub(super) fn new(n: usize, what: &str) -> Self {
-        let bar =
-            if std::io::stderr().is_terminal() { ProgressBar::new(n as u64) } else { ProgressBar::hidden() };
-        // The template is a constant but for a word: were it wrong, the plain bar would do.
-        let template =
-            format!("  {{bar:28.green/black.bright}} {{pos}}/{{len}} {what}, {{eta}} left   {{msg}}");
-        if let Ok(style) = ProgressStyle::with_template(&template) {
-            bar.set_style(style.progress_chars("━╸━"));
-        }
+        let bar = progress::bar(n as u64, &format!("{{pos}}/{{len}} {what}, {{eta}} left   {{msg}}"));
         bar.enable_steady_tick(Duration::from_millis(200));
         Self(bar)
     }

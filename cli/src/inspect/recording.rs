@@ -42,15 +42,8 @@ pub(super) fn look(path: &Path) -> Result<Value, UsageError> {
     let messages = open_recording(path).map_err(|error| refused(error.to_string()))?;
     let mut topics: BTreeMap<String, Topic> = BTreeMap::new();
     let mut timing = Timing::default();
-    let (mut setup, mut ended_early, mut times_ns) = (Value::Null, None, None);
-    for message in messages {
-        let message = match message {
-            Ok(message) => message,
-            Err(error) => {
-                ended_early = Some(error.to_string());
-                break;
-            }
-        };
+    let (mut setup, mut times_ns) = (Value::Null, None);
+    let ended_early = messages.take_all(|message| {
         let channel = &message.channel;
         if channel.topic == "/setup" {
             setup = serde_json::from_slice(&message.data).unwrap_or(Value::Null);
@@ -70,7 +63,8 @@ pub(super) fn look(path: &Path) -> Result<Value, UsageError> {
         }
         let (first, last) = times_ns.unwrap_or((message.log_time_ns, message.log_time_ns));
         times_ns = Some((first.min(message.log_time_ns), last.max(message.log_time_ns)));
-    }
+        Ok(())
+    });
     if topics.is_empty() {
         return Err(refused(ended_early.unwrap_or_else(|| "no message in it".to_owned())));
     }

@@ -1,9 +1,7 @@
 //! `surefoot train kinodynamics`: the fit, a bar meanwhile, and the weights.
 
-use std::io::IsTerminal;
 use std::ops::ControlFlow;
 
-use indicatif::ProgressBar;
 use kinodynamics::{
     Answer, Architecture, Epoch, LabelConfig, LabelCounts, Latency, Outcome, Recording, Sensing, Settings,
     SpeedSource, TrainError, train,
@@ -14,10 +12,7 @@ use crate::arguments::{
     KinodynamicsAnswer, KinodynamicsFilter, KinodynamicsSensing, KinodynamicsSpeed,
     TrainKinodynamicsArguments,
 };
-use crate::{UsageError, interrupt, output, summary};
-
-/// Room that must be free beforehand: weights and curves take less [bytes].
-const ROOM_BYTES: u64 = 16 << 20;
+use crate::{UsageError, interrupt, progress, summary};
 
 /// The content of `kinodynamics_training.json`.
 #[derive(Serialize)]
@@ -32,20 +27,14 @@ struct Written<'a> {
 }
 
 pub(crate) fn run_kinodynamics(arguments: &TrainKinodynamicsArguments) -> anyhow::Result<()> {
-    formats::prepare_out_dir(&arguments.out, ROOM_BYTES)
-        .map_err(|error| UsageError(format!("--out: {}", UsageError::from_input(error))))?;
-    arguments.json.as_deref().map_or(Ok(()), output::prepare_json)?;
+    arguments.results.prepare()?;
     let path = &arguments.train;
     let refused = |told: String| UsageError(format!("{}: {told}", path.display()));
     let bytes = std::fs::read(path).map_err(|error| refused(error.to_string()))?;
     let recording = Recording::from_bytes(&bytes).map_err(|error| refused(error.to_string()))?;
     interrupt::catch_interrupts()?;
     let settings = settings(arguments);
-    let bar = if std::io::stderr().is_terminal() {
-        ProgressBar::new(settings.epochs as u64)
-    } else {
-        ProgressBar::hidden()
-    };
+    let bar = progress::bar(settings.n_passes() as u64, "{pos}/{len} passes");
     let outcome = train(&recording, &settings, summary::revision(), &mut |_| {
         bar.inc(1);
         if interrupt::interrupted() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
@@ -56,7 +45,7 @@ pub(crate) fn run_kinodynamics(arguments: &TrainKinodynamicsArguments) -> anyhow
     print!("{}", told(&outcome));
     println!(
         "  kinodynamics.safetensors, kinodynamics.json and kinodynamics_training.json in {}",
-        arguments.out.display()
+        arguments.results.out.display()
     );
     Ok(())
 }
@@ -96,10 +85,9 @@ fn write(
     settings: &Settings,
     outcome: &Outcome,
 ) -> anyhow::Result<()> {
-    let file = |name: &str| arguments.out.join(name);
     // The sidecar holds the hash of the weights: a half-written pair is refused when it is read.
-    formats::write_bytes_atomic(&file("kinodynamics.safetensors"), &outcome.checkpoint.weights_bytes()?)?;
-    formats::write_bytes_atomic(&file("kinodynamics.json"), &outcome.checkpoint.sidecar_bytes()?)?;
+    arguments.results.write("kinodynamics.safetensors", &outcome.checkpoint.weights_bytes()?)?;
+    arguments.results.write("kinodynamics.json", &outcome.checkpoint.sidecar_bytes()?)?;
     let written = Written {
         revision: summary::revision(),
         settings,
@@ -109,9 +97,7 @@ fn write(
         identity_rmse_per_m: outcome.identity_rmse_per_m,
         curves: &outcome.curves,
     };
-    for path in [Some(file("kinodynamics_training.json")), arguments.json.clone()].iter().flatten() {
-        formats::write_json_atomic(path, &written)?;
-    }
+    arguments.results.write_json("kinodynamics_training.json", &written)?;
     Ok(())
 }
 

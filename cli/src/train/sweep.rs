@@ -1,7 +1,6 @@
 //! `surefoot train traversability --sweep`: all trainings of a search, some at a time, each kept as soon as it is done.
 
 use std::collections::VecDeque;
-use std::io::IsTerminal;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
@@ -10,12 +9,12 @@ use std::time::Instant;
 use evidential::{
     Grid, Method, Phase, Selection, Selections, Settings, TrainError, TrainingEnd, Trial, fingerprint,
 };
-use indicatif::{ProgressBar, ProgressStyle};
+use indicatif::ProgressBar;
 
 use super::data::Data;
 use super::told;
 use crate::arguments::TrainArguments;
-use crate::{UsageError, WorkFailed, interrupt, summary};
+use crate::{UsageError, WorkFailed, interrupt, progress, summary};
 
 /// All parameter sets of a method.
 struct Candidates {
@@ -27,7 +26,7 @@ pub(super) fn run(arguments: &TrainArguments, data: &Data) -> anyhow::Result<()>
     let data_hash = fingerprint(&data.training, &data.validation)?;
     let candidates: Vec<Candidates> =
         arguments.methods().into_iter().map(|m| candidates(arguments, m)).collect();
-    let log = TrialLog::read(arguments.out.join("trials.jsonl"), &data_hash)?;
+    let log = TrialLog::read(arguments.results.file("trials.jsonl"), &data_hash)?;
     let queue = open_trainings(&candidates, arguments.seeds, &log);
     let search = Search::new(data, data_hash, log, queue);
     std::thread::scope(|scope| {
@@ -93,7 +92,7 @@ fn select(
         );
         selections.selections.push(selection);
     }
-    let path = arguments.out.join("selections.json");
+    let path = arguments.results.file("selections.json");
     formats::write_json_atomic(&path, &selections)?;
     println!("\n  {}", path.display());
     Ok(())
@@ -112,17 +111,7 @@ struct Search<'a> {
 impl<'a> Search<'a> {
     fn new(data: &'a Data, data_hash: String, log: TrialLog, queue: VecDeque<Settings>) -> Self {
         let n_trainings = queue.len();
-        let bar = if std::io::stderr().is_terminal() {
-            ProgressBar::new(n_trainings as u64)
-        } else {
-            ProgressBar::hidden()
-        };
-        // The template is a constant: were it wrong, the plain bar would do.
-        if let Ok(style) = ProgressStyle::with_template(
-            "  {bar:28.green/black.bright} {pos}/{len} trainings, {eta} left   {msg}",
-        ) {
-            bar.set_style(style.progress_chars("━╸━"));
-        }
+        let bar = progress::bar(n_trainings as u64, "{pos}/{len} trainings, {eta} left   {msg}");
         let log = TrialLog { data_hash, ..log };
         Self { data, queue: queue.into(), log: log.into(), bar, began: Instant::now(), n_trainings }
     }

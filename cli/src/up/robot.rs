@@ -9,7 +9,7 @@ use navigator::{Areas, GuardConfig};
 use runtime::ages::AskedAges;
 
 use crate::UsageError;
-use crate::arguments::{Goal, Method, UpArguments, UpRole};
+use crate::arguments::{Correct, Goal, Method, UpArguments, UpRole};
 use crate::drive::scene::{self, Machine};
 
 /// Lengths of the vehicle within which a robot is at its goal, where nobody says how near that is.
@@ -27,6 +27,13 @@ pub(super) fn described(arguments: &UpArguments) -> Result<UpArguments, UsageErr
     if let Some(name) = &robot.ground.method {
         let method = Method::from_str(name, true).map_err(|_| told(unknown_method(name)))?;
         arguments.drive.method = Some(method);
+    }
+    if let Some(correction) = &robot.correction {
+        let name = &correction.method;
+        let method = Correct::from_str(name, true)
+            .map_err(|_| told(format!("correction.method: expected kinodynamics, found {name:?}")))?;
+        arguments.drive.correct = Some(method);
+        arguments.drive.kinodynamics_weights = Some(correction.weights.clone());
     }
     let directs = roles_of(&robot).map_err(told)?.contains(&Role::Mission);
     let RobotFile { rates, ground, mission, .. } = &robot;

@@ -17,7 +17,6 @@ use runtime::setup::{ClockAnchor, MachineSetup, RecordedSetup};
 use rustix::process::{Signal, set_parent_process_death_signal};
 use scenarios::{EpisodeConfig, Outcome, Task};
 use serde::Serialize;
-use sha2::{Digest, Sha256};
 use simulator::{Ending, PlantReport, PlantSetup};
 use std::ffi::OsString;
 use std::sync::Arc;
@@ -129,7 +128,7 @@ pub(super) fn run(arguments: &UpArguments, role: Role) -> anyhow::Result<()> {
         set_parent_process_death_signal(Some(Signal::TERM))?;
     }
     if arguments.realtime {
-        eprintln!("surefoot {}: {}", role.name(), realtime::settle(role));
+        eprintln!("surefoot {}: {}", role.name(), realtime::configure_thread(role));
     }
     let machine = machine(arguments)?;
     let ages = ages(arguments, &machine)?;
@@ -160,19 +159,20 @@ pub(super) fn run(arguments: &UpArguments, role: Role) -> anyhow::Result<()> {
             match learn::school(arguments, &machine)? {
                 None => learning::run(&bus, &setup, is_over)?,
                 Some(school) => {
-                    let tell = &mut |told: Told<'_>| learn::tell(told, &arguments.drive.out);
+                    let tell = &mut |told: Told<'_>| learn::tell(told, &arguments.drive.results.out);
                     learning::run_and_learn(&bus, &setup, school, is_over, tell)?;
                 }
             }
         }
         Role::Control => {
-            let Machine { model, mut config, .. } = machine;
+            let Machine { model, mut config, knowledge, .. } = machine;
             if arguments.realtime {
                 // It has one core of its own.
                 config.controller.n_threads = 1;
             }
             let (seed, period_s) = (arguments.drive.seed, robot::periods(arguments).control_s);
-            let setup = ControlSetup { model, config, seed, period_s, ages };
+            let corrector = knowledge.corrector;
+            let setup = ControlSetup { model, config, corrector, seed, period_s, ages };
             control::run(&join(arguments)?, setup, is_over)?;
         }
         Role::Mission => run_mission(arguments, &machine, ages)?,
@@ -198,7 +198,7 @@ fn recorder_setup(
 ) -> anyhow::Result<RecorderSetup> {
     let Machine { vehicle, model, config, knowledge } = machine;
     let checkpoint_sha256 = match &knowledge.networks {
-        Some(networks) => hexadecimal(&Sha256::digest(networks.weights_bytes()?)),
+        Some(networks) => networks.digest()?.hexadecimal(),
         None => String::new(),
     };
     let (vehicle_name, mounts) = (vehicle.name.clone(), config.sensors.clone());
@@ -212,12 +212,16 @@ fn recorder_setup(
         config_toml,
         method: knowledge.method.name().to_owned(),
         checkpoint_sha256,
+        corrector_sha256: knowledge
+            .corrector
+            .map(|checkpoint| checkpoint.sidecar().weights_sha256.clone())
+            .unwrap_or_default(),
         alpha: arguments.drive.alpha,
         seed: arguments.drive.seed.to_string(),
         ages,
         revision: revision().to_owned(),
     };
-    let folder = arguments.drive.out.clone();
+    let folder = arguments.drive.results.out.clone();
     Ok(RecorderSetup {
         folder,
         setup,
@@ -229,10 +233,6 @@ fn recorder_setup(
     })
 }
 
-fn hexadecimal(bytes: &[u8]) -> String {
-    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
-}
-
 fn level(arguments: &UpArguments) -> Result<CvarLevel, UsageError> {
     CvarLevel::new(arguments.drive.alpha).map_err(UsageError::from_input)
 }
@@ -242,9 +242,7 @@ fn belief(machine: &Machine) -> anyhow::Result<(Belief, u64)> {
     let knowledge = &machine.knowledge;
     Ok(match (knowledge.method.learned(), &knowledge.networks) {
         (Some((_, unfamiliar)), Some(networks)) => {
-            let digest = Sha256::digest(networks.weights_bytes()?);
-            let checkpoint = digest.iter().take(8).fold(0, |word, byte| word << 8 | u64::from(*byte));
-            (Belief::Learned { checkpoint: Arc::clone(networks), unfamiliar }, checkpoint)
+            (Belief::Learned { checkpoint: Arc::clone(networks), unfamiliar }, networks.digest()?.short())
         }
         _ if knowledge.method == Method::Nominal => (Belief::Nominal, 0),
         _ => (Belief::Physics, 0),
@@ -274,6 +272,7 @@ fn run_plant(arguments: &UpArguments, machine: &Machine, ages: AgeLimits) -> any
     episode.deviations = arguments.drive.deviation.iter().map(|asked| asked.deviation).collect();
     episode.rules.startup_s = STANDING_MAX_S;
     episode.rules.stopped_s = STANDING_MAX_S;
+    scene::let_walk(&arguments.drive, &machine.vehicle, &task, &mut episode);
     let setup = PlantSetup {
         task,
         vehicle: &machine.vehicle,
@@ -297,11 +296,8 @@ fn run_plant(arguments: &UpArguments, machine: &Machine, ages: AgeLimits) -> any
         world: &world,
         method: machine.knowledge.method.name(),
     };
-    std::fs::create_dir_all(&arguments.drive.out)?;
-    let kept = arguments.drive.out.join("summary.json");
-    for path in std::iter::once(&kept).chain(&arguments.drive.json) {
-        formats::write_json_atomic(path, &summary)?;
-    }
+    std::fs::create_dir_all(&arguments.drive.results.out)?;
+    arguments.drive.results.write_json("summary.json", &summary)?;
     match outcome {
         Some(Outcome::Goal) | None => Ok(()),
         Some(outcome) => Err(WorkFailed(format!(

@@ -10,7 +10,7 @@ use super::patch_ground::PatchGround;
 use super::patch_stencil::{PatchStencil, Point, Quad};
 use crate::predictor::FEATURE_MAX;
 
-/// Footprints of one yaw whose base cells lie [`physics_prior::Ratio::stride`] apart in one row.
+/// Footprints of one yaw whose base cells lie [`physics_prior::ResolutionRatio::stride`] apart in one row.
 #[derive(Clone, Copy)]
 pub(super) struct Line<'a> {
     pub stencil: &'a PatchStencil,
@@ -382,7 +382,7 @@ impl<L: Lanes> Sample<L> {
 mod tests {
     use bicycle::Geometry;
     use bicycle::lanes::{BLOCK, Instructions};
-    use physics_prior::Ratio;
+    use physics_prior::ResolutionRatio;
     use terrain::{Cell, GridGeometry, GridMap, SurfaceCell, TerrainClass};
 
     use super::*;
@@ -428,7 +428,8 @@ mod tests {
         };
         let values = (0..WINDOW.n_cells()).map(cell).collect();
         #[allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
-        let (surface, ratio) = (GridMap::from_values(WINDOW, values).unwrap(), Ratio::new(0.1, 0.1).unwrap());
+        let (surface, ratio) =
+            (GridMap::from_values(WINDOW, values).unwrap(), ResolutionRatio::new(0.1, 0.1).unwrap());
         let layout = FeatureLayout::for_vehicle(&CAR);
         let mut ground = PatchGround::unknown(WINDOW, ratio, layout.height_scale_m);
         ground.read(&surface, [0, 0], [69, 19]);

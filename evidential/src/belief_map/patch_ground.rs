@@ -1,13 +1,13 @@
 //! The surface as networks read it: layers of plain numbers, padded so that no patch needs a bounds check.
 
-use physics_prior::{Planes, Ratio};
+use physics_prior::{Planes, ResolutionRatio};
 use terrain::{GridGeometry, GridMap, SurfaceCell, TerrainClass};
 
 /// Layers over a window of the surface's lattice.
 #[derive(Clone, Debug)]
 pub(super) struct PatchGround {
     planes: Planes,
-    ratio: Ratio,
+    ratio: ResolutionRatio,
     per_height_m: f32,
     /// Height of the ground, 0 where unknown [m].
     pub heights_m: Vec<f32>,
@@ -23,7 +23,7 @@ pub(super) struct PatchGround {
 
 impl PatchGround {
     /// Ground of which nothing is known yet.
-    pub fn unknown(window: GridGeometry, ratio: Ratio, height_scale_m: f64) -> Self {
+    pub fn unknown(window: GridGeometry, ratio: ResolutionRatio, height_scale_m: f64) -> Self {
         Self::over(window, ratio, (1.0 / height_scale_m) as f32)
     }
 
@@ -32,7 +32,7 @@ impl PatchGround {
         Self::over(window, self.ratio, self.per_height_m)
     }
 
-    fn over(window: GridGeometry, ratio: Ratio, per_height_m: f32) -> Self {
+    fn over(window: GridGeometry, ratio: ResolutionRatio, per_height_m: f32) -> Self {
         let planes = Planes::new(window, ratio);
         Self {
             planes,
@@ -147,7 +147,8 @@ mod tests {
         };
         let values = (0..WINDOW.n_cells()).map(cell).collect();
         #[allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
-        let (surface, ratio) = (GridMap::from_values(WINDOW, values).unwrap(), Ratio::new(0.3, 0.2).unwrap());
+        let (surface, ratio) =
+            (GridMap::from_values(WINDOW, values).unwrap(), ResolutionRatio::new(0.3, 0.2).unwrap());
         let mut ground = PatchGround::unknown(WINDOW, ratio, 0.1);
         // In two parts, as what changes comes.
         ground.read(&surface, [-3, 4], [5, 10]);

@@ -2,60 +2,11 @@
 
 use std::collections::BTreeMap;
 
-use safetensors::tensor::{Dtype, SafeTensorError, SafeTensors, TensorView};
-use serde::Deserialize;
-use sha2::{Digest, Sha256};
 use traversability::Bins;
 
-use super::{Checkpoint, Sidecar, Tensor};
+use super::{Checkpoint, Sidecar};
 use crate::FeatureLayout;
-
-/// Why bytes are no checkpoint, or one that does not fit.
-#[derive(Debug, thiserror::Error)]
-pub enum CheckpointError {
-    /// The sidecar is no JSON of a sidecar.
-    #[error("sidecar: expected JSON of format {format}, found: {0}", format = Sidecar::FORMAT)]
-    Json(serde_json::Error),
-    /// The sidecar cannot be written.
-    #[error("sidecar: expected values that JSON can hold: {0}")]
-    Unwritable(serde_json::Error),
-    /// The weights are no safetensors.
-    #[error("weights: expected safetensors, found: {0}")]
-    Safetensors(#[from] SafeTensorError),
-    /// The two do not belong together, or to this program, vehicle or layout.
-    #[error("{what}: expected {expected}, found {found}")]
-    Mismatch {
-        /// What differs.
-        what: String,
-        /// What would fit.
-        expected: String,
-        /// What is there.
-        found: String,
-    },
-    /// A weight that is no number.
-    #[error("{tensor}, value {index}: expected a finite number, found {found}")]
-    NonFinite {
-        /// Name of the array.
-        tensor: String,
-        /// Which of its values, from 0.
-        index: usize,
-        /// The value.
-        found: f32,
-    },
-}
-
-/// Refuses unless both are the same.
-fn require<T: PartialEq + std::fmt::Debug>(
-    what: &str,
-    expected: &T,
-    found: &T,
-) -> Result<(), CheckpointError> {
-    if expected == found {
-        return Ok(());
-    }
-    let (expected, found) = (format!("{expected:?}"), format!("{found:?}"));
-    Err(CheckpointError::Mismatch { what: what.to_owned(), expected, found })
-}
+use crate::weights::{self, CheckpointError, Tensor, WeightsDigest, require};
 
 fn require_positive(what: &str, values: &[f32]) -> Result<(), CheckpointError> {
     match values.iter().find(|value| !(value.is_finite() && **value > 0.0)) {
@@ -69,17 +20,6 @@ fn require_positive(what: &str, values: &[f32]) -> Result<(), CheckpointError> {
 }
 
 impl Sidecar {
-    /// Reads the version first: what else stands in one of another version means something else, if anything.
-    fn read(json: &[u8]) -> Result<Self, CheckpointError> {
-        #[derive(Deserialize)]
-        struct Version {
-            format: u32,
-        }
-        let Version { format } = serde_json::from_slice(json).map_err(CheckpointError::Json)?;
-        require("format", &Self::FORMAT, &format)?;
-        serde_json::from_slice(json).map_err(CheckpointError::Json)
-    }
-
     /// Refuses what this program cannot use: another format or bins, lengths that contradict one another, numbers out
     /// of range.
     fn validate(&self) -> Result<(), CheckpointError> {
@@ -116,9 +56,9 @@ impl Checkpoint {
     /// What [`Checkpoint::from_bytes`] refuses, but for the hash.
     pub fn new(sidecar: Sidecar, tensors: BTreeMap<String, Tensor>) -> Result<Self, CheckpointError> {
         sidecar.validate()?;
-        check_tensors(&sidecar, &tensors)?;
+        weights::check(sidecar.architecture.tensor_shapes(), &tensors)?;
         let mut checkpoint = Self { sidecar, tensors };
-        checkpoint.sidecar.weights_sha256 = sha256(&checkpoint.weights_bytes()?);
+        checkpoint.sidecar.weights_sha256 = checkpoint.digest()?.hexadecimal();
         Ok(checkpoint)
     }
 
@@ -127,13 +67,15 @@ impl Checkpoint {
     /// # Errors
     /// A tensor whose shape contradicts its number of values.
     pub fn weights_bytes(&self) -> Result<Vec<u8>, CheckpointError> {
-        let bytes = |tensor: &Tensor| tensor.values.iter().flat_map(|value| value.to_le_bytes()).collect();
-        let data: Vec<Vec<u8>> = self.tensors.values().map(bytes).collect();
-        let mut views = Vec::with_capacity(data.len());
-        for ((name, tensor), data) in self.tensors.iter().zip(&data) {
-            views.push((name.as_str(), TensorView::new(Dtype::F32, tensor.shape.clone(), data)?));
-        }
-        Ok(safetensors::serialize(views, None)?)
+        weights::to_bytes(&self.tensors)
+    }
+
+    /// What the weights are known by.
+    ///
+    /// # Errors
+    /// A tensor whose shape contradicts its number of values.
+    pub fn digest(&self) -> Result<WeightsDigest, CheckpointError> {
+        Ok(WeightsDigest::of(&self.weights_bytes()?))
     }
 
     /// The sidecar as indented JSON.
@@ -141,9 +83,7 @@ impl Checkpoint {
     /// # Errors
     /// Numbers that JSON cannot hold.
     pub fn sidecar_bytes(&self) -> Result<Vec<u8>, CheckpointError> {
-        let mut text = serde_json::to_vec_pretty(&self.sidecar).map_err(CheckpointError::Unwritable)?;
-        text.push(b'\n');
-        Ok(text)
+        weights::sidecar_bytes(&self.sidecar)
     }
 
     /// A checkpoint from the bytes of its two files.
@@ -152,17 +92,10 @@ impl Checkpoint {
     /// Truncated or other bytes, another format, weights of another hash than the sidecar's, other bins, shapes or
     /// lengths than the sidecar's architecture and layout demand, numbers that are not finite.
     pub fn from_bytes(weights: &[u8], sidecar: &[u8]) -> Result<Self, CheckpointError> {
-        let sidecar = Sidecar::read(sidecar)?;
+        let sidecar: Sidecar = weights::read_sidecar(sidecar, Sidecar::FORMAT)?;
         sidecar.validate()?;
-        require("SHA-256 of the weights", &sidecar.weights_sha256, &sha256(weights))?;
-        let mut tensors = BTreeMap::new();
-        for (name, view) in SafeTensors::deserialize(weights)?.tensors() {
-            require(&format!("type of {name}"), &Dtype::F32, &view.dtype())?;
-            let values =
-                view.data().as_chunks::<4>().0.iter().map(|&bytes| f32::from_le_bytes(bytes)).collect();
-            tensors.insert(name, Tensor { shape: view.shape().to_vec(), values });
-        }
-        check_tensors(&sidecar, &tensors)?;
+        let tensors = weights::from_bytes(weights, &sidecar.weights_sha256)?;
+        weights::check(sidecar.architecture.tensor_shapes(), &tensors)?;
         Ok(Self { sidecar, tensors })
     }
 
@@ -180,28 +113,6 @@ impl Checkpoint {
     pub fn require_prior(&self, prior: &physics_prior::PriorConfig) -> Result<(), CheckpointError> {
         require("physics prior of the weights", prior, &self.sidecar.prior)
     }
-}
-
-fn check_tensors(sidecar: &Sidecar, tensors: &BTreeMap<String, Tensor>) -> Result<(), CheckpointError> {
-    let mut expected = sidecar.architecture.tensor_shapes();
-    expected.sort();
-    let names: Vec<&String> = expected.iter().map(|(name, _)| name).collect();
-    require("names of the weights", &names, &tensors.keys().collect())?;
-    for ((name, shape), tensor) in expected.iter().zip(tensors.values()) {
-        require(&format!("shape of {name}"), shape, &tensor.shape)?;
-        // The shape is the architecture's, whose product cannot be told from a huge one by itself.
-        let n = shape.iter().fold(1usize, |n, &length| n.saturating_mul(length));
-        require(&format!("number of values of {name}"), &n, &tensor.values.len())?;
-        if let Some(index) = tensor.values.iter().position(|value| !value.is_finite()) {
-            let found = tensor.values[index];
-            return Err(CheckpointError::NonFinite { tensor: name.clone(), index, found });
-        }
-    }
-    Ok(())
-}
-
-fn sha256(bytes: &[u8]) -> String {
-    Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
 #[cfg(test)]

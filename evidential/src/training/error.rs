@@ -1,6 +1,8 @@
 //! Why a training fails.
 
-use super::{Phase, SettingsError};
+use terrain::SettingError;
+
+use super::Phase;
 use crate::{CheckpointError, DatasetError};
 
 /// Why nothing was trained.
@@ -8,7 +10,7 @@ use crate::{CheckpointError, DatasetError};
 pub enum TrainError {
     /// A setting out of range.
     #[error("settings: {0}")]
-    Settings(#[from] SettingsError),
+    Settings(#[from] SettingError),
     /// Data that nothing can be learnt from.
     #[error("{which} data: {problem}")]
     Data {

@@ -6,11 +6,12 @@
 //! to the method's loss, with the flow as it is now.
 
 use candle_core::{Device, Tensor};
+use terrain::SettingError;
 
 use super::evaluation::scores;
 use super::samples::{Samples, gather};
 use super::steps::{Place, adam, order, pass};
-use super::{CHUNK, FLOW_KEY, JOINT_KEY, Phase, Settings, SettingsError, TrainError, mean_surprise};
+use super::{CHUNK, FLOW_KEY, JOINT_KEY, Phase, Settings, TrainError, mean_surprise};
 use crate::loss::{BatchLoss, LossTerms};
 use crate::network::Network;
 use crate::{Architecture, Checkpoint, Dataset, DatasetError, DensityRange, Sidecar};
@@ -38,7 +39,7 @@ impl Refinement {
         Self { seed, learning_rate: 1e-3, epochs: 12, flow_learning_rate: 1e-3, flow_epochs: 6, batch: 64 }
     }
 
-    fn validate(&self) -> Result<(), SettingsError> {
+    fn validate(&self) -> Result<(), SettingError> {
         // The same ranges as those of a whole training.
         let Self { seed, learning_rate, epochs, flow_learning_rate, flow_epochs, batch } = *self;
         let whole = Settings::new(crate::Method::Pietra, seed);

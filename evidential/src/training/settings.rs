@@ -1,6 +1,7 @@
 //! What a training run may choose.
 
 use serde::{Deserialize, Serialize};
+use terrain::SettingError;
 
 use crate::{Architecture, Method};
 
@@ -41,18 +42,6 @@ pub struct Settings {
     pub n_flow_layers: usize,
 }
 
-/// A setting that makes no sense.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error("{field}: expected {expected}, found {found}")]
-pub struct SettingsError {
-    /// Name of the field.
-    pub field: &'static str,
-    /// What would do.
-    pub expected: &'static str,
-    /// The value that was given.
-    pub found: f64,
-}
-
 /// Widest layer, most layers, largest batch: beyond, a slip of the keyboard is likelier than a wish.
 const COUNT_MAX: usize = 1 << 16;
 
@@ -79,11 +68,11 @@ impl Settings {
     }
 
     /// Refuses values outside their ranges.
-    pub fn validate(&self) -> Result<(), SettingsError> {
+    pub fn validate(&self) -> Result<(), SettingError> {
         let rates = [("learning_rate", self.learning_rate), ("flow_learning_rate", self.flow_learning_rate)];
-        check(&rates, "a number above 0, at most 1", |v| v > 0.0 && v <= 1.0)?;
+        SettingError::check_finite(&rates, "a number above 0, at most 1", |v| v > 0.0 && v <= 1.0)?;
         let weights = [("physics_weight", self.physics_weight), ("entropy_weight", self.entropy_weight)];
-        check(&weights, "a finite number >= 0", |v| v >= 0.0)?;
+        SettingError::check_finite(&weights, "a finite number >= 0", |v| v >= 0.0)?;
         let mut counts = vec![
             ("batch", self.batch),
             ("epochs_max", self.epochs_max),
@@ -95,9 +84,11 @@ impl Settings {
         ];
         counts.extend(self.encoder_hidden.iter().map(|&width| ("encoder_hidden", width)));
         let counts: Vec<_> = counts.into_iter().map(|(field, count)| (field, count as f64)).collect();
-        check(&counts, "a count from 1 to 65536", |v| (1.0..=COUNT_MAX as f64).contains(&v))?;
+        SettingError::check_finite(&counts, "a count from 1 to 65536", |v| {
+            (1.0..=COUNT_MAX as f64).contains(&v)
+        })?;
         let may_be_zero = [("flow_epochs_max", self.flow_epochs_max as f64)];
-        check(&may_be_zero, "a count from 0 to 65536", |v| v <= COUNT_MAX as f64)
+        SettingError::check_finite(&may_be_zero, "a count from 0 to 65536", |v| v <= COUNT_MAX as f64)
     }
 
     /// Sizes of the networks for footprints of so many features; a method without evidence has none of its parts.
@@ -111,17 +102,6 @@ impl Settings {
             evidence_hidden: if_evidential(self.evidence_hidden),
             n_flow_layers: if_evidential(self.n_flow_layers),
         }
-    }
-}
-
-fn check(
-    fields: &[(&'static str, f64)],
-    expected: &'static str,
-    allowed: impl Fn(f64) -> bool,
-) -> Result<(), SettingsError> {
-    match fields.iter().find(|(_, value)| !(value.is_finite() && allowed(*value))) {
-        Some(&(field, found)) => Err(SettingsError { field, expected, found }),
-        None => Ok(()),
     }
 }
 

@@ -11,7 +11,7 @@ use terrain::{GridGeometry, GridMap};
 use crate::ConfigError;
 use crate::cells::CellLimit;
 use crate::numpy::check_cell;
-use crate::refusal::Refusal;
+use crate::refusal::{ArrayFileError, Refusal};
 
 pub use png::PngScale;
 
@@ -44,26 +44,9 @@ pub struct ElevationLayers {
 /// An elevation file that cannot be used. Every message is one line.
 #[derive(Debug, thiserror::Error)]
 pub enum ElevationError {
-    /// The file could not be read.
-    #[error("{file}: expected a readable file, found: {source}")]
-    Unreadable {
-        /// Path as given.
-        file: String,
-        /// What the system said.
-        source: std::io::Error,
-    },
-    /// A part of the file is wrong.
-    #[error("{file}: {field}: expected {expected}, found {found}")]
-    Field {
-        /// Path as given.
-        file: String,
-        /// Array, tag or property.
-        field: String,
-        /// What would do.
-        expected: String,
-        /// What was there.
-        found: String,
-    },
+    /// The file, or a part of it.
+    #[error(transparent)]
+    File(#[from] ArrayFileError),
     /// The sidecar that scales a PNG is wrong.
     #[error(transparent)]
     Sidecar(#[from] ConfigError),
@@ -83,7 +66,10 @@ pub fn read_elevation(path: &Path) -> Result<ElevationFile, ElevationError> {
         "npz" => open_and(path, npz::read),
         "tif" | "tiff" => open_and(path, geotiff::read),
         "png" => read_elevation_png(path, PngScale::beside(path)?),
-        _ => Err(Refusal::new("file name", "the extension npz, tif, tiff or png", path.display()).of(path)),
+        _ => {
+            let refusal = Refusal::new("file name", "the extension npz, tif, tiff or png", path.display());
+            Err(refused(path, refusal))
+        }
     }
 }
 
@@ -107,15 +93,12 @@ fn open_and(
         Ok((std::io::BufReader::new(file), about.len()))
     };
     let (file, n_bytes) =
-        open().map_err(|source| ElevationError::Unreadable { file: path.display().to_string(), source })?;
-    read(file, n_bytes).map_err(|refusal| refusal.of(path))
+        open().map_err(|source| ArrayFileError::Unreadable { file: path.display().to_string(), source })?;
+    read(file, n_bytes).map_err(|refusal| refused(path, refusal))
 }
 
-impl Refusal {
-    fn of(self, path: &Path) -> ElevationError {
-        let Self { field, expected, found } = self;
-        ElevationError::Field { file: path.display().to_string(), field, expected, found }
-    }
+fn refused(path: &Path, refusal: Refusal) -> ElevationError {
+    ArrayFileError::refused(&path.display().to_string(), refusal).into()
 }
 
 /// Refuses sizes that are no map, or more than a file of this size holds.

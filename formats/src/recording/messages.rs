@@ -108,6 +108,15 @@ impl RecordingMessages {
     }
 }
 
+impl RecordingMessages {
+    /// Hands every message to `take`, up to where the recording breaks off or `take` refuses one. Returns why it ended
+    /// there; `None` of a recording that is whole.
+    pub fn take_all(self, mut take: impl FnMut(RecordedMessage) -> Result<(), String>) -> Option<String> {
+        let mut taken = self.map(|message| take(message.map_err(|error| error.to_string())?));
+        taken.find_map(Result::err)
+    }
+}
+
 impl Iterator for RecordingMessages {
     type Item = Result<RecordedMessage, RecordingError>;
 

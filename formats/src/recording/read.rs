@@ -53,25 +53,19 @@ pub fn read_drive_log_mcap(path: &Path) -> Result<McapDriveLog, McapReadError> {
     };
     let mut topics = BTreeSet::new();
     let mut log = DriveLog::default();
-    let mut ended_early = None;
     let mut fields = None;
-    for message in messages {
-        let added = message.map_err(|error| error.to_string()).and_then(|message| {
-            topics.insert(message.channel.topic.clone());
-            if message.channel.topic != drive_row::TOPIC {
-                return Ok(());
-            }
-            if fields.is_none() {
-                let schema = Fields::of(&message.channel.schema_data);
-                fields = Some(schema.ok_or("messages without a schema of a drive log")?);
-            }
-            fields.as_ref().map_or(Ok(()), |fields| add_row(fields, &mut log, &message.data))
-        });
-        if let Err(problem) = added {
-            ended_early = Some(format!("after {} rows: {problem}", log.n_rows()));
-            break;
+    let problem = messages.take_all(|message| {
+        topics.insert(message.channel.topic.clone());
+        if message.channel.topic != drive_row::TOPIC {
+            return Ok(());
         }
-    }
+        if fields.is_none() {
+            let schema = Fields::of(&message.channel.schema_data);
+            fields = Some(schema.ok_or("messages without a schema of a drive log")?);
+        }
+        fields.as_ref().map_or(Ok(()), |fields| add_row(fields, &mut log, &message.data))
+    });
+    let ended_early = problem.map(|problem| format!("after {} rows: {problem}", log.n_rows()));
     if log.n_rows() > 0 {
         return Ok(McapDriveLog { log, ended_early });
     }

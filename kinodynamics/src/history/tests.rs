@@ -59,9 +59,30 @@ fn few_missing_samples_are_the_last_before_them() {
 }
 
 #[test]
-fn half_the_rate_is_told() {
+fn other_rates_are_told() {
     let history = filled((0..300).step_by(2), |_, _| {});
-    assert_eq!(fault(&history, 298), Some(ImuFault::Rate { missing: 50 }));
+    let told = fault(&history, 298).unwrap().to_string();
+    assert!(told == "expected 200 Hz, found 100 Hz" || told == "expected 200 Hz, found 99 Hz", "{told}");
+    // Twice as fast: a hundred samples are a quarter of a second.
+    let history = filled(0..300, |k, sample| sample.valid_at_ns = 1_000_000_000 + k * PERIOD_NS / 2);
+    let told = history.window(1_000_000_000 + 150 * PERIOD_NS, AGE_MAX_NS).err().unwrap().to_string();
+    assert_eq!(told, "expected 200 Hz, found 400 Hz");
+}
+
+#[test]
+fn clocks_that_are_ahead_or_set_back_are_noticed() {
+    let history = filled(0..100, |_, _| {});
+    let now_ns = sample(99).valid_at_ns - AGE_MAX_NS - 1;
+    let found = history.window(now_ns, AGE_MAX_NS).err();
+    assert_eq!(found, Some(ImuFault::FromFuture { ahead_ns: AGE_MAX_NS + 1 }));
+    // A second ahead for a while, then right again: it starts anew, and is whole after half a second.
+    let ahead = |k: u64, sample: &mut ImuSample| {
+        if k < 300 {
+            sample.valid_at_ns += 1_000_000_000;
+        }
+    };
+    assert_eq!(fault(&filled(0..350, ahead), 349), Some(ImuFault::Short { found: 50 }));
+    assert_eq!(fault(&filled(0..400, ahead), 399), None);
 }
 
 #[test]

@@ -1,19 +1,14 @@
 //! Whether the unit's axes, signs, units and rate are what they should be, told from gravity and from the localisation.
 
 use super::Recording;
+use crate::agreement::{Agreement, Disagreement, Moment};
 use crate::history::PERIOD_NS;
 
 const AXIS: [&str; 3] = ["forward", "left", "up"];
-/// Least correlation of the upward rate with the localisation's yaw rate.
-const CORRELATION_MIN: f64 = 0.8;
-/// How far the upward rate may be off as a factor.
-const FACTOR: [f64; 2] = [0.7, 1.4];
 /// How far the mean specific force may be off [m/s2].
 const GRAVITY_MPS2: [f64; 2] = [8.0, 11.6];
 /// How far the rate may be off as a factor.
 const PERIOD: [f64; 2] = [0.9, 1.1];
-/// Yaw rates below this tell no axis [rad/s].
-const TURNING_RADPS: f64 = 0.05;
 
 /// What is wrong with the unit.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -58,6 +53,21 @@ pub enum ImuCheckError {
         /// Upward rate over yaw rate [-].
         factor: f64,
     },
+    /// The force to the left is not what it takes to turn.
+    #[error("IMU: expected the force to the left to follow speed times yaw rate, found correlations of {0:.2} ahead and {1:.2} to the left{hint}", correlation[0], correlation[1], hint = force_hint(correlation))]
+    Force {
+        /// Of the forces ahead and to the left with speed times yaw rate [-].
+        correlation: [f64; 2],
+    },
+}
+
+impl From<Disagreement> for ImuCheckError {
+    fn from(disagreement: Disagreement) -> Self {
+        match disagreement {
+            Disagreement::Rate { correlation, factor } => Self::YawRate { correlation, factor },
+            Disagreement::Force { correlation } => Self::Force { correlation },
+        }
+    }
 }
 
 fn hint(mean_mps2: &[f64; 3]) -> String {
@@ -78,10 +88,18 @@ fn rate_hint(correlation: &[f64; 3], factor: f64) -> String {
         2 if correlation[2] < 0.0 => "; its sign is turned".to_owned(),
         2 if (50.0..65.0).contains(&factor) => "; is it in degrees per second?".to_owned(),
         2 => String::new(),
-        axis if correlation[axis].abs() >= CORRELATION_MIN => {
+        axis if correlation[axis].abs() >= 0.6 => {
             format!("; the axis called {} is the upward one", AXIS[axis])
         }
         _ => String::new(),
+    }
+}
+
+fn force_hint([ahead, left]: &[f64; 2]) -> &'static str {
+    if ahead.abs() > left.abs() {
+        "; forward and left are swapped"
+    } else {
+        "; the axis called left points right"
     }
 }
 
@@ -98,22 +116,17 @@ pub fn check_imu(recording: &Recording) -> Result<(), ImuCheckError> {
             }
         }
     }
-    let (sums, n_samples) = Sums::of(recording);
-    let yaw_rate_radps = (sums.yaw_square / sums.n.max(1.0)).sqrt();
-    if n_samples < 100 || sums.n < 20.0 || yaw_rate_radps < TURNING_RADPS {
+    let (agreement, n_samples) = agreement(recording);
+    if n_samples < 100 || agreement.turning_radps().is_none() {
+        let yaw_rate_radps = agreement.mean_yaw_rate_radps();
         return Err(ImuCheckError::Nothing { n_samples, yaw_rate_radps });
     }
     check_rate(recording)?;
-    let mean_mps2 = sums.force.map(|sum| sum / n_samples as f64);
+    let mean_mps2 = mean_force_mps2(recording, n_samples);
     if !(GRAVITY_MPS2[0]..=GRAVITY_MPS2[1]).contains(&mean_mps2[2]) {
         return Err(ImuCheckError::Gravity { mean_mps2 });
     }
-    let correlation = [0, 1, 2].map(|axis| {
-        sums.product[axis] / (sums.rate_square[axis] * sums.yaw_square).sqrt().max(f64::MIN_POSITIVE)
-    });
-    let factor = sums.product[2] / sums.yaw_square;
-    let is_right = correlation[2] >= CORRELATION_MIN && (FACTOR[0]..=FACTOR[1]).contains(&factor);
-    if is_right { Ok(()) } else { Err(ImuCheckError::YawRate { correlation, factor }) }
+    Ok(agreement.check()?)
 }
 
 fn check_rate(recording: &Recording) -> Result<(), ImuCheckError> {
@@ -128,53 +141,40 @@ fn check_rate(recording: &Recording) -> Result<(), ImuCheckError> {
     Err(ImuCheckError::Rate { found_hz: 1e9 / median_ns.max(1) as f64 })
 }
 
-/// Sums over all samples, and over all ticks with the mean of the samples since the tick before.
-#[derive(Default)]
-struct Sums {
-    force: [f64; 3],
-    n: f64,
-    yaw_square: f64,
-    rate_square: [f64; 3],
-    product: [f64; 3],
+fn mean_force_mps2(recording: &Recording, n_samples: usize) -> [f64; 3] {
+    let mut sums = [0.0; 3];
+    for sample in recording.runs.iter().flat_map(|run| &run.imu) {
+        for (sum, force) in sums.iter_mut().zip(sample.acceleration_mps2) {
+            *sum += f64::from(force);
+        }
+    }
+    sums.map(|sum| sum / n_samples as f64)
 }
 
-impl Sums {
-    fn of(recording: &Recording) -> (Self, usize) {
-        let mut sums = Self::default();
-        let mut n_samples = 0;
-        for run in &recording.runs {
-            n_samples += run.imu.len();
-            for sample in &run.imu {
-                for (sum, force) in sums.force.iter_mut().zip(sample.acceleration_mps2) {
-                    *sum += f64::from(force);
-                }
+/// Over all ticks, each with the few samples before it; and the number of samples.
+fn agreement(recording: &Recording) -> (Agreement, usize) {
+    let mut agreement = Agreement::new(1.0);
+    for run in &recording.runs {
+        let mut next = 0;
+        for tick in &run.ticks {
+            let begin = next;
+            while run.imu.get(next).is_some_and(|sample| sample.valid_at_ns <= tick.time_ns) {
+                next += 1;
             }
-            let mut next = 0;
-            for tick in &run.ticks {
-                let begin = next;
-                while run.imu.get(next).is_some_and(|sample| sample.valid_at_ns <= tick.time_ns) {
-                    next += 1;
-                }
-                // About the instant of the tick: the last few samples before it.
-                let begin = begin.max(next.saturating_sub(4));
-                if begin < next {
-                    sums.add(&run.imu[begin..next], f64::from(tick.yaw_rate_radps));
-                }
+            let begin = begin.max(next.saturating_sub(4));
+            if begin < next {
+                let samples = run.imu[begin..next].iter().map(crate::history::numbers);
+                let (rate_radps, force_mps2) = crate::history::means(samples);
+                agreement.note(&Moment {
+                    rate_radps,
+                    force_mps2,
+                    yaw_rate_radps: f64::from(tick.yaw_rate_radps),
+                    speed_mps: f64::from(tick.wheel_speed_mps),
+                });
             }
         }
-        (sums, n_samples)
     }
-
-    fn add(&mut self, samples: &[bicycle::ImuSample], yaw_rate_radps: f64) {
-        self.n += 1.0;
-        self.yaw_square += yaw_rate_radps * yaw_rate_radps;
-        for axis in 0..3 {
-            let sum: f64 = samples.iter().map(|sample| f64::from(sample.angular_rate_radps[axis])).sum();
-            let rate = sum / samples.len() as f64;
-            self.rate_square[axis] += rate * rate;
-            self.product[axis] += rate * yaw_rate_radps;
-        }
-    }
+    (agreement, recording.runs.iter().map(|run| run.imu.len()).sum())
 }
 
 #[cfg(test)]

@@ -9,7 +9,6 @@ use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 use super::{Data, Settings, TrainError, keep};
-use crate::checkpoint;
 use crate::familiarity::{Fade, LAYERS, features, n_features};
 
 const STEPS: usize = 1500;
@@ -20,11 +19,23 @@ const DEVIATION_MIN: f32 = 1e-2;
 /// Shares of the training examples below which trust is gone, and begins to fade.
 const SHARES: [f64; 2] = [0.001, 0.05];
 
-/// Fits the flow, adds its weights and tells where trust fades.
+/// Fits the flow on one thread: others would wait longer for one another than they compute.
 pub(super) fn fit(
     data: &Data,
     settings: &Settings,
-    tensors: &mut BTreeMap<String, checkpoint::Tensor>,
+    tensors: &mut BTreeMap<String, crate::Tensor>,
+) -> Result<Fade, TrainError> {
+    match rayon::ThreadPoolBuilder::new().num_threads(1).build() {
+        Ok(pool) => pool.install(|| fit_flow(data, settings, tensors)),
+        Err(_) => fit_flow(data, settings, tensors),
+    }
+}
+
+/// Fits the flow, adds its weights and tells where trust fades.
+fn fit_flow(
+    data: &Data,
+    settings: &Settings,
+    tensors: &mut BTreeMap<String, evidential::Tensor>,
 ) -> Result<Fade, TrainError> {
     let width = n_features(settings.architecture.senses());
     let rows = standardised(data, width, tensors)?;
@@ -56,7 +67,7 @@ pub(super) fn fit(
 fn standardised(
     data: &Data,
     width: usize,
-    tensors: &mut BTreeMap<String, checkpoint::Tensor>,
+    tensors: &mut BTreeMap<String, crate::Tensor>,
 ) -> candle_core::Result<Vec<f32>> {
     let n = data.training.n;
     let (windows, desired) =
@@ -79,7 +90,7 @@ fn standardised(
         }
     }
     for (name, values) in [("flow.mean", means), ("flow.deviation", deviations)] {
-        tensors.insert(name.to_owned(), checkpoint::Tensor { shape: vec![width], values });
+        tensors.insert(name.to_owned(), crate::Tensor { shape: vec![width], values });
     }
     Ok(rows)
 }

@@ -2,13 +2,19 @@
 
 use std::collections::BTreeMap;
 
-use candle_core::{Device, Result, Tensor, Var};
+use candle_core::{DType, Device, Result, Tensor, Var};
 use rand::{RngExt, SeedableRng};
+use rand_distr::StandardNormal;
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 use super::keep;
 use crate::architecture::{Activation, Architecture, LayerShape};
-use crate::checkpoint;
+
+/// Share of the inputs that a unit must answer to.
+const AWAKE_MIN: f32 = 0.05;
+
+/// Size of what all other units add to the answer at first, over what they would.
+const OTHERS: f64 = 0.1;
 
 struct Layer {
     name: String,
@@ -19,19 +25,49 @@ struct Layer {
 }
 
 impl Layer {
-    /// Weights and biases uniform within one over the root of the number of inputs, as PyTorch begins.
+    /// Normal weights whose sums keep the size of their inputs behind a ReLU (He and others 2015), or before a hyperbolic
+    /// tangent; no biases.
     fn new(shape: LayerShape, rng: &mut Xoshiro256PlusPlus) -> Result<Self> {
         let LayerShape { name, n_inputs, n_outputs, activation } = shape;
-        let bound = 1.0 / (n_inputs as f32).sqrt();
-        let mut uniform =
-            |n: usize| -> Vec<f32> { (0..n).map(|_| rng.random_range(-bound..bound)).collect() };
-        let weights = Var::from_vec(uniform(n_outputs * n_inputs), (n_outputs, n_inputs), &Device::Cpu)?;
+        let gain = match activation {
+            Activation::Relu => 2.0,
+            Activation::Tanh => 1.0,
+        };
+        let deviation = (gain / n_inputs as f32).sqrt();
+        let weights = (0..n_outputs * n_inputs).map(|_| deviation * rng.sample::<f32, _>(StandardNormal));
         Ok(Self {
             name,
-            weights,
-            biases: Var::from_vec(uniform(n_outputs), n_outputs, &Device::Cpu)?,
+            weights: Var::from_vec(weights.collect(), (n_outputs, n_inputs), &Device::Cpu)?,
+            biases: Var::zeros(n_outputs, DType::F32, &Device::Cpu)?,
             activation,
         })
+    }
+
+    /// Makes a unit the multiple of one of its inputs.
+    fn carry(&self, unit: usize, input: usize, factor: f32) -> Result<()> {
+        let mut weights = self.weights.to_vec2::<f32>()?;
+        weights[unit].fill(0.0);
+        weights[unit][input] = factor;
+        self.weights.set(&Tensor::new(weights, &Device::Cpu)?)
+    }
+
+    /// Turns units round that hardly any of these inputs [rows, inputs] gets an answer out of: they would not learn, and
+    /// turned round nearly all do. Returns the outputs.
+    fn wake(&self, inputs: &Tensor) -> Result<Tensor> {
+        if self.activation == Activation::Relu {
+            let answers = self.shares_awake(inputs)?;
+            let signs: Vec<f32> =
+                answers.iter().map(|share| if *share < AWAKE_MIN { -1.0 } else { 1.0 }).collect();
+            let signs = Tensor::from_vec(signs, answers.len(), &Device::Cpu)?;
+            self.weights.set(&self.weights.broadcast_mul(&signs.unsqueeze(1)?)?)?;
+            self.biases.set(&self.biases.mul(&signs)?)?;
+        }
+        self.forward(inputs)
+    }
+
+    /// Share of these inputs that each unit answers to.
+    fn shares_awake(&self, inputs: &Tensor) -> Result<Vec<f32>> {
+        self.forward(inputs)?.gt(0.0)?.to_dtype(DType::F32)?.mean(0)?.to_vec1()
     }
 
     fn forward(&self, inputs: &Tensor) -> Result<Tensor> {
@@ -55,23 +91,90 @@ impl Network {
         let mut layers = |shapes: Vec<LayerShape>| -> Result<Vec<Layer>> {
             shapes.into_iter().map(|shape| Layer::new(shape, &mut rng)).collect()
         };
-        Ok(Self { encoder: layers(architecture.encoder())?, command: layers(architecture.command())? })
+        let network =
+            Self { encoder: layers(architecture.encoder())?, command: layers(architecture.command())? };
+        network.embed_how_much_is_felt()?;
+        network.command_what_is_desired()?;
+        Ok(network)
+    }
+
+    /// Lets the embedding begin as means of what the units before it answer, all of one sign: how much the unit shakes.
+    /// With signs drawn at random, the noise of shaking is as large as what it tells.
+    fn embed_how_much_is_felt(&self) -> Result<()> {
+        let Some(embedding) = self.encoder.last() else { return Ok(()) };
+        let (_, n_inputs) = embedding.weights.dims2()?;
+        // The weights' deviation is the root of two over the number of inputs.
+        let factor = (2.0 / n_inputs as f64).sqrt();
+        embedding.weights.set(&(embedding.weights.abs()? * factor)?)
+    }
+
+    /// Lets the command network begin as the nominal model: it answers nearly what is desired, whatever the ground, and
+    /// learns the difference. Its first units carry the desired curvature to either side and the desired speed.
+    fn command_what_is_desired(&self) -> Result<()> {
+        const SPEED: usize = 0;
+        const CURVATURE: usize = 1;
+        let [first, second, last] = &self.command[..] else { return Ok(()) };
+        first.carry(0, CURVATURE, 1.0)?;
+        first.carry(1, CURVATURE, -1.0)?;
+        first.carry(2, SPEED, 1.0)?;
+        (0..3).try_for_each(|unit| second.carry(unit, unit, 1.0))?;
+        let mut weights = (last.weights.as_tensor() * OTHERS)?.to_vec2::<f32>()?;
+        (weights[0][0], weights[0][1], weights[0][2]) = (1.0, -1.0, 0.0);
+        if let Some(speed) = weights.get_mut(1) {
+            (speed[0], speed[1], speed[2]) = (0.0, 0.0, 1.0);
+        }
+        last.weights.set(&Tensor::new(weights, &Device::Cpu)?)
+    }
+
+    /// Makes every unit answer to some of these windows [rows, 600] and wishes [rows, 2] at least.
+    pub(super) fn wake(&self, windows: &Tensor, desired: &Tensor) -> Result<()> {
+        self.pass(windows, desired, Layer::wake).map(drop)
     }
 
     /// Answers over their scales [rows, answers] for standardised windows [rows, 600] and wishes [rows, 2].
     pub(super) fn forward(&self, windows: &Tensor, desired: &Tensor) -> Result<Tensor> {
+        self.pass(windows, desired, Layer::forward)
+    }
+
+    fn pass(
+        &self,
+        windows: &Tensor,
+        desired: &Tensor,
+        through: fn(&Layer, &Tensor) -> Result<Tensor>,
+    ) -> Result<Tensor> {
         let mut values = desired.clone();
         if !self.encoder.is_empty() {
             let mut embedding = windows.clone();
             for layer in &self.encoder {
-                embedding = layer.forward(&embedding)?;
+                embedding = through(layer, &embedding)?;
             }
             values = Tensor::cat(&[desired, &embedding], 1)?;
         }
         for layer in &self.command {
-            values = layer.forward(&values)?;
+            values = through(layer, &values)?;
         }
         Ok(values)
+    }
+
+    /// Share of these inputs that every unit behind a ReLU answers to, layer after layer.
+    #[cfg(test)]
+    pub(super) fn shares_awake(&self, windows: &Tensor, desired: &Tensor) -> Result<Vec<f32>> {
+        let mut values = windows.clone();
+        let mut shares = Vec::new();
+        let mut note = |layer: &Layer, inputs: &Tensor| -> Result<Tensor> {
+            if layer.activation == Activation::Relu {
+                shares.extend(layer.shares_awake(inputs)?);
+            }
+            layer.forward(inputs)
+        };
+        for layer in &self.encoder {
+            values = note(layer, &values)?;
+        }
+        let mut values = Tensor::cat(&[desired, &values], 1)?;
+        for layer in &self.command {
+            values = note(layer, &values)?;
+        }
+        Ok(shares)
     }
 
     fn layers(&self) -> impl Iterator<Item = &Layer> {
@@ -82,7 +185,7 @@ impl Network {
         self.layers().flat_map(|layer| [layer.weights.clone(), layer.biases.clone()]).collect()
     }
 
-    pub(super) fn tensors(&self) -> Result<BTreeMap<String, checkpoint::Tensor>> {
+    pub(super) fn tensors(&self) -> Result<BTreeMap<String, crate::Tensor>> {
         let mut tensors = BTreeMap::new();
         for layer in self.layers() {
             keep(&mut tensors, format!("{}.weight", layer.name), &layer.weights)?;

@@ -71,6 +71,51 @@ fn blind_model_is_off_by_what_it_cannot_know() {
     assert!((0.035..0.055).contains(&blind), "{blind}");
 }
 
+/// What is off on the chosen blocks, to the square, beyond what stays off for who knows the ground and divides by its share.
+fn error_by_ground(recording: &Recording, settings: &Settings) -> f64 {
+    let latency_s = estimate_latency(recording).unwrap().seconds;
+    let (examples, _) = label(recording, &LabelConfig { latency_s, ..settings.labels });
+    let places = block_split(&examples, settings.seed).validation;
+    let known = |place: &usize| {
+        let Example { commanded, driven, ground, .. } = &examples[*place];
+        f64::from(commanded[0] - driven[1] / if *ground == Some(1) { 0.8 } else { 0.95 }).powi(2)
+    };
+    error(recording, settings).powi(2) - places.iter().map(known).sum::<f64>() / places.len() as f64
+}
+
+/// Which ground it is shows in the unit's shaking and in nothing else: who hears it finds most of what nobody can know who
+/// does not.
+#[test]
+fn ground_that_only_the_unit_can_tell_is_learned() {
+    let recording = two_grounds(3);
+    let sensing = Sensing::Imu { embedding: 2 };
+    let blind = error_by_ground(&recording, &settings(Sensing::Blind, 8));
+    let learned = error_by_ground(&recording, &settings(sensing, 8));
+    let shuffled = Settings { history: History::Shuffled, ..settings(sensing, 8) };
+    let shuffled = error_by_ground(&recording, &shuffled);
+    println!("blind {blind:.2e}, learned {learned:.2e}, of shuffled histories {shuffled:.2e} 1/m2");
+    assert!(learned < 0.4 * blind, "{learned} of {blind}");
+    assert!(shuffled > 0.8 * blind, "{shuffled} of {blind}");
+}
+
+#[test]
+fn every_unit_answers_to_some_of_the_data() {
+    let network = Network::new(&Architecture::PAPER, 3).unwrap();
+    let rows = 64;
+    let wave = |n: usize| Tensor::from_vec((0..n).map(|k| (k as f32 * 0.7).sin()).collect(), n, &Device::Cpu);
+    // All windows lie to one side, which leaves half of the first units silent.
+    let windows =
+        wave(rows * WINDOW * AXES).unwrap().reshape((rows, WINDOW * AXES)).unwrap().affine(0.1, 2.0).unwrap();
+    let desired = wave(rows * 2).unwrap().reshape((rows, 2)).unwrap();
+    let silent = |network: &Network| {
+        let shares = network.shares_awake(&windows, &desired).unwrap();
+        shares.iter().filter(|share| **share < 0.05).count()
+    };
+    let before = silent(&network);
+    network.wake(&windows, &desired).unwrap();
+    assert_eq!((before > 100, silent(&network)), (true, 0), "{before} were silent");
+}
+
 #[test]
 fn flat_weights_answer_as_candle_does() {
     let recording = two_grounds(2);

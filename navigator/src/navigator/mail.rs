@@ -2,9 +2,13 @@
 
 use std::collections::VecDeque;
 
-use crate::{MissionMessage, OdometryMessage, ScanMessage, StuckMessage, SurfaceHeader};
+use bicycle::ImuSample;
 
-/// Odometry that waits for a part at the most: as many as on the channel of processes; of more, the oldest is dropped.
+use crate::{
+    MessageId, MissionMessage, OdometryMessage, ScanMessage, StuckMessage, SurfaceHeader, TracksMessage,
+};
+
+/// Odometry, and messages of the inertial measurement unit, that wait for a part at the most: as many as on the channel of processes; of more, the oldest is dropped.
 const ODOMETRY_MAX: usize = 32;
 /// The same of scans, and of maps of the ground.
 const SCANS_MAX: usize = 2;
@@ -23,12 +27,14 @@ pub(super) struct Mail<C> {
     pub to_leader: VecDeque<OdometryMessage<C>>,
     pub to_surveyor: VecDeque<OdometryMessage<C>>,
     pub to_pilot: VecDeque<OdometryMessage<C>>,
+    pub to_corrector: VecDeque<(MessageId, Vec<ImuSample>)>,
     pub scans: VecDeque<ScanMessage>,
     pub surfaces: VecDeque<SurfaceHeader>,
     pub learned: ToAssessor,
     /// `None` where nobody stands in.
     pub physics: Option<ToAssessor>,
     pub mission_to_pilot: Option<MissionMessage>,
+    pub tracks_to_pilot: Option<TracksMessage>,
     /// A learned map has come that whoever stands in has not heard of.
     pub has_learned: bool,
 }
@@ -40,11 +46,13 @@ impl<C> Default for Mail<C> {
             to_leader: queue(),
             to_surveyor: queue(),
             to_pilot: queue(),
+            to_corrector: VecDeque::with_capacity(ODOMETRY_MAX),
             scans: VecDeque::with_capacity(SCANS_MAX),
             surfaces: VecDeque::with_capacity(SURFACES_MAX),
             learned: ToAssessor::default(),
             physics: None,
             mission_to_pilot: None,
+            tracks_to_pilot: None,
             has_learned: false,
         }
     }
@@ -55,6 +63,10 @@ impl<C: Copy> Mail<C> {
         for queue in [&mut self.to_leader, &mut self.to_surveyor, &mut self.to_pilot] {
             put(queue, *message, ODOMETRY_MAX);
         }
+    }
+
+    pub fn imu(&mut self, id: MessageId, samples: Vec<ImuSample>) {
+        put(&mut self.to_corrector, (id, samples), ODOMETRY_MAX);
     }
 
     pub fn scan(&mut self, message: ScanMessage) {

@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
 use super::*;
-use crate::{GuardConfig, MessageId, RiskMapConfig};
+use crate::{GuardConfig, MessageId, MovingConfig, RiskMapConfig};
 use bicycle::{Command, Geometry, Limits, State};
 use mppi::{CostToGo, CostToGoConfig};
 use physics_prior::PriorConfig;
@@ -49,6 +49,8 @@ fn config() -> Config {
         attitude_share: 0.9,
         areas: crate::Areas::default(),
         sensors: Vec::new(),
+        moving: None,
+        correction: kinodynamics::CorrectionConfig::default(),
     }
 }
 
@@ -66,7 +68,10 @@ struct Drive {
 impl Drive {
     /// On level ground to a goal 18 m ahead, with a vehicle that follows its commands 0.3 s late.
     fn new() -> Self {
-        let config = config();
+        Self::with(&config())
+    }
+
+    fn with(config: &Config) -> Self {
         let model = Model { wheelbase_m: 2.0, limits: limits(), effects: Vec::new() };
         let map = RiskMap::constant(GridGeometry::centred(0.25, 160, 160, 0.0, 0.0), 8, Risk::NONE);
         let mut field = CostToGo::new(CostToGoConfig::default(), &limits(), 160, 160).unwrap();
@@ -74,7 +79,7 @@ impl Drive {
         field.update(map.view(), goal_m).unwrap();
         let state = State { x_m: -15.0, speed_mps: SPEED_MPS, ..State::default() };
         let applied = Applied { command: Command::default(), since_ns: 0, by: AppliedBy::Command };
-        Self { pilot: Pilot::new(model, &config, 1).unwrap(), map, field, goal_m, state, applied, cycle: 0 }
+        Self { pilot: Pilot::new(model, config, 1).unwrap(), map, field, goal_m, state, applied, cycle: 0 }
     }
 
     fn measure(&mut self) {
@@ -266,4 +271,85 @@ fn what_is_wrong_with_the_measurements_is_said_first_and_a_map_that_is_missing_l
     drive.measure();
     assert_eq!(drive.pilot.decide(1, None, &lost), Decision::Stop(StopReason::StaleMission));
     assert_eq!(drive.pilot.decide(2, None, &there), Decision::Hold(HoldReason::NoMap));
+}
+
+/// Somebody who stands at a place, as of a time [ms], in the frame of that time.
+fn somebody_at(at_ms: u64, position_m: [f64; 2]) -> TracksMessage {
+    somebody_in_frame([at_ms, at_ms], position_m)
+}
+
+/// The same in the frame of another time.
+fn somebody_in_frame([at_ms, frame_at_ms]: [u64; 2], position_m: [f64; 2]) -> TracksMessage {
+    let track = tracking::Track { number: 1, position_m, radius_m: 0.3, ..tracking::Track::default() };
+    let id = MessageId { epoch_ns: 2, sequence: at_ms + 1 };
+    let scan = (MessageId::default(), at_ms * 1_000_000);
+    TracksMessage::new(id, scan, frame_at_ms * 1_000_000, &[track])
+}
+
+/// Measured a cycle's way on: odometry that stands still would be taken for frozen.
+fn onwards(drive: &mut Drive) {
+    drive.state.x_m += SPEED_MPS * CYCLE_S;
+    drive.measure();
+}
+
+#[test]
+fn nobody_drives_among_people_of_whom_nothing_is_known_or_nothing_any_more() {
+    let mut drive = Drive::with(&Config { moving: Some(MovingConfig::default()), ..config() });
+    onwards(&mut drive);
+    assert_eq!(drive.decide(), Decision::Hold(HoldReason::NoMap), "nothing is known");
+    drive.pilot.hear_tracks(&somebody_at(100, [100.0, 100.0]));
+    for _ in 1..=11 {
+        onwards(&mut drive);
+        assert!(matches!(drive.decide(), Decision::Drive(_)), "cycle {}", drive.cycle);
+    }
+    // Map and odometry go on, and 1.1 s ago somebody knew last who moves.
+    onwards(&mut drive);
+    assert_eq!(drive.decide(), Decision::Stop(StopReason::StaleScan));
+    drive.pilot.hear_tracks(&somebody_at(50, [100.0, 100.0]));
+    onwards(&mut drive);
+    assert_eq!(drive.decide(), Decision::Stop(StopReason::StaleScan), "what is older is no news");
+    drive.pilot.hear_tracks(&somebody_at(1400, [100.0, 100.0]));
+    onwards(&mut drive);
+    assert!(matches!(drive.decide(), Decision::Drive(_)));
+}
+
+#[test]
+fn who_stands_before_the_bumper_is_stopped_for_until_he_has_gone() {
+    let mut drive = Drive::with(&Config { moving: Some(MovingConfig::default()), ..config() });
+    let bumper_m = drive.state.x_m;
+    drive.pilot.hear_tracks(&somebody_at(0, [bumper_m + 1.2, 0.0]));
+    drive.measure();
+    let answer = |drive: &mut Drive| drive.decide();
+    assert_eq!(answer(&mut drive), Decision::Stop(StopReason::MovingObstacle));
+    drive.pilot.hear_tracks(&somebody_at(100, [bumper_m, 20.0]));
+    drive.measure();
+    assert!(matches!(answer(&mut drive), Decision::Drive(_)));
+    let without = Config { moving: None, ..config() };
+    let mut drive = Drive::with(&without);
+    drive.pilot.hear_tracks(&somebody_at(0, [bumper_m + 1.2, 0.0]));
+    drive.measure();
+    assert!(matches!(drive.decide(), Decision::Drive(_)), "where nobody has said that anything moves");
+}
+
+/// The localisation jumps 6 m to the north after the scan: so does he, and is no longer taken to be in the way.
+#[test]
+fn a_jump_takes_people_along() {
+    let mut drive = Drive::with(&Config { moving: Some(MovingConfig::default()), ..config() });
+    let ahead_m = [drive.state.x_m + 1.4, 0.0];
+    drive.measure();
+    drive.pilot.hear_tracks(&somebody_at(0, [ahead_m[0], -6.0]));
+    assert!(matches!(drive.decide(), Decision::Drive(_)), "6 m beside the way");
+    drive.state.x_m += 0.2;
+    drive.state.y_m += 6.0;
+    drive.measure();
+    drive.pilot.hear_tracks(&somebody_at(50, [ahead_m[0] + 0.2, -6.0]));
+    assert!(matches!(drive.decide(), Decision::Drive(_)), "and still, both moved");
+    drive.measure();
+    let seen_before_the_jump = somebody_in_frame([60, 50], [ahead_m[0] + 0.2, 0.0]);
+    drive.pilot.hear_tracks(&seen_before_the_jump);
+    assert_eq!(
+        drive.decide(),
+        Decision::Stop(StopReason::MovingObstacle),
+        "he was before the bumper all along"
+    );
 }

@@ -2,6 +2,7 @@
 
 use super::cell::Packed;
 use super::{Key, TILE_EDGE, TileError};
+use data_encoding::HEXLOWER;
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 use tempfile::NamedTempFile;
@@ -122,8 +123,7 @@ fn decode(bytes: &[u8], key: Key) -> Result<Vec<Packed>, Fault> {
     let (content, stored) = bytes.split_at(bytes.len() - CHECKSUM_BYTES);
     let sum = xxh3_64(content).to_le_bytes();
     if sum != stored {
-        let told = |sum: &[u8]| sum.iter().map(|byte| format!("{byte:02x}")).collect::<String>();
-        return Err(("checksum", told(&sum), told(stored)));
+        return Err(("checksum", HEXLOWER.encode(&sum), HEXLOWER.encode(stored)));
     }
     if content[..HEADER_BYTES] != header(key) {
         return Err(("header", format!("tile {key:?}"), "that of another tile or version".to_owned()));

@@ -9,7 +9,6 @@ use evidential::{Checkpoint, Unfamiliar};
 use navigator::{Assessor, Belief, Config};
 use rustix::process::setpriority_process;
 use rustix::thread::gettid;
-use sha2::{Digest, Sha256};
 use traversability::CvarLevel;
 
 use super::learner::{Decision, Learner, Round};
@@ -44,12 +43,6 @@ impl Judge {
         let belief = Belief::Learned { checkpoint: Arc::clone(checkpoint), unfamiliar: self.unfamiliar };
         Ok(Assessor::new(&self.vehicle, &self.limits, &self.config, &belief, self.level)?)
     }
-}
-
-/// First 8 bytes of the SHA-256 of networks' weights.
-pub fn hash_of(checkpoint: &Checkpoint) -> Result<u64, evidential::CheckpointError> {
-    let digest = Sha256::digest(checkpoint.weights_bytes()?);
-    Ok(digest.iter().take(8).fold(0, |word, byte| word << 8 | u64::from(*byte)))
 }
 
 /// A round that ended, with what is to be used from now on if that has changed.
@@ -157,7 +150,7 @@ fn one_round(
     let change = match round.decision {
         Decision::Accepted | Decision::RolledBack => {
             let checkpoint = Arc::clone(learner.in_use());
-            let hash = hash_of(&checkpoint)?;
+            let hash = checkpoint.digest()?.short();
             let assessor = judge.by(&checkpoint)?;
             Some((checkpoint, hash, assessor))
         }

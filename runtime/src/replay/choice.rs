@@ -6,7 +6,7 @@ use std::ops::Bound;
 use super::records::Key;
 use crate::mapping::{LEARNED, PHYSICS};
 use bus::clock::SECOND_NS;
-use bus::message::{DecisionRecord, RiskHeader, Source};
+use bus::message::{DecisionRecord, RiskHeader, Source, Stamp, TrackRecord, TracksHeader};
 use navigator::is_learned;
 
 /// How long a map may be on its way: its sender may be interrupted between stamping and handing it over [ns].
@@ -16,20 +16,31 @@ const AUTHORS: [(u64, &str); 2] = [(LEARNED, "learned"), (PHYSICS, "physics'")];
 /// Follows what one life of control says that it had, decision by decision.
 pub(super) struct Choice<'a> {
     risks: &'a [BTreeMap<Key, RiskHeader>; 2],
+    tracks: &'a Tracks,
     learned_max_ns: u64,
     /// When control began to hear of maps [ns].
     began_ns: u64,
     held: [Option<Key>; 2],
+    held_tracks: Option<Key>,
 }
 
+/// What moved, message by message.
+type Tracks = BTreeMap<Key, (TracksHeader, Vec<TrackRecord>)>;
+
 impl<'a> Choice<'a> {
-    pub fn new(risks: &'a [BTreeMap<Key, RiskHeader>; 2], learned_max_ns: u64, began_ns: u64) -> Self {
-        Self { risks, learned_max_ns, began_ns, held: [None; 2] }
+    pub fn new(
+        risks: &'a [BTreeMap<Key, RiskHeader>; 2],
+        tracks: &'a Tracks,
+        learned_max_ns: u64,
+        began_ns: u64,
+    ) -> Self {
+        Self { risks, tracks, learned_max_ns, began_ns, held: [None; 2], held_tracks: None }
     }
 
-    /// Says how a decision contradicts the rule: it had the newest map of each author, and was made on the one of the
-    /// two that is to be driven on.
+    /// Says how a decision contradicts the rule: it had the newest map of each author and the newest of what moves, and was
+    /// made on the one of the two maps that is to be driven on.
     pub fn check(&mut self, decision: &DecisionRecord) -> Result<(), String> {
+        self.check_tracks(decision)?;
         let held = [decision.learned, decision.physics].map(key_of);
         let before = std::mem::replace(&mut self.held, held);
         for (place, (_, name)) in AUTHORS.into_iter().enumerate() {
@@ -39,7 +50,9 @@ impl<'a> Choice<'a> {
                     "expected {name} risk map {before} or a later one, which it had, found {held}"
                 ));
             }
-            if let Some(missed) = self.overdue(place, held[place], decision.decided_at_ns) {
+            let later = self.risks[place].range(later_than(held[place]));
+            let sent = later.map(|(key, header)| (key, &header.stamp));
+            if let Some(missed) = self.overdue(sent, decision.decided_at_ns) {
                 let held = told(held[place]);
                 return Err(format!(
                     "expected {name} risk map {}, which was there, found {held}",
@@ -48,6 +61,24 @@ impl<'a> Choice<'a> {
             }
         }
         self.check_used(decision, held)
+    }
+
+    fn check_tracks(&mut self, decision: &DecisionRecord) -> Result<(), String> {
+        let held = key_of(decision.tracks);
+        let before = std::mem::replace(&mut self.held_tracks, held);
+        if held < before {
+            let [before, held] = [before, held].map(told);
+            return Err(format!("expected tracks {before} or later ones, which it had, found {held}"));
+        }
+        let later = self.tracks.range(later_than(held));
+        let sent = later.map(|(key, (header, _))| (key, &header.stamp));
+        match self.overdue(sent, decision.decided_at_ns) {
+            Some(missed) => {
+                let held = told(held);
+                Err(format!("expected tracks {}, which were there, found {held}", missed.sequence))
+            }
+            None => Ok(()),
+        }
     }
 
     fn check_used(&self, decision: &DecisionRecord, held: [Option<Key>; 2]) -> Result<(), String> {
@@ -79,16 +110,23 @@ impl<'a> Choice<'a> {
         ))
     }
 
-    /// The first map later than the one it had that it must have had.
-    fn overdue(&self, place: usize, held: Option<Key>, decided_at_ns: u64) -> Option<Key> {
-        let after = held.map_or(Bound::Unbounded, Bound::Excluded);
-        let mut later = self.risks[place].range((after, Bound::Unbounded));
-        let was_there = |header: &RiskHeader| {
-            let sent_at_ns = header.stamp.published_at_ns;
+    /// The first of the messages later than the one it had that it must have had.
+    fn overdue<'b>(
+        &self,
+        mut later: impl Iterator<Item = (&'b Key, &'b Stamp)>,
+        decided_at_ns: u64,
+    ) -> Option<Key> {
+        let was_there = |stamp: &Stamp| {
+            let sent_at_ns = stamp.published_at_ns;
             sent_at_ns >= self.began_ns + ON_THE_WAY_NS && sent_at_ns + ON_THE_WAY_NS < decided_at_ns
         };
-        later.find(|(_, header)| was_there(header)).map(|(key, _)| *key)
+        later.find(|(_, stamp)| was_there(stamp)).map(|(key, _)| *key)
     }
+}
+
+/// The messages after this one; all of them after none.
+fn later_than(held: Option<Key>) -> (Bound<Key>, Bound<Key>) {
+    (held.map_or(Bound::Unbounded, Bound::Excluded), Bound::Unbounded)
 }
 
 fn key_of(source: Source) -> Option<Key> {
@@ -106,6 +144,7 @@ mod tests {
 
     const MILLISECOND_NS: u64 = 1_000_000;
     const BEGAN_NS: u64 = 10 * SECOND_NS;
+    static NOTHING: Tracks = BTreeMap::new();
 
     /// A map every 200 ms of each author, of a scan 100 ms before; learned ones end after a second.
     fn risks() -> [BTreeMap<Key, RiskHeader>; 2] {
@@ -144,7 +183,7 @@ mod tests {
     /// What is said of decisions every 100 ms, one of them changed.
     fn verdict(at_ms: u64, change: impl Fn(&mut DecisionRecord)) -> Result<(), String> {
         let risks = risks();
-        let mut choice = Choice::new(&risks, 600 * MILLISECOND_NS, BEGAN_NS);
+        let mut choice = Choice::new(&risks, &NOTHING, 600 * MILLISECOND_NS, BEGAN_NS);
         (1..30).map(|k| 100 * k).try_for_each(|after_ms| {
             let mut decision = decision(after_ms);
             if after_ms == at_ms {
@@ -182,7 +221,7 @@ mod tests {
         assert!(verdict(1000, long_ago).is_err());
         // From the first decision on: nothing went back, and yet there was a later one.
         let risks = risks();
-        let mut choice = Choice::new(&risks, 600 * MILLISECOND_NS, BEGAN_NS);
+        let mut choice = Choice::new(&risks, &NOTHING, 600 * MILLISECOND_NS, BEGAN_NS);
         let mut first = decision(2500);
         first.physics.sequence = 9;
         first.risk = first.physics;
@@ -199,12 +238,38 @@ mod tests {
             decision.risk = decision.physics;
         };
         let risks = risks();
-        let mut choice = Choice::new(&risks, 600 * MILLISECOND_NS, BEGAN_NS);
+        let mut choice = Choice::new(&risks, &NOTHING, 600 * MILLISECOND_NS, BEGAN_NS);
         // Map 11 was sent at 2200 ms.
         for (after_ms, is_right) in [(2400, true), (2500, false)] {
             let mut decision = decision(after_ms);
             late(&mut decision);
             assert_eq!(choice.check(&decision).is_ok(), is_right, "{after_ms} ms");
         }
+    }
+
+    /// Tracks every 200 ms, as many as maps of physics.
+    #[test]
+    fn decisions_that_pretend_to_have_known_less_of_what_moves_are_told() {
+        let header = |sequence: u64| {
+            let published_at_ns = BEGAN_NS + 200 * MILLISECOND_NS * sequence;
+            let stamp = Stamp { epoch_ns: 1, sequence, published_at_ns, ..Stamp::default() };
+            (Key::from(stamp.source()), (TracksHeader { stamp, ..TracksHeader::default() }, Vec::new()))
+        };
+        let (risks, tracks): (_, Tracks) = (risks(), (1..=25).map(header).collect());
+        let verdict = |at_ms: u64, less: u64| {
+            let mut choice = Choice::new(&risks, &tracks, 600 * MILLISECOND_NS, BEGAN_NS);
+            (1..30).map(|k| 100 * k).try_for_each(|after_ms| {
+                let mut decision = decision(after_ms);
+                let sequence = (after_ms / 200).saturating_sub(if after_ms == at_ms { less } else { 0 });
+                decision.tracks =
+                    if sequence == 0 { Source::default() } else { Source { epoch_ns: 1, sequence } };
+                choice.check(&decision)
+            })
+        };
+        assert_eq!(verdict(0, 0), Ok(()));
+        assert_eq!(verdict(2500, 1).unwrap_err(), "expected tracks 12 or later ones, which it had, found 11");
+        let mut choice = Choice::new(&risks, &tracks, 600 * MILLISECOND_NS, BEGAN_NS);
+        let first = DecisionRecord { tracks: Source { epoch_ns: 1, sequence: 9 }, ..decision(2500) };
+        assert_eq!(choice.check(&first).unwrap_err(), "expected tracks 10, which were there, found 9");
     }
 }

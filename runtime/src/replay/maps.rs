@@ -39,13 +39,13 @@ pub(super) struct Maps<'a> {
     survey: Option<(u64, Survey)>,
     localisation: Localisation,
     surface_at: Option<Key>,
-    authors: [Author<'a>; 2],
+    remade: [RemadeRiskMaps<'a>; 2],
     missing: Vec<String>,
     n_surfaces: u64,
 }
 
 /// One author of risk maps.
-struct Author<'a> {
+struct RemadeRiskMaps<'a> {
     headers: &'a BTreeMap<Key, RiskHeader>,
     knowledge: Knowledge,
     number: u64,
@@ -63,9 +63,9 @@ impl<'a> Maps<'a> {
         knowledge: &Knowledge,
         level: CvarLevel,
     ) -> Result<Self, ReplayError> {
-        let author = |place: usize, belief: &Belief, checkpoint: u64, number: u64| Author {
+        let author = |place: usize, belief: &Belief, checkpoint: u64, number: u64| RemadeRiskMaps {
             headers: &records.risks[place],
-            knowledge: Knowledge { belief: belief.clone(), checkpoint },
+            knowledge: Knowledge { belief: belief.clone(), checkpoint, corrector: None },
             number,
             level,
             maker: None,
@@ -79,7 +79,7 @@ impl<'a> Maps<'a> {
             survey: None,
             localisation: Localisation::default(),
             surface_at: None,
-            authors: [
+            remade: [
                 author(0, &knowledge.belief, knowledge.checkpoint, LEARNED),
                 author(1, &Belief::Physics, 0, PHYSICS),
             ],
@@ -90,7 +90,7 @@ impl<'a> Maps<'a> {
 
     /// Maps of the ground and risk maps made again with the recorded hash.
     pub fn n_made(&self) -> (u64, u64) {
-        (self.n_surfaces, self.authors.iter().map(|author| author.n_made).sum())
+        (self.n_surfaces, self.remade.iter().map(|remade| remade.n_made).sum())
     }
 
     /// Makes the maps that no decision asked for, too; returns what is missing, and what became of the localisation.
@@ -107,10 +107,10 @@ impl<'a> Maps<'a> {
         let place = usize::from(decision.author == PHYSICS);
         let key = Key::from(decision.risk);
         loop {
-            if let Some(made) = self.authors[place].made.get(&key) {
+            if let Some(made) = self.remade[place].made.get(&key) {
                 return Ok(Ok(Arc::clone(made)));
             }
-            let Some(header) = self.authors[place].headers.get(&key) else {
+            let Some(header) = self.remade[place].headers.get(&key) else {
                 return Ok(Err(Unmade { what: format!("risk map {}", key.sequence) }));
             };
             let wanted = Key::from(header.surface);
@@ -131,8 +131,8 @@ impl<'a> Maps<'a> {
         }
         self.surface_at = Some(key);
         let made = self.survey(key, header)?;
-        for author in &mut self.authors {
-            author.follow(header, &made, records, self.machine)?;
+        for remade in &mut self.remade {
+            remade.follow(header, &made, records, self.machine)?;
         }
         Ok(true)
     }
@@ -159,7 +159,7 @@ impl<'a> Maps<'a> {
     }
 }
 
-impl Author<'_> {
+impl RemadeRiskMaps<'_> {
     /// Makes the risk maps that were made of this map of the ground.
     fn follow(
         &mut self,

@@ -7,16 +7,15 @@ use std::sync::Arc;
 
 use bytemuck::AnyBitPattern;
 use evidential::Checkpoint;
-use navigator::MissionMessage;
+use navigator::{MissionMessage, TracksMessage};
 
-use crate::convert::mission_message;
-use crate::online::hash_of;
+use crate::convert::{mission_message, tracks_message};
 use crate::recorder::topic;
 use crate::setup::RecordedSetup;
 use bus::channel::Header;
 use bus::message::{
-    CheckpointHeader, DecisionRecord, LAYOUT_VERSION, MissionRecord, OdometryRecord, PointRecord, RiskHeader,
-    ScanHeader, Source, Stamp, StuckRecord, SurfaceHeader,
+    CheckpointHeader, DecisionRecord, ImuRecord, LAYOUT_VERSION, MissionRecord, OdometryRecord, PointRecord,
+    RiskHeader, ScanHeader, Source, Stamp, StuckRecord, SurfaceHeader, TrackRecord, TracksHeader,
 };
 
 /// A message, by its publisher's life and its number.
@@ -41,10 +40,14 @@ pub struct Records {
     pub setup: Option<RecordedSetup>,
     /// Odometry.
     pub odometry: BTreeMap<Key, (Stamp, OdometryRecord)>,
+    /// What the inertial measurement unit measured.
+    pub imu: BTreeMap<Key, Vec<ImuRecord>>,
     /// Scans.
     pub scans: BTreeMap<Key, (ScanHeader, Vec<PointRecord>)>,
     /// Headers of the maps of the ground.
     pub surfaces: BTreeMap<Key, SurfaceHeader>,
+    /// What moved.
+    pub tracks: BTreeMap<Key, (TracksHeader, Vec<TrackRecord>)>,
     /// Headers of the risk maps: learned, physics.
     pub risks: [BTreeMap<Key, RiskHeader>; 2],
     /// Stuck poses.
@@ -148,25 +151,32 @@ impl Records {
         Ok(Some(mission_message(stamp, record)))
     }
 
+    /// What a decision knew of what moves, if anything; says which message is missing.
+    pub fn tracks(&self, source: Source) -> Result<Option<TracksMessage>, String> {
+        if source == Source::default() {
+            return Ok(None);
+        }
+        let known = self.tracks.get(&source.into());
+        let (header, tracks) = known.ok_or_else(|| format!("tracks {}", source.sequence))?;
+        Ok(Some(tracks_message(header, tracks)))
+    }
+
     fn read_file(&mut self, path: &Path) -> Result<(), ReadError> {
         let file = path.display().to_string();
         let unreadable = |source| ReadError::Unreadable { file: file.clone(), source };
-        for message in formats::open_recording(path).map_err(unreadable)? {
-            match message {
-                Ok(message) => {
-                    let topic = &message.channel.topic;
-                    if let Err(untaken) = self.take(topic, &message.data) {
-                        self.ended_early = Some(format!("{file}: a message on {topic} that is none"));
-                        return untaken.into_error(&file).map_or(Ok(()), Err);
-                    }
-                }
-                Err(error) => {
-                    self.ended_early = Some(format!("{file}: {error}"));
-                    break;
-                }
-            }
+        let messages = formats::open_recording(path).map_err(unreadable)?;
+        let mut untaken = None;
+        let problem = messages.take_all(|message| {
+            let topic = &message.channel.topic;
+            self.take(topic, &message.data).map_err(|refused| {
+                untaken = Some(refused);
+                format!("a message on {topic} that is none")
+            })
+        });
+        if let Some(problem) = problem {
+            self.ended_early = Some(format!("{file}: {problem}"));
         }
-        Ok(())
+        untaken.and_then(|untaken| untaken.into_error(&file)).map_or(Ok(()), Err)
     }
 
     fn take(&mut self, name: &str, bytes: &[u8]) -> Result<(), Untaken> {
@@ -204,9 +214,17 @@ impl Records {
                 let (stamp, decision): (Stamp, DecisionRecord) = one(bytes)?;
                 self.decisions.insert(stamp.source().into(), decision);
             }
+            topic::IMU => {
+                let (stamp, samples): (Stamp, Vec<ImuRecord>) = split(bytes)?;
+                self.imu.insert(stamp.source().into(), samples);
+            }
             topic::SCAN => {
                 let (header, points): (ScanHeader, Vec<PointRecord>) = split(bytes)?;
                 self.scans.insert(header.stamp.source().into(), (header, points));
+            }
+            topic::TRACKS => {
+                let (header, tracks): (TracksHeader, Vec<TrackRecord>) = split(bytes)?;
+                self.tracks.insert(header.stamp.source().into(), (header, tracks));
             }
             topic::SURFACE => {
                 let (header, _): (SurfaceHeader, Vec<u8>) = split(bytes)?;
@@ -218,7 +236,7 @@ impl Records {
                     let (weights, sidecar) = bytes.split_at_checked(header.n_weight_bytes as usize)?;
                     let checkpoint = Checkpoint::from_bytes(weights, sidecar).ok()?;
                     // What it calls itself must be what it is.
-                    if hash_of(&checkpoint).ok()? != header.checkpoint {
+                    if checkpoint.digest().ok()?.short() != header.checkpoint {
                         return None;
                     }
                     place.insert(Arc::new(checkpoint));
@@ -322,6 +340,7 @@ mod tests {
             ages: ages::limits(&Periods::default(), &GuardConfig::default(), &AskedAges::default()).unwrap(),
             method: "physics".to_owned(),
             checkpoint_sha256: String::new(),
+            corrector_sha256: String::new(),
             alpha: 0.6,
             seed: "1".to_owned(),
             revision: String::new(),

@@ -8,12 +8,15 @@ use navigator::{Jump, NavigatorError, Surface, Surveyor, Whereabouts};
 
 use super::difference;
 use super::records::{Key, Records};
-use crate::convert::{jump_of, odometry_message, surface_record};
+use crate::convert::{jump_of, odometry_message, surface_record, track_record};
 use crate::intake::hash_of;
 use crate::mapping::JUMPED;
 use crate::setup::MachineSetup;
 use bus::message::{OdometryRecord, Stamp, SurfaceHeader};
 use terrain::Mount;
+
+/// Messages of what moves among which that of a scan is looked for: more are lost than anybody loses.
+const TRACKS_LOOKED_AT: usize = 16;
 
 /// What became of the localisation that maps of the ground tell of.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -34,9 +37,12 @@ pub(super) struct Survey {
     mounts: Vec<Mount>,
     last_map: u64,
     last_odometry: Option<Key>,
+    last_tracks: Option<Key>,
     trust: Trust,
     /// Whether every map since the beginning was there, and so every jump.
     is_shift_known: bool,
+    /// Whether every map since the beginning was made again as it was, and so every track.
+    are_tracks_known: bool,
 }
 
 /// Whether the surveyor knows of the odometry what mapping knew.
@@ -67,14 +73,17 @@ impl Survey {
     pub fn new(machine: &MachineSetup) -> Result<Self, NavigatorError> {
         let MachineSetup { vehicle, model, config } = machine;
         let surveyor = Surveyor::new(vehicle, config.elevation, config.guard, Surface::Sensed)?
-            .with_sensors(SensorModel::of(&model.effects));
+            .with_sensors(SensorModel::of(&model.effects))
+            .with_moving(config.moving.as_ref())?;
         Ok(Self {
             surveyor,
             mounts: config.sensors.clone(),
             last_map: 0,
             last_odometry: None,
+            last_tracks: None,
             trust: Trust::From(0),
             is_shift_known: true,
+            are_tracks_known: true,
         })
     }
 
@@ -115,6 +124,7 @@ impl Survey {
         let there = place.as_ref().map_or(told, |(there, _)| *there);
         self.judge(header, place, found);
         self.surveyor.fuse(&there, &scan)?;
+        self.judge_tracks(header, records, found);
         Ok(Ok(()))
     }
 
@@ -187,8 +197,20 @@ impl Survey {
         }
     }
 
-    /// Holds what a map tells against what the odometry shows.
+    /// Holds what a map tells against what the odometry shows. Once that is not known to be the same, nothing is known of
+    /// what moves either, which is tracked over all scans.
     fn judge(
+        &mut self,
+        header: &SurfaceHeader,
+        place: Result<Place, Option<&'static str>>,
+        found: &mut Localisation,
+    ) {
+        let n_verified = found.n_verified;
+        self.compare(header, place, found);
+        self.are_tracks_known &= self.is_shift_known && found.n_verified > n_verified;
+    }
+
+    fn compare(
         &mut self,
         header: &SurfaceHeader,
         place: Result<Place, Option<&'static str>>,
@@ -219,6 +241,23 @@ impl Survey {
         found
             .contradictions
             .push(format!("map of the ground {}, of {of}: {difference}", header.stamp.sequence));
+    }
+
+    /// Holds what mapping said of what moves against what the same scans show, as long as all of them were there.
+    fn judge_tracks(&mut self, header: &SurfaceHeader, records: &Records, found: &mut Localisation) {
+        let Some(tracker) = self.surveyor.tracker().filter(|_| self.are_tracks_known) else { return };
+        let after = self.last_tracks.map_or(Bound::Unbounded, Bound::Excluded);
+        let mut later = records.tracks.range((after, Bound::Unbounded)).take(TRACKS_LOOKED_AT);
+        let Some((key, (_, told))) = later.find(|(_, (tracks, _))| tracks.scan == header.scan) else {
+            return;
+        };
+        self.last_tracks = Some(*key);
+        if !tracker.moving().iter().map(track_record).eq(told.iter().copied()) {
+            found.contradictions.push(format!(
+                "tracks of scan {}: expected those that the scans show, found others",
+                header.scan.sequence
+            ));
+        }
     }
 
     /// What mapping took in since the map before, as far as it was recorded, and what is wrong with that.

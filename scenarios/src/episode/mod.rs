@@ -1,5 +1,6 @@
 //! The episode: a vehicle, a task and whoever decides, until something ends it.
 
+mod crossing;
 mod fault;
 mod referee;
 mod trace;
@@ -8,16 +9,18 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use bicycle::{Command, Decision, ImuSample, Odometry, Vehicle};
-use terrain::Scan;
+use terrain::{Scan, SettingError};
 
 use crate::{
     Collision, CommandError, Deviation, IMU_PERIOD_NS, Imu, ImuConfig, Motion, OdometryConfig,
-    OdometrySensor, Plant, PlantError, RangeSensor, RangeSensorConfig, RangeSensorError, Task,
+    OdometrySensor, Plant, PlantError, RangeSensor, RangeSensorConfig, Task, Walker,
 };
+pub use crossing::Strike;
 pub use fault::{Fault, SensorFault};
 pub use referee::{Outcome, Rules};
 pub use trace::{TraceRow, drive_log};
 
+use crossing::Crossing;
 use referee::{Referee, STANDING_MPS};
 
 /// What the vehicle measures in one control cycle.
@@ -52,10 +55,12 @@ pub struct EpisodeConfig {
     pub faults: Vec<Fault>,
     /// How the machine departs from its description all along.
     pub deviations: Vec<Deviation>,
+    /// Who walks about.
+    pub walkers: Vec<Walker>,
 }
 
 impl EpisodeConfig {
-    /// 10 Hz control, 5 Hz scans, sensors that fit the machine, the rules of the rock field, no faults.
+    /// 10 Hz control, 5 Hz scans, sensors that fit the machine, the rules of the rock field, no faults, nobody about.
     pub fn for_vehicle(vehicle: &Vehicle) -> Self {
         Self {
             control_hz: 10.0,
@@ -66,6 +71,7 @@ impl EpisodeConfig {
             rules: Rules::default(),
             faults: Vec::new(),
             deviations: Vec::new(),
+            walkers: Vec::new(),
         }
     }
 }
@@ -87,8 +93,8 @@ pub enum EpisodeError {
     #[error(transparent)]
     Plant(#[from] PlantError),
     /// The sensor cannot be.
-    #[error(transparent)]
-    RangeSensor(#[from] RangeSensorError),
+    #[error("range sensor {0}")]
+    RangeSensor(#[from] SettingError),
     /// The command is no number.
     #[error(transparent)]
     Command(#[from] CommandError),
@@ -109,6 +115,7 @@ pub struct Episode {
     odometry: OdometrySensor,
     imu: Imu,
     referee: Referee,
+    crossing: Crossing,
     observation: Observation,
     command: Command,
     trace: Vec<TraceRow>,
@@ -136,6 +143,7 @@ impl Episode {
             odometry: OdometrySensor::deviating(config.odometry, &config.deviations, seed),
             imu: Imu::new(config.imu, seed),
             referee: Referee::new(config.rules, vehicle.limits),
+            crossing: Crossing::new(vehicle, config.walkers.clone()),
             observation: Observation::default(),
             command: Command::default(),
             trace: Vec::new(),
@@ -172,6 +180,7 @@ impl Episode {
             command: self.command,
             decision: *decision,
         });
+        self.crossing.begin_cycle();
         let mut imu = Vec::with_capacity(self.samples_per_cycle as usize);
         for _ in 0..self.samples_per_cycle {
             motion = self.advance(&mut imu)?;
@@ -184,6 +193,7 @@ impl Episode {
         match self.outcome() {
             Some(Outcome::AttitudeLimit) => self.see_what_becomes_of_it()?,
             Some(Outcome::Collision) => self.see_it_stand()?,
+            Some(Outcome::WalkerStruck) => self.crossing.judge(&self.task, &self.config, &self.trace)?,
             _ => {}
         }
         self.measure(&motion, imu);
@@ -232,6 +242,21 @@ impl Episode {
     /// What obstacles did to the vehicle, if it touched one.
     pub fn collision(&self) -> Option<Collision> {
         self.plant.collision()
+    }
+
+    /// Whom the vehicle struck, if it did, and whether a stop would have spared him.
+    pub fn strike(&self) -> Option<Strike> {
+        self.crossing.strike()
+    }
+
+    /// How often somebody walked into the standing vehicle.
+    pub fn n_walked_into(&self) -> u64 {
+        self.crossing.n_walked_into()
+    }
+
+    /// Who walks about, as they are now.
+    pub fn walkers(&self) -> &[Walker] {
+        self.crossing.walkers()
     }
 
     /// The true motion now.
@@ -294,6 +319,9 @@ impl Episode {
         let motion = self.plant.motion();
         imu.push(self.imu.sample(&motion, &self.task.world, self.n_samples * IMU_PERIOD_NS));
         self.referee.watch(&self.task, &motion, &self.plant, self.time_s());
+        if self.crossing.advance(&motion, self.time_s()) {
+            self.referee.saw_a_strike();
+        }
         Ok(motion)
     }
 
@@ -335,7 +363,12 @@ impl Episode {
         let number = self.n_cycles / self.config.cycles_per_scan;
         let sensor =
             self.range_sensor.as_ref().filter(|_| self.n_cycles.is_multiple_of(self.config.cycles_per_scan));
-        let scan = sensor.map(|sensor| sensor.scan(&motion.pose, number, valid_at_ns));
+        let walkers = self.crossing.walkers();
+        let swept = sensor.map(|sensor| sensor.scan_among(walkers, &motion.pose, number, valid_at_ns));
+        if let Some((_, n_returns)) = &swept {
+            self.crossing.note_sweep(n_returns, motion, self.n_cycles as usize);
+        }
+        let scan = swept.map(|(scan, _)| scan);
         let scan = faults().fold(scan, |scan, fault| fault.on_scan(scan?));
         self.observation = Observation { valid_at_ns, odometry, imu, scan: scan.map(Arc::new) };
     }

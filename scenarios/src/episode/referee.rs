@@ -29,6 +29,8 @@ pub enum Outcome {
     Collision,
     /// A wheel stood in water, whose depth nobody knows.
     InWater,
+    /// The moving vehicle touched somebody who walks; [`crate::Episode::strike`] says whether a stop would have spared him.
+    WalkerStruck,
 }
 
 impl std::fmt::Display for Outcome {
@@ -43,6 +45,7 @@ impl std::fmt::Display for Outcome {
             Self::Stopped => "stopped",
             Self::Collision => "collision",
             Self::InWater => "in water",
+            Self::WalkerStruck => "walker struck",
         })
     }
 }
@@ -163,6 +166,10 @@ impl Referee {
     pub(super) fn excuse_standing(&mut self) {
         self.places.clear();
         self.stopping_s = 0.0;
+    }
+
+    pub(super) fn saw_a_strike(&mut self) {
+        self.outcome.get_or_insert(Outcome::WalkerStruck);
     }
 
     pub(super) fn saw_rolling_over(&mut self) {

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use crate::world::height_on_triangles;
 use crate::{Patch, World};
 
 /// Heights that stop a vehicle, in the layout that the wheels' many lookups want.
@@ -82,15 +83,9 @@ impl Ground {
     fn in_square(&self, row: usize, col: usize, u: f64, v: f64) -> f64 {
         let start = row * self.n_cols + col;
         // One check of the bounds for all four.
-        let south = &self.surface_m[start..start + self.n_cols + 2];
-        let [south_west, south_east] = [south[0], south[1]].map(f64::from);
-        let [north_west, north_east] = [south[self.n_cols], south[self.n_cols + 1]].map(f64::from);
-        // The diagonal runs from south-west to north-east.
-        if u >= v {
-            south_west + u * (south_east - south_west) + v * (north_east - south_east)
-        } else {
-            south_west + v * (north_west - south_west) + u * (north_east - north_west)
-        }
+        let square = &self.surface_m[start..start + self.n_cols + 2];
+        let corners = [square[0], square[1], square[self.n_cols], square[self.n_cols + 1]];
+        height_on_triangles(corners.map(f64::from), [u, v])
     }
 
     /// Whether the surface there is that of an obstacle.

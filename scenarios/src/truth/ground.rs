@@ -1,6 +1,7 @@
 //! The ground in the layout that a million poses want: no division, runs of points at even steps.
 
 use crate::World;
+use crate::world::height_on_triangles;
 
 /// Heights of a world.
 #[derive(Clone, Debug)]
@@ -91,11 +92,7 @@ impl Ground {
         let start = south * self.n_cols + west;
         // One check of the bounds for all four.
         let square = &self.height_m[start..start + self.n_cols + 2];
-        let (south_west, south_east) = (square[0], square[1]);
-        let (north_west, north_east) = (square[self.n_cols], square[self.n_cols + 1]);
-        // The fold runs from south-west to north-east; both sides are computed, a branch would miss half the time.
-        let below = south_west + u * (south_east - south_west) + v * (north_east - south_east);
-        let above = south_west + v * (north_west - south_west) + u * (north_east - north_west);
-        f64::from(if u >= v { below } else { above })
+        let corners = [square[0], square[1], square[self.n_cols], square[self.n_cols + 1]];
+        f64::from(height_on_triangles(corners, [u, v]))
     }
 }

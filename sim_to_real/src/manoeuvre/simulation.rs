@@ -67,7 +67,7 @@ fn driven(
     let stepper = Stepper::new(&model, STEP_S, 1.0).with_instant_actuators();
     let mut memory = vec![0.0; stepper.n_slots()];
     if let Some(&first) = commands.first() {
-        stepper.settle(Command { speed_mps: speed_mps as f32, ..first }, &mut memory);
+        stepper.fill_steady_state(Command { speed_mps: speed_mps as f32, ..first }, &mut memory);
     }
     let real = |value: f64| Real(Scalar, value);
     let zero = real(0.0);

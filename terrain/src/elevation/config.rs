@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::BodyBox;
+use crate::{BodyBox, SettingError};
 
 /// Slope of the steepest ground that is still ground: the tangent of 70 degrees.
 const STEEPEST_GROUND: f64 = 2.747;
@@ -89,18 +89,6 @@ impl Default for ElevationConfig {
     }
 }
 
-/// A setting that cannot be.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error("elevation map: {field}: expected {expected}, found {found}")]
-pub struct ElevationConfigError {
-    /// Name of the field.
-    pub field: &'static str,
-    /// The range that would do.
-    pub expected: &'static str,
-    /// The value that was given.
-    pub found: f64,
-}
-
 impl ElevationConfig {
     /// The defaults with every length that has to do with the machine scaled from a vehicle of 3.4 m to one of
     /// `length_m`; resolution and window stay.
@@ -124,7 +112,7 @@ impl ElevationConfig {
     }
 
     /// Refuses settings no map can be built from.
-    pub fn validate(&self) -> Result<(), ElevationConfigError> {
+    pub fn validate(&self) -> Result<(), SettingError> {
         let positive = [
             ("resolution_m", self.resolution_m),
             ("n_rows", self.n_rows as f64),
@@ -147,15 +135,17 @@ impl ElevationConfig {
             ("gap_radius_m", self.gap_radius_m),
             ("publish_step_m", f64::from(self.publish_step_m)),
         ];
-        check(&positive, "a finite number > 0", |v| v.is_finite() && v > 0.0)?;
+        SettingError::check(&positive, "a finite number > 0", |v| v.is_finite() && v > 0.0)?;
         let n_cells = self.n_rows.saturating_mul(self.n_cols);
-        check(&[("n_rows x n_cols", n_cells as f64)], "at most 4194304 cells", |n| n <= CELLS_MAX as f64)?;
-        check(&not_negative, "a finite number >= 0", |v| v.is_finite() && v >= 0.0)?;
+        SettingError::check(&[("n_rows x n_cols", n_cells as f64)], "at most 4194304 cells", |n| {
+            n <= CELLS_MAX as f64
+        })?;
+        SettingError::check(&not_negative, "a finite number >= 0", |v| v.is_finite() && v >= 0.0)?;
         let faces = self.own_body.min_m.map(|face| ("own_body.min_m", face));
-        check(&faces, "three finite numbers", f64::is_finite)?;
+        SettingError::check(&faces, "three finite numbers", f64::is_finite)?;
         let faces = self.own_body.max_m.map(|face| ("own_body.max_m", face));
-        check(&faces, "three finite numbers", f64::is_finite)?;
-        check(&[("recentre_m", self.recentre_m)], "a number > 0, infinity allowed", |v| v > 0.0)
+        SettingError::check(&faces, "three finite numbers", f64::is_finite)?;
+        SettingError::check(&[("recentre_m", self.recentre_m)], "a number > 0, infinity allowed", |v| v > 0.0)
     }
 
     /// Span of heights in a cell beyond which they belong to a wall [m].
@@ -167,16 +157,5 @@ impl ElevationConfig {
     /// Gap radius in whole cells.
     pub(super) fn gap_radius_cells(&self) -> usize {
         (self.gap_radius_m / self.resolution_m) as usize
-    }
-}
-
-fn check(
-    fields: &[(&'static str, f64)],
-    expected: &'static str,
-    allowed: impl Fn(f64) -> bool,
-) -> Result<(), ElevationConfigError> {
-    match fields.iter().find(|(_, value)| !allowed(*value)) {
-        Some(&(field, found)) => Err(ElevationConfigError { field, expected, found }),
-        None => Ok(()),
     }
 }

@@ -8,11 +8,12 @@ mod statistics;
 mod surfacing;
 mod visibility;
 
-pub use config::{ElevationConfig, ElevationConfigError};
+pub use config::ElevationConfig;
 
 use crate::region::LatticeBounds;
 use crate::{
-    CellRegion, DistantPosition, Footprint, GridGeometry, GridMap, Pose, Scan, SurfaceCell, TerrainClass,
+    CellRegion, DistantPosition, Footprint, GridGeometry, GridMap, Pose, Scan, SettingError, SurfaceCell,
+    TerrainClass,
 };
 use cell::{CellState, Ground};
 use nalgebra::{Point3, Vector3};
@@ -112,7 +113,7 @@ pub struct ElevationMap {
 
 impl ElevationMap {
     /// An empty map. Its window is centred on the first pose.
-    pub fn new(config: ElevationConfig) -> Result<Self, ElevationConfigError> {
+    pub fn new(config: ElevationConfig) -> Result<Self, SettingError> {
         config.validate()?;
         let geometry = GridGeometry::centred(config.resolution_m, config.n_rows, config.n_cols, 0.0, 0.0);
         Ok(Self {

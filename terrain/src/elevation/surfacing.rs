@@ -79,7 +79,7 @@ impl Scratch {
             };
             self.inferred.push((index as u32, surface));
         }
-        self.settle();
+        self.enter_inferred();
     }
 
     /// Fills cells that are enclosed by known ones, unless a ray passed below the height they would get: then
@@ -101,11 +101,11 @@ impl Scratch {
                 self.inferred.push((index as u32, surface));
             }
         }
-        self.settle();
+        self.enter_inferred();
     }
 
     /// Enters what was inferred; only now, so that nothing is inferred from what was inferred beside it.
-    fn settle(&mut self) {
+    fn enter_inferred(&mut self) {
         for &(index, surface) in &self.inferred {
             self.next[index as usize] = surface;
         }

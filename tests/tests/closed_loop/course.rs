@@ -80,6 +80,7 @@ impl Course {
             episode: self.episode.clone(),
             method: self.method,
             networks: None,
+            corrector: None,
             map_source: MapSource::Sensed,
             level: CvarLevel::new(0.6).unwrap(),
             seed: self.seed,

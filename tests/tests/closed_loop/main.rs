@@ -9,3 +9,4 @@ mod missions;
 mod repeats;
 mod sensors;
 mod skid_steer;
+mod walkers;

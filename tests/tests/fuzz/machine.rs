@@ -9,8 +9,8 @@ use bus::message::{
 };
 use bus::payload::{cell_numbers, content_hash};
 use navigator::{
-    Activity, Assessor, Belief, Config, Destination, MissionMessage, NavigatorError, Pilot, PilotAges,
-    RiskMessage, RiskMessages, Surface, Surveyor,
+    Activity, Assessor, Belief, Config, Destination, MissionMessage, MovingConfig, NavigatorError, Pilot,
+    PilotAges, RiskMessage, RiskMessages, Surface, Surveyor,
 };
 use runtime::convert::{decision_record, id_of, odometry_message, risk_message};
 use runtime::mapping::{FUSED, PHYSICS};
@@ -64,8 +64,17 @@ pub fn goal() -> Destination {
 
 /// A controller that has seen nothing and is told, once and for all, to drive there.
 pub fn pilot() -> Pilot {
+    pilot_with(&MACHINE.config)
+}
+
+/// The same who keeps away from what moves.
+pub fn pilot_among_people() -> Pilot {
+    pilot_with(&Config { moving: Some(MovingConfig::default()), ..MACHINE.config.clone() })
+}
+
+fn pilot_with(config: &Config) -> Pilot {
     let ages = PilotAges { mission_ns: u64::MAX, ..PilotAges::default() };
-    let mut pilot = Pilot::new(MACHINE.model.clone(), &MACHINE.config, SEED).unwrap().with_ages(ages);
+    let mut pilot = Pilot::new(MACHINE.model.clone(), config, SEED).unwrap().with_ages(ages);
     pilot.hear_mission(&MissionMessage {
         id: id_of(stamped(0).source()),
         valid_at_ns: at_ns(0),

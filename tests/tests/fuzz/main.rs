@@ -78,6 +78,7 @@ targets! {
     imu: 8192, 64, 64 * KB, messages::imu, messages::read_imu;
     scan: 4096, 64, 2 * MB, messages::scan, messages::read_scan;
     surface: 256, 64, 4 * MB, messages::surface, messages::read_surface;
+    tracks: 512, 64, 2 * MB, messages::tracks, messages::read_tracks;
     risk: 1024, 64, MB, messages::risk, messages::read_risk;
     command: 8192, 0, 64 * KB, messages::command, messages::read_command;
     decision: 8192, 0, 64 * KB, messages::decision, messages::read_decision;

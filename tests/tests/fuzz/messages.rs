@@ -3,12 +3,14 @@
 
 use std::sync::LazyLock;
 
+use bicycle::Command;
 use bus::ages::Periods;
 use bus::channel::{self, Channel, Element, Header};
 use bus::layout::Scalar;
 use bus::message::{
     CheckpointHeader, CommandRecord, DecisionRecord, Grid, ImuRecord, MissionRecord, OdometryRecord,
-    OrderHeader, RiskHeader, ScanHeader, StatusRecord, StuckRecord, SurfaceHeader, layouts,
+    OrderHeader, RiskHeader, ScanHeader, StatusRecord, StuckRecord, SurfaceHeader, TrackRecord, TracksHeader,
+    layouts,
 };
 use bus::payload::{RiskParts, surface_map};
 use bus::status::Role;
@@ -23,13 +25,13 @@ use navigator::{
 };
 use rand::RngExt;
 use runtime::ages::{self, AskedAges};
-use runtime::convert::{mission_message, risk_message};
+use runtime::convert::{mission_message, risk_message, tracks_message};
 use runtime::mission::{order_of, record_of, said_by};
 use runtime::timing::Timing;
 use terrain::{Mount, Pose};
 
 use crate::harness::{Fate, Reader, Rng};
-use crate::machine::{Drive, MACHINE, at_ns, goal, judge, only, pilot, show, stamped};
+use crate::machine::{Drive, MACHINE, at_ns, goal, judge, only, pilot, pilot_among_people, show, stamped};
 use crate::mutate::{self, once_in};
 use crate::networks;
 
@@ -403,6 +405,36 @@ pub fn read_order() -> Reader {
         assert!(!record_of(&mission, &told).to_string().is_empty());
         mission.order(Order::EmergencyStop, said(2), u64::MAX).ok();
         assert!(!matches!(mission.instruction(), Instruction::Drive(_)));
+    })
+}
+
+static TRACKS: LazyLock<Whole> = LazyLock::new(|| {
+    let header = TracksHeader { stamp: stamped(1), frame_at_ns: at_ns(1), ..TracksHeader::default() };
+    let track = TrackRecord {
+        number: 1,
+        position_m: [1.5, 0.5],
+        velocity_mps: [0.0, -0.5],
+        position_m2: 0.01,
+        cross_m2ps: 0.01,
+        velocity_m2ps2: 0.1,
+        radius_m: 0.3,
+    };
+    Whole::new((&header, "TracksHeader"), &[track; 3], places("TrackRecord"))
+});
+
+pub fn tracks(rng: &mut Rng) -> Vec<u8> {
+    TRACKS.broken(rng)
+}
+
+/// Whatever is told of what moves, there is a decision, and a command of it that a vehicle can carry out.
+pub fn read_tracks() -> Reader {
+    let drive = Drive::get();
+    reader(channel::TRACKS, move |header, records: &[TrackRecord]| {
+        let mut pilot = pilot_among_people();
+        show(&mut pilot, &Drive::odometry(1));
+        pilot.hear_tracks(&tracks_message(header, records));
+        let command = pilot.answer(at_ns(1), &only(drive.map())).decision.command(Command::default());
+        assert!(command.speed_mps.is_finite() && command.steering_rad.is_finite(), "{command:?}");
     })
 }
 

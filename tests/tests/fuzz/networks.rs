@@ -5,9 +5,10 @@ use std::sync::LazyLock;
 use bicycle::Geometry;
 use bicycle::lanes::Instructions;
 use bus::layout::Scalar;
-use evidential::{Architecture, Checkpoint, Dataset, Example, Method, Predictor, Tensor, shipped};
+use evidential::{
+    Architecture, Checkpoint, Dataset, Example, Method, Predictor, Tensor, WeightsDigest, shipped,
+};
 use rand::RngExt;
-use sha2::{Digest, Sha256};
 use traversability::N_BINS;
 
 use crate::harness::{Fate, Reader, Rng};
@@ -73,7 +74,7 @@ pub fn checkpoint(rng: &mut Rng) -> Vec<u8> {
     if is_sidecar {
         sidecar = mutate::text(rng, &SIDECAR);
     } else if !once_in(rng, 8) {
-        let hash: String = Sha256::digest(&weights).iter().map(|byte| format!("{byte:02x}")).collect();
+        let hash = WeightsDigest::of(&weights).hexadecimal();
         sidecar = SIDECAR.replace(&CHECKPOINT.sidecar.weights_sha256, &hash).into_bytes();
     }
     [(weights.len() as u64).to_le_bytes().as_slice(), &weights, &sidecar].concat()

@@ -35,6 +35,7 @@ fn setup() -> RecordedSetup {
         config_toml,
         method: "physics".to_owned(),
         checkpoint_sha256: String::new(),
+        corrector_sha256: String::new(),
         alpha: ALPHA,
         seed: SEED.to_string(),
         revision: String::new(),
@@ -132,7 +133,7 @@ pub fn recorded_run(rng: &mut Rng) -> Vec<u8> {
 pub fn read_recorded_run() -> Reader {
     let folder = folder();
     let files = [folder.path().join("run.mcap")];
-    let knowledge = Knowledge { belief: Belief::Physics, checkpoint: 0 };
+    let knowledge = Knowledge { belief: Belief::Physics, checkpoint: 0, corrector: None };
     let read = move |input: &[u8]| {
         std::fs::write(&files[0], input).unwrap();
         let _lives = &folder;
@@ -151,7 +152,7 @@ fn the_recording_that_is_broken_replays_when_it_is_whole() {
     let folder = folder();
     let file = folder.path().join("run.mcap");
     std::fs::write(&file, recording::whole(&RUN)).unwrap();
-    let knowledge = Knowledge { belief: Belief::Physics, checkpoint: 0 };
+    let knowledge = Knowledge { belief: Belief::Physics, checkpoint: 0, corrector: None };
     let report = replayed(&[file], &knowledge).unwrap();
     assert_eq!((report.n_decisions, report.n_identical, report.n_surfaces), (2, 2, 1), "{report:?}");
     assert_eq!(report.n_risk_maps, 1, "{report:?}");

@@ -65,7 +65,7 @@ fn every_process_may_fail_and_the_vehicle_is_safe() {
     let files = run.recordings();
     let records = replay::read(&files).unwrap();
     assert_eq!((records.ended_early.as_ref(), run.said_by_recorder()), (None, None));
-    let knowledge = Knowledge { belief: navigator::Belief::Physics, checkpoint: 0 };
+    let knowledge = Knowledge { belief: navigator::Belief::Physics, checkpoint: 0, corrector: None };
     let report = replay::replay(&records, &knowledge).unwrap();
     assert_eq!(report.first_difference, None, "{report:?}");
     assert!(report.n_identical > 50, "{report:?}");

@@ -9,7 +9,7 @@ use bicycle::{Model, Vehicle};
 use bus::ages::{AgeLimits, Periods};
 use bus::channel::{Bus, RunName};
 use bus::status::Role;
-use navigator::{Areas, Belief, Config, Route};
+use navigator::{Areas, Belief, Config, MovingConfig, Route};
 use runtime::ages::{self, AskedAges};
 use runtime::control::{self, ControlSetup};
 use runtime::learning::{self, LearningSetup};
@@ -18,7 +18,7 @@ use runtime::mission::{self, Beginning, MissionSetup};
 use runtime::recorder::{self, RecorderSetup};
 use runtime::setup::{ClockAnchor, MachineSetup, RecordedSetup};
 use rustix::process::{Pid, Signal, kill_process, set_parent_process_death_signal};
-use scenarios::{EpisodeConfig, RockFieldConfig, Task};
+use scenarios::{EpisodeConfig, RockFieldConfig, Stride, Task, Walker};
 use simulator::{self, Ending, PlantSetup};
 use traversability::CvarLevel;
 
@@ -57,6 +57,7 @@ pub fn machine() -> (Vehicle, Config) {
     config.controller.n_rollouts = 256;
     config.controller.n_steps = 30;
     config.controller.n_threads = 1;
+    config.moving = Some(MovingConfig::default());
     (vehicle, config)
 }
 
@@ -146,7 +147,8 @@ impl Run {
 
     /// What recorders had to say.
     pub fn said_by_recorder(&self) -> Option<String> {
-        std::fs::read_to_string(self.folder.path().join(SAID)).ok()
+        let said = std::fs::read_to_string(self.folder.path().join(SAID)).ok();
+        said.filter(|text| text.ends_with('\n'))
     }
 
     pub fn start_all(&mut self, roles: &[Role]) {
@@ -256,7 +258,8 @@ fn be(role: Role, run: &RunName, folder: &Path, is_over: &dyn Fn() -> bool) {
             learning::run(&bus, &setup, is_over).unwrap();
         }
         Role::Control => {
-            let setup = ControlSetup { model, config, seed: SEED, period_s: 0.1, ages: ages() };
+            let setup =
+                ControlSetup { model, config, corrector: None, seed: SEED, period_s: 0.1, ages: ages() };
             control::run(&bus, setup, is_over).unwrap();
         }
         Role::Mission => {
@@ -304,6 +307,7 @@ pub fn recorded_setup() -> RecordedSetup {
         config_toml,
         method: "physics".to_owned(),
         checkpoint_sha256: String::new(),
+        corrector_sha256: String::new(),
         alpha: ALPHA,
         seed: SEED.to_string(),
         ages: ages(),
@@ -322,7 +326,17 @@ pub fn episode_config(vehicle: &Vehicle) -> EpisodeConfig {
     if let Some(sensor) = &mut episode.range_sensor {
         (sensor.n_azimuths, sensor.n_beams) = (120, 24);
     }
+    episode.walkers = vec![passer_by()];
     episode
+}
+
+/// Walks up and down beside the start, where he is seen and in nobody's way.
+fn passer_by() -> Walker {
+    let Task { start: [x_m, y_m, yaw_rad], .. } = task();
+    let (sin, cos) = yaw_rad.sin_cos();
+    let at_m = [x_m + 2.0 * cos + 5.0 * sin, y_m + 2.0 * sin - 5.0 * cos];
+    let walk = |sense: f64| Stride { duration_s: 5.0, velocity_mps: [sense * cos, sense * sin] };
+    Walker::new(at_m, (0..100).map(|k| walk(if k % 2 == 0 { 1.0 } else { -1.0 })).collect())
 }
 
 pub fn plant_setup(vehicle: &Vehicle) -> PlantSetup<'_> {

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use bicycle::Decision;
+use bus::channel::{COMMAND, Channel, IMU, MISSION, ODOMETRY, RISK, SCAN};
 use bus::layout::{c_header, python_module};
 use bus::message::{CommandRecord, LAYOUT_VERSION, layouts};
 use bus::watchdog::Watchdog;
@@ -100,4 +101,28 @@ fn the_c_header_is_that_of_the_types_and_compiles() {
 #[test]
 fn the_python_module_is_that_of_the_types() {
     hold("python/surefoot_layout.py", &python_module(&layouts(), LAYOUT_VERSION));
+}
+
+/// Depth, readers and history, as the table of `channels.py` ends its row of a channel: where they differ, whoever opens
+/// the channel second is refused.
+fn python_row<H, T>(channel: &Channel<H, T>) -> [String; 2] {
+    let Channel { name, depth, n_readers, history, .. } = channel;
+    [format!("    \"{name}\": ("), format!(", {depth}, {n_readers}, {history}),")]
+}
+
+#[test]
+fn the_python_channels_are_those_of_the_run() {
+    let text = std::fs::read_to_string(place("python/channels.py")).unwrap();
+    let rows = [
+        python_row(&ODOMETRY),
+        python_row(&IMU),
+        python_row(&SCAN),
+        python_row(&RISK),
+        python_row(&COMMAND),
+        python_row(&MISSION),
+    ];
+    for [begin, end] in rows {
+        let row = text.lines().find(|line| line.starts_with(&begin)).unwrap_or_else(|| panic!("{begin}"));
+        assert!(row.ends_with(&end), "{row} does not end in {end}");
+    }
 }

@@ -36,7 +36,7 @@ static RECORDED: LazyLock<Records> = LazyLock::new(|| {
 fn after(change: impl FnOnce(&mut Records)) -> ReplayReport {
     let mut records = RECORDED.clone();
     change(&mut records);
-    replay::replay(&records, &Knowledge { belief: Belief::Physics, checkpoint: 0 }).unwrap()
+    replay::replay(&records, &Knowledge { belief: Belief::Physics, checkpoint: 0, corrector: None }).unwrap()
 }
 
 /// The last map of the ground of an event that odometry was taken in for, or the one so many before it.

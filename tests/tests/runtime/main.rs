@@ -5,6 +5,7 @@
 #![allow(clippy::disallowed_methods, reason = "processes are waited for")]
 
 mod channels;
+mod corrector;
 mod driver;
 mod faults;
 mod fixture;
@@ -18,6 +19,7 @@ mod pipeline;
 mod recordings;
 mod rewritten;
 mod supervision;
+mod tracks;
 mod witness;
 
 /// Not a test of its own: what the processes of the others begin with.

@@ -229,7 +229,7 @@ fn control_goes_on_from_what_was_really_applied() {
     witness.until_driving("nobody holds it any more");
     drop(driver);
     run.end();
-    let knowledge = Knowledge { belief: Belief::Physics, checkpoint: 0 };
+    let knowledge = Knowledge { belief: Belief::Physics, checkpoint: 0, corrector: None };
     let records = replay::read(&run.recordings()).unwrap();
     assert!(records.stuck.is_empty(), "{:?}", records.stuck);
     let report = replay::replay(&records, &knowledge).unwrap();

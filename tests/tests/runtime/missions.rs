@@ -132,7 +132,9 @@ fn orders_are_followed_in_a_control_cycle_and_every_decision_is_made_again() {
     }
     directed.run.end();
     let records = replay::read(&directed.run.recordings()).unwrap();
-    let report = replay::replay(&records, &Knowledge { belief: Belief::Physics, checkpoint: 0 }).unwrap();
+    let report =
+        replay::replay(&records, &Knowledge { belief: Belief::Physics, checkpoint: 0, corrector: None })
+            .unwrap();
     assert_eq!((report.first_difference, report.missing), (None, vec![]));
     assert!(report.n_identical == report.n_decisions && report.n_decisions > 100, "{}", report.n_decisions);
 }
@@ -152,7 +154,9 @@ fn the_share_of_outcomes_changes_while_driving_and_maps_say_for_which_they_were_
     directed.witness.until("ten decisions on them", |witness| witness.decided.len() >= 10);
     directed.run.end();
     let records = replay::read(&directed.run.recordings()).unwrap();
-    let report = replay::replay(&records, &Knowledge { belief: Belief::Physics, checkpoint: 0 }).unwrap();
+    let report =
+        replay::replay(&records, &Knowledge { belief: Belief::Physics, checkpoint: 0, corrector: None })
+            .unwrap();
     assert_eq!((report.first_difference, report.missing), (None, vec![]));
     assert_eq!(report.n_identical, report.n_decisions);
     let levels: std::collections::BTreeSet<_> =

@@ -14,6 +14,7 @@ use bus::ages::AgeLimits;
 
 use crate::fixture::ages;
 use in_process::{InProcess, Made, Shown};
+use kinodynamics::Reason;
 use processes::Processes;
 use schedule::{BEGAN_NS, MILLISECOND_NS, Recorder, Schedule, Step};
 
@@ -62,6 +63,9 @@ fn the_schedule_holds_what_there_are_rules_for() {
     ] {
         assert!(n(&|shown| (shown.decision, shown.reason) == (decision, reason)) > 0, "{decision} {reason}");
     }
+    let late = runtime::convert::AS_PLANNED + Reason::ImuLate as u32;
+    assert!(n(&|shown| matches!(shown.correction, 1 | 2)) > 30, "corrected: {decisions:?}");
+    assert!(n(&|shown| shown.correction == late) > 0, "without the unit: {decisions:?}");
     let knows_stuck = |made: &&Made| matches!(made, Made::Risk { stuck, .. } if *stuck > 0);
     assert!(made.iter().filter(knows_stuck).count() > 3, "it got stuck");
     assert!(schedule.len() > 3000, "{}", schedule.len());

@@ -19,7 +19,7 @@ fn read(files: &[PathBuf]) -> Records {
 }
 
 fn made_again(records: &Records) -> ReplayReport {
-    let knowledge = Knowledge { belief: Belief::Physics, checkpoint: 0 };
+    let knowledge = Knowledge { belief: Belief::Physics, checkpoint: 0, corrector: None };
     replay::replay(records, &knowledge).unwrap()
 }
 

@@ -8,9 +8,12 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use bicycle::Decision;
-use bus::channel::{Bus, Channel, DECISION, Inlet, MISSION, ODOMETRY, Outlet, RISK, Refusal};
+use bus::channel::{Bus, Channel, DECISION, Inlet, MISSION, ODOMETRY, Outlet, RISK, Refusal, TRACKS};
 use bus::clock::now_ns;
-use bus::message::{CommandRecord, DecisionRecord, Grid, MissionRecord, OdometryRecord, RiskHeader, Stamp};
+use bus::message::{
+    CommandRecord, DecisionRecord, Grid, MissionRecord, OdometryRecord, RiskHeader, Stamp, TRACKS_MAX,
+    TrackRecord, TracksHeader,
+};
 use bus::payload::{RiskParts, risk_views};
 use bus::status::Role;
 use terrain::GridGeometry;
@@ -220,6 +223,7 @@ fn write_somewhere(memory: &Memory, numbers: &mut Numbers) {
 struct Others {
     odometry: Outlet<Stamp, OdometryRecord>,
     missions: Outlet<Stamp, MissionRecord>,
+    tracks: Outlet<TracksHeader, TrackRecord>,
     risks: Outlet<RiskHeader, [f32; 4]>,
     decisions: Inlet<Stamp, DecisionRecord>,
     decided: Vec<DecisionRecord>,
@@ -227,7 +231,8 @@ struct Others {
 }
 
 impl Others {
-    /// A fiftieth of a second: odometry, now and then a mission and a map, which nobody writes into meanwhile.
+    /// A fiftieth of a second: odometry, now and then a mission, that nothing moves, and a map, which nobody writes into
+    /// meanwhile.
     fn step(&mut self, writing: &Mutex<()>) {
         // It stands, as its sensors see it: never twice at the same place.
         let x_m = 0.01 * (self.n_steps % 2) as f64;
@@ -238,6 +243,8 @@ impl Others {
             self.missions.send_one(Stamp::default(), mission, now_ns()).unwrap();
         }
         if self.n_steps.is_multiple_of(10) {
+            let nothing = self.tracks.write(0, |_| TrackRecord::default()).unwrap();
+            self.tracks.send(nothing, now_ns()).unwrap();
             let nobody = writing.lock().unwrap();
             send_map(&mut self.risks);
             drop(nobody);
@@ -271,6 +278,7 @@ fn control_decides_whatever_becomes_of_the_map_that_it_reads() {
     let mut others = Others {
         odometry: bus.outlet(&ODOMETRY, 1).unwrap(),
         missions: bus.outlet(&MISSION, 1).unwrap(),
+        tracks: bus.outlet(&TRACKS, TRACKS_MAX).unwrap(),
         risks: bus.outlet(&RISK, parts().n_elements()).unwrap(),
         decisions: bus.inlet(&DECISION).unwrap(),
         decided: Vec::new(),

@@ -1,14 +1,12 @@
 //! How far drives and trainings have come: a bar on a terminal, a line where there is none.
 #![allow(clippy::disallowed_methods, reason = "people are told how long the benchmark takes")]
 
-use std::io::IsTerminal;
 use std::sync::OnceLock;
 use std::time::Instant;
 
 use ::bench::learning::{Request, Stage, Trained};
-use indicatif::{ProgressBar, ProgressStyle};
-
-use super::told;
+use ::report::learning::duration;
+use indicatif::ProgressBar;
 
 /// One kind of work.
 pub(super) struct Progress {
@@ -23,25 +21,17 @@ pub(super) struct Progress {
 impl Progress {
     /// Counts the drives of one part after the other.
     pub fn drives(n_drives: u32) -> Self {
-        Self::new(n_drives as usize, 1, "  {bar:28.green/black.bright} {pos}/{len} drives   {msg}")
+        Self::new(n_drives as usize, 1, "{pos}/{len} drives   {msg}")
     }
 
     /// Counts trainings that are done `n_threads` at a time.
     pub fn trainings(n_trainings: usize, n_threads: usize) -> Self {
-        let template = "  {bar:28.green/black.bright} {pos}/{len} trainings, {eta} left   {msg}";
-        Self::new(n_trainings, n_threads.min(n_trainings), template)
+        let beside = "{pos}/{len} trainings, {eta} left   {msg}";
+        Self::new(n_trainings, n_threads.min(n_trainings), beside)
     }
 
-    fn new(n_steps: usize, n_threads: usize, template: &str) -> Self {
-        let bar = if std::io::stderr().is_terminal() {
-            ProgressBar::new(n_steps as u64)
-        } else {
-            ProgressBar::hidden()
-        };
-        // The templates are constants: were one wrong, the plain bar would do.
-        if let Ok(style) = ProgressStyle::with_template(template) {
-            bar.set_style(style.progress_chars("━╸━"));
-        }
+    fn new(n_steps: usize, n_threads: usize, beside: &str) -> Self {
+        let bar = crate::progress::bar(n_steps as u64, beside);
         Self { bar, began: Instant::now(), n_steps, n_threads, estimated_s: OnceLock::new() }
     }
 
@@ -70,7 +60,7 @@ impl Progress {
                 "  {} trainings, {} at a time: about {}",
                 self.n_steps,
                 self.n_threads,
-                told::duration(rounds * elapsed_s)
+                duration(rounds * elapsed_s)
             );
             self.bar.suspend(|| println!("{told}"));
         }

@@ -93,7 +93,33 @@ impl Unfinished {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::picture::gap_examples::answer;
+    use sim_to_real::{Shrink, Verdict};
+
+    fn answer() -> Answer {
+        let shrink = Shrink {
+            metric: "normalised held-out rollout error".to_owned(),
+            before: Some(2.1),
+            after: Some(0.4),
+            floor: 0.35,
+            closed: Some(0.97),
+            closed_low: None,
+            closed_high: None,
+            predicted_closed: Some(0.95),
+            learned_bound_closed: None,
+            position_error_2s_m: None,
+        };
+        Answer {
+            case: "case".to_owned(),
+            steering: sim_to_real::Steering::Angle,
+            verdict: Verdict::None,
+            effects: Vec::new(),
+            ranking: Vec::new(),
+            credible_set: Vec::new(),
+            places: Vec::new(),
+            shrink,
+            advice: Vec::new(),
+        }
+    }
 
     fn asked(program: u64) -> Asked {
         Asked { set: "/set".into(), labels_sha256: "0".to_owned(), program: (program, 7) }

@@ -19,7 +19,8 @@ fn refused(change: impl FnOnce(&mut serde_json::Value)) -> String {
 
 /// The refusal of weights whose hash the sidecar holds.
 fn refused_weights(weights: &[u8]) -> String {
-    let sidecar = Sidecar { weights_sha256: sha256(weights), ..CHECKPOINT.sidecar.clone() };
+    let sidecar =
+        Sidecar { weights_sha256: WeightsDigest::of(weights).hexadecimal(), ..CHECKPOINT.sidecar.clone() };
     let sidecar = serde_json::to_vec(&sidecar).unwrap();
     Checkpoint::from_bytes(weights, &sidecar).map(|_| ()).unwrap_err().to_string()
 }

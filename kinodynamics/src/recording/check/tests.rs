@@ -9,7 +9,7 @@ fn recording(change: impl Fn(&mut ImuSample)) -> Recording {
     let imu = (0..4000u64).map(|k| {
         let mut sample = ImuSample {
             valid_at_ns: k * PERIOD_NS,
-            acceleration_mps2: [0.2, 0.5, 9.81],
+            acceleration_mps2: [0.2, yaw_rate(k as f64 * 0.005) as f32, 9.81],
             angular_rate_radps: [0.01, -0.02, yaw_rate(k as f64 * 0.005) as f32],
         };
         change(&mut sample);
@@ -47,7 +47,7 @@ fn other_axes_signs_and_units_are_told_by_what_they_look_like() {
         sample.angular_rate_radps.rotate_right(1);
     });
     assert!(
-        message.ends_with("9.81 forward, 0.20 left, 0.50 up; the axis called forward points up"),
+        message.contains("9.81 forward, 0.20 left") && message.ends_with("the axis called forward points up"),
         "{message}"
     );
     let message = told(|sample| sample.acceleration_mps2[2] *= -1.0);
@@ -60,6 +60,10 @@ fn other_axes_signs_and_units_are_told_by_what_they_look_like() {
     assert!(message.ends_with("the axis called left is the upward one"), "{message}");
     let message = told(|sample| sample.angular_rate_radps[2] *= 57.3);
     assert!(message.ends_with("is it in degrees per second?"), "{message}");
+    let message = told(|sample| sample.acceleration_mps2.swap(0, 1));
+    assert!(message.ends_with("forward and left are swapped"), "{message}");
+    let message = told(|sample| sample.acceleration_mps2[1] *= -1.0);
+    assert!(message.ends_with("the axis called left points right"), "{message}");
 }
 
 #[test]

@@ -12,6 +12,7 @@ use runtime::convert::decision_record;
 use traversability::CvarLevel;
 
 use super::schedule::{BEGAN_NS, Step};
+use crate::corrector::CORRECTOR;
 use crate::fixture::{ALPHA, SEED, ages, machine, task};
 
 /// Of a map: the content, and of a risk map also what it says of itself, without the lives of publishers.
@@ -30,6 +31,7 @@ pub struct Shown {
     pub reason: u32,
     pub author: u64,
     pub risk: u64,
+    pub correction: u32,
 }
 
 pub fn config() -> Config {
@@ -57,6 +59,8 @@ pub fn navigator() -> Navigator {
     .unwrap()
     .with_ages(PilotAges { learned_ns, mission_ns })
     .with_stand_in(physics, learning_silence_ns, BEGAN_NS)
+    .with_corrector(&CORRECTOR)
+    .unwrap()
 }
 
 /// The parts in one object.
@@ -88,6 +92,7 @@ impl InProcess {
                     applied: *applied,
                 });
             }
+            Step::Imu(samples) => navigator.hear_imu(samples),
             Step::Scan(scan) => {
                 navigator.hear_scan(ScanMessage { id: id(1), sensor: 0, scan: scan.as_ref().clone() });
             }
@@ -145,10 +150,13 @@ pub fn decision(record: &DecisionRecord) -> Made {
         mission: nameless(record.mission),
         learned: nameless(record.learned),
         physics: nameless(record.physics),
+        // In one object they have the name of their map, which also tells of jumps.
+        tracks: Source { epoch_ns: 0, sequence: u64::from(record.tracks != Source::default()) },
+        imu: nameless(record.imu),
         ..*record
     };
-    let DecisionRecord { cycle, author, .. } = bare;
+    let DecisionRecord { cycle, author, correction, .. } = bare;
     let (decision, reason) = (bare.command.decision, bare.command.reason);
-    let record = Shown { cycle, decision, reason, author, risk: bare.risk.sequence };
+    let record = Shown { cycle, decision, reason, author, risk: bare.risk.sequence, correction };
     Made::Decision { bits: content_hash(std::slice::from_ref(&bare)), record }
 }

@@ -5,10 +5,11 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use bicycle::Model;
 use bus::ages::{AgeLimits, Periods};
-use bus::channel::{Bus, DECISION, Inlet, ODOMETRY, ORDER, Outlet, RISK, RISK_PHYSICS, SCAN, SURFACE};
+use bus::channel::{Bus, DECISION, IMU, Inlet, ODOMETRY, ORDER, Outlet, RISK, RISK_PHYSICS, SCAN, SURFACE};
 use bus::clock::Clock;
 use bus::message::{
-    DecisionRecord, OdometryRecord, OrderHeader, PointRecord, RiskHeader, ScanHeader, Stamp, SurfaceHeader,
+    DecisionRecord, ImuRecord, OdometryRecord, OrderHeader, PointRecord, RiskHeader, ScanHeader, Stamp,
+    SurfaceHeader,
 };
 use bus::payload::content_hash;
 use navigator::{Belief, Route};
@@ -20,12 +21,14 @@ use traversability::CvarLevel;
 
 use super::in_process::{Made, config, decision};
 use super::schedule::{BEGAN_NS, Step};
+use crate::corrector::CORRECTOR;
 use crate::fixture::{ALPHA, Run, SEED, machine, task};
 
 /// The same parts, each with its channels, one after the other as the schedule says.
 pub struct Processes {
     time_ns: Arc<AtomicU64>,
     odometry: Outlet<Stamp, OdometryRecord>,
+    imu: Outlet<Stamp, ImuRecord>,
     scans: Outlet<ScanHeader, PointRecord>,
     orders: Outlet<OrderHeader, [f64; 2]>,
     leading: Leading,
@@ -61,9 +64,12 @@ impl Processes {
         let mapping = MappingSetup { vehicle: &vehicle, config: config.clone(), level, model: &model, ages };
         let learning =
             LearningSetup { vehicle: &vehicle, config: config.clone(), belief, checkpoint: 0, level, limits };
-        let control = ControlSetup { model: model.clone(), config, seed: SEED, period_s: 0.1, ages };
+        let corrector = Some(Arc::clone(&CORRECTOR));
+        let control =
+            ControlSetup { model: model.clone(), config, corrector, seed: SEED, period_s: 0.1, ages };
         Self {
             odometry: bus.outlet(&ODOMETRY, 1).unwrap(),
+            imu: bus.outlet(&IMU, 16).unwrap(),
             scans: bus.outlet(&SCAN, 1 << 14).unwrap(),
             orders: bus.outlet(&ORDER, 4).unwrap(),
             leading: Leading::new(&bus, mission).unwrap(),
@@ -87,6 +93,11 @@ impl Processes {
             Step::Odometry(odometry, applied) => {
                 let record = OdometryRecord::from(odometry).with_applied(applied);
                 self.odometry.send_one(Stamp::default(), record, odometry.valid_at_ns).unwrap();
+            }
+            Step::Imu(samples) => {
+                let element = |place: usize| ImuRecord::from(&samples[place]);
+                let loan = self.imu.write(samples.len(), element).unwrap();
+                self.imu.send(loan, at_ns).unwrap();
             }
             Step::Scan(scan) => {
                 let element = |place: usize| PointRecord::from(&scan.points[place]);

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use bicycle::{Applied, AppliedBy, Command, Decision, HoldReason, Odometry};
+use bicycle::{Applied, AppliedBy, Command, Decision, HoldReason, ImuSample, Odometry};
 use navigator::{Jump, Order};
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -24,6 +24,7 @@ pub const LASTS_MS: u64 = 15_000;
 #[derive(Clone, Debug)]
 pub enum Step {
     Odometry(Odometry, Applied),
+    Imu(Vec<ImuSample>),
     Scan(Arc<Scan>),
     Order(Order),
     Lead,
@@ -43,6 +44,7 @@ pub mod plan {
     pub const JUMPS_FROM: u64 = 5010;
     pub const PAUSED: Range<u64> = 6500..7000;
     pub const BOLDER_FROM: u64 = 7300;
+    pub const IMU_IS_SILENT: Range<u64> = 7500..7900;
     pub const HELD: Range<u64> = 8000..10_500;
     pub const MISSION_IS_SILENT: Range<u64> = 11_000..14_200;
 }
@@ -92,6 +94,11 @@ impl Recorder {
         }
         let late_ns = self.random.random_range(0..6 * MILLISECOND_NS);
         self.put(at_ns + late_ns, Step::Odometry(odometry, self.applied));
+        let of_now = |sample: &ImuSample| ImuSample { valid_at_ns: BEGAN_NS + sample.valid_at_ns, ..*sample };
+        let imu: Vec<ImuSample> = observation.imu.iter().map(of_now).collect();
+        if !imu.is_empty() && !plan::IMU_IS_SILENT.contains(&at_ms) {
+            self.put(at_ns + late_ns, Step::Imu(imu));
+        }
         if let Some(scan) = observation.scan {
             // Between two odometry messages, and now and then far behind them.
             let scan = Scan { valid_at_ns: at_ns + 7 * MILLISECOND_NS, ..scan.as_ref().clone() };

@@ -1,0 +1,69 @@
+//! The least time to the goal over a map.
+
+use mppi::CostToGoConfig;
+use numpy::PyArray2;
+use pyo3::prelude::*;
+
+use crate::arrays::{numbers, owned};
+use crate::controller::AnyModel;
+use crate::detached::Turns;
+use crate::failure::refused_value;
+use crate::ground::grid;
+use crate::risk_map::RiskMap;
+use crate::settings::Source;
+
+/// The field of least time to the goal over the known map, which tells the controller what lies beyond its horizon.
+///
+/// CostToGo(model, n_rows, n_cols, settings=None) for risk maps of that many rows and columns. settings: a dict, TOML text or
+/// a path with what differs from the defaults, as the part "cost_to_go" of `settings_for(vehicle)`.
+#[pyclass(frozen, module = "surefoot")]
+pub struct CostToGo {
+    pub field: Turns<mppi::CostToGo>,
+    shape: [usize; 2],
+}
+
+#[pymethods]
+impl CostToGo {
+    #[new]
+    #[pyo3(signature = (model, n_rows, n_cols, settings=None))]
+    fn new(
+        model: AnyModel,
+        n_rows: usize,
+        n_cols: usize,
+        settings: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<Self> {
+        let config: CostToGoConfig = match settings {
+            Some(settings) => Source::new("settings", settings)?.parse(formats::ConfigText::parse)?,
+            None => CostToGoConfig::default(),
+        };
+        grid([n_rows, n_cols], 1.0, (0, 0))?;
+        let field = mppi::CostToGo::new(config, model.limits(), n_rows, n_cols).map_err(refused_value)?;
+        Ok(Self { field: Turns::new(field), shape: [n_rows, n_cols] })
+    }
+
+    /// Solves for the times over the map to the goal, two numbers, x_m, y_m, which may lie beyond it. Raises `ValueError` for a
+    /// map of another shape or a goal that is no place; the field is then as it was.
+    fn update(
+        &self,
+        py: Python<'_>,
+        risk_map: &Bound<'_, RiskMap>,
+        goal_m: &Bound<'_, PyAny>,
+    ) -> PyResult<()> {
+        let goal_m = numbers("goal_m", goal_m, ["x_m", "y_m"])?;
+        let updated =
+            risk_map.get().with_view(py, |map| self.field.take(py, |field| field.update(map, goal_m)))?;
+        updated?.map_err(refused_value)
+    }
+
+    /// Least time from each cell to the goal [s]: float32 (row, col), zero before the first update, a copy.
+    #[getter]
+    fn seconds<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f32>>> {
+        let seconds = self.field.take(py, |field| field.view().seconds.to_vec())?;
+        owned(py, seconds, self.shape)
+    }
+
+    fn __repr__(&self) -> String {
+        let [n_rows, n_cols] = self.shape;
+        format!("<surefoot.CostToGo of {n_rows} x {n_cols} cells>")
+    }
+}

@@ -1,0 +1,241 @@
+//! A diagnosis in plain words.
+
+use bicycle::effect::{CATALOGUE, Parameter};
+use sim_to_real::{Answer, Condition, Estimate, NamedEffect, Shrink, Verdict};
+
+/// The verdict in a sentence.
+pub(crate) fn verdict(answer: &Answer) -> String {
+    let names = listed(&answer.effects.iter().map(|effect| effect.id.as_str()).collect::<Vec<_>>());
+    match answer.verdict {
+        Verdict::None => {
+            "No gap: the real drives differ from the simulator by no more than its own drives from one another."
+                .to_owned()
+        }
+        Verdict::Effects => format!("The gap comes from {names}."),
+        Verdict::EffectsAndUnknown => {
+            format!("A part of the gap comes from {names}; the rest is nothing that the catalogue knows.")
+        }
+        Verdict::Unknown => "There is a gap, and nothing that the catalogue knows explains it.".to_owned(),
+    }
+}
+
+/// `a`, `a and b`, `a, b and c`.
+fn listed(names: &[&str]) -> String {
+    match names {
+        [all @ .., last] if !all.is_empty() => format!("{} and {last}", all.join(", ")),
+        _ => names.concat(),
+    }
+}
+
+/// What an effect is, from the catalogue.
+pub(crate) fn meaning(id: &str) -> &'static str {
+    CATALOGUE.iter().find(|description| description.id == id).map_or("", |description| description.meaning)
+}
+
+/// Parameters with values and intervals: `time_constant 0.210 s (0.180 to 0.240)`.
+pub(crate) fn parameters(effect: &NamedEffect) -> String {
+    let told = |(name, estimate): (&String, &Estimate)| parameter(&effect.id, name, estimate);
+    effect.parameters.iter().map(told).collect::<Vec<_>>().join(", ")
+}
+
+/// One parameter with value, unit and 90 % interval.
+pub(crate) fn parameter(id: &str, name: &str, estimate: &Estimate) -> String {
+    let known = CATALOGUE.iter().find(|description| description.id == id);
+    let known = known.and_then(|description| description.parameters.iter().find(|p| p.name == name));
+    let unit = known.map_or("", |parameter: &Parameter| parameter.unit);
+    let unit = if unit == "-" || unit.is_empty() { String::new() } else { format!(" {unit}") };
+    let Estimate { value, low, high } = *estimate;
+    format!("{} {}{unit} ({} to {})", plain_name(name), rounded(value), rounded(low), rounded(high))
+}
+
+/// `time_constant_s` without its unit and underscores.
+fn plain_name(name: &str) -> String {
+    let units = ["_s", "_rad", "_mps", "_mps2", "_radps", "_per_m", "_m", "_s2_per_m2"];
+    let longest = units.iter().filter_map(|unit| name.strip_suffix(unit)).min_by_key(|rest| rest.len());
+    longest.unwrap_or(name).replace('_', " ")
+}
+
+/// Three significant digits.
+fn rounded(value: f64) -> String {
+    if value == 0.0 || !value.is_finite() {
+        return format!("{value}");
+    }
+    let decimals = (2 - value.abs().log10().floor() as i32).clamp(0, 6) as usize;
+    format!("{value:.decimals$}")
+}
+
+/// A condition in words.
+pub(crate) fn condition(condition: Condition) -> &'static str {
+    match condition {
+        Condition::Speed => "speed",
+        Condition::Steering => "steering",
+        Condition::SteeringChange => "change of steering",
+        Condition::SpeedChange => "change of speed",
+        Condition::LateralAcceleration => "lateral acceleration",
+        Condition::Pitch => "pitch of the ground",
+        Condition::Roll => "roll of the ground",
+        Condition::TerrainClass => "terrain class",
+        Condition::Heading => "heading",
+        Condition::Constant => "everywhere the same",
+    }
+}
+
+/// Share above the null from which a condition is told [-].
+pub(crate) const STANDS_OUT: f64 = 0.01;
+
+/// The conditions that stand out, as `speed 0.61, pitch 0.12`.
+pub(crate) fn places(answer: &Answer) -> String {
+    let standing = answer.places.iter().filter(|place| place.share > STANDS_OUT);
+    let told: Vec<_> =
+        standing.map(|place| format!("{} {:.2}", condition(place.condition), place.share)).collect();
+    if told.is_empty() { "nowhere in particular".to_owned() } else { told.join(", ") }
+}
+
+/// How far the gap shrinks, line by line.
+pub(crate) fn shrink(shrink: &Shrink) -> Vec<String> {
+    let mut lines = Vec::new();
+    if let Some(predicted) = shrink.predicted_closed {
+        lines.push(format!(
+            "predicted from the real drives alone: {:.0} % of the gap closes",
+            100.0 * predicted
+        ));
+    }
+    match (shrink.before, shrink.after) {
+        (Some(before), Some(after)) => lines.push(format!(
+            "held-out rollout error {before:.2} before, {after:.2} after, {:.2} is the floor",
+            shrink.floor
+        )),
+        _ => lines.push("no held-out drives: nothing was verified".to_owned()),
+    }
+    lines.extend(closed(shrink));
+    if let Some(error) = shrink.position_error_2s_m {
+        lines.push(format!(
+            "position error after 2 s {:.3} m before, {:.3} m after",
+            error.before, error.after
+        ));
+    }
+    lines.extend(shrink.learned_bound_closed.map(|bound| learned(bound, shrink.closed)));
+    lines
+}
+
+/// What a learned correction on top of the announced effects adds.
+fn learned(bound: f64, closed: Option<f64>) -> String {
+    let percent = 100.0 * bound;
+    if closed.is_some_and(|closed| bound > closed + MORE) {
+        return format!(
+            "with a learned correction on top {percent:.0} %: so much a flexible model finds beyond them"
+        );
+    }
+    format!("a learned correction on top finds nothing to add ({percent:.0} %)")
+}
+
+/// Closed part by which a learned correction has to surpass the announced effects to have found anything [-].
+const MORE: f64 = 0.01;
+
+fn closed(shrink: &Shrink) -> Option<String> {
+    let before = shrink.before?;
+    let Some(closed) = shrink.closed else {
+        return (before < 1.2 * shrink.floor)
+            .then(|| "so near to the floor that there is nothing to close".to_owned());
+    };
+    let interval = shrink.closed_low.zip(shrink.closed_high);
+    let interval = interval
+        .map(|(low, high)| format!(" ({:.0} to {:.0} %)", 100.0 * low, 100.0 * high))
+        .unwrap_or_default();
+    Some(format!("{:.0} %{interval} of the gap closes on the held-out drives", 100.0 * closed))
+}
+
+/// Everything for the terminal.
+pub fn text(answer: &Answer, drives: &str) -> String {
+    let mut lines = vec![String::new(), format!("  {} · {drives}", answer.case), String::new()];
+    lines.push(format!("  {}", verdict(answer)));
+    for effect in &answer.effects {
+        lines.push(format!("    {}  {}", effect.id, parameters(effect)));
+        lines.push(format!("      {}", meaning(&effect.id)));
+    }
+    if matches!(answer.verdict, Verdict::Effects | Verdict::EffectsAndUnknown) {
+        lines.extend(others(answer).map(|(what, names)| format!("    {what}: {}", names.join(", "))));
+    }
+    if answer.verdict != Verdict::None {
+        lines.push(format!("  where    {}", places(answer)));
+    }
+    lines.extend(named("how far", &shrink(&answer.shrink)));
+    lines.extend(named("next", &answer.advice));
+    lines.join("\n") + "\n"
+}
+
+/// What else would explain the gap: in which sense, and the names.
+pub(crate) fn others(answer: &Answer) -> Option<(&'static str, Vec<&str>)> {
+    let is_other = |id: &&String| answer.effects.iter().all(|effect| effect.id != **id);
+    let others: Vec<&str> = answer.credible_set.iter().filter(is_other).map(String::as_str).collect();
+    let what = match answer.effects.len() {
+        1 => "Alone, these explain the drives about as well",
+        _ => "In place of one of them, these would do as well",
+    };
+    (!others.is_empty()).then_some((what, others))
+}
+
+/// Lines below one another, the first with a name before it.
+fn named(name: &str, lines: &[String]) -> Vec<String> {
+    let name = |place: usize| if place == 0 { name } else { "" };
+    lines.iter().enumerate().map(|(place, line)| format!("  {:<9}{line}", name(place))).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::gap::examples;
+
+    #[test]
+    fn the_answer_is_told_line_by_line() {
+        let told = text(&examples::answer(), "v: 4 nominal drives");
+        let lines: Vec<&str> = told.lines().map(str::trim_end).collect();
+        let expected = [
+            "",
+            "  steering <late> · v: 4 nominal drives",
+            "",
+            "  The gap comes from steer_lag.",
+            "    steer_lag  time constant 0.210 s (0.180 to 0.240)",
+        ];
+        assert_eq!(&lines[..5], expected);
+        let rest = [
+            "    Alone, these explain the drives about as well: steer_delay",
+            "  where    change of steering 0.61",
+            "  how far  predicted from the real drives alone: 95 % of the gap closes",
+            "           held-out rollout error 2.10 before, 0.40 after, 0.35 is the floor",
+            "           97 % (90 to 100 %) of the gap closes on the held-out drives",
+            "           position error after 2 s 0.289 m before, 0.101 m after",
+            "  next     drive steps of the steering & sines",
+        ];
+        assert_eq!(lines[6..], rest);
+    }
+
+    #[test]
+    fn a_parameter_is_told_with_unit_and_interval() {
+        let estimate = Estimate { value: 0.2104, low: 0.18, high: 0.2399 };
+        assert_eq!(
+            parameter("steer_lag", "time_constant_s", &estimate),
+            "time constant 0.210 s (0.180 to 0.240)"
+        );
+        let ratio = Estimate { value: 1.0, low: 0.95, high: 1.05 };
+        assert_eq!(parameter("steer_gain", "ratio", &ratio), "ratio 1.00 (0.950 to 1.05)");
+    }
+
+    #[test]
+    fn a_learned_correction_that_adds_nothing_is_no_bound_of_its_own() {
+        assert_eq!(learned(0.8, Some(0.8)), "a learned correction on top finds nothing to add (80 %)");
+        assert_eq!(learned(0.7, Some(0.8)), "a learned correction on top finds nothing to add (70 %)");
+        assert!(learned(0.9, Some(0.8)).starts_with("with a learned correction on top 90 %"));
+    }
+
+    #[test]
+    fn names_are_listed_as_one_speaks() {
+        let told = [&["a"][..], &["a", "b"], &["a", "b", "c"]].map(listed);
+        assert_eq!(told, ["a", "a and b", "a, b and c"]);
+    }
+
+    #[test]
+    fn three_digits_are_kept() {
+        assert_eq!([0.0, 12345.6, 0.012345, -2.5].map(rounded), ["0", "12346", "0.0123", "-2.50"]);
+    }
+}

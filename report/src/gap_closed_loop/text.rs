@@ -1,0 +1,84 @@
+//! The closed-loop table for a terminal.
+
+use bench::gap_closed_loop::{DriveResult, Mean, Report, Row};
+
+/// A drive in a line.
+pub fn drive_text(drive: &DriveResult) -> String {
+    let job = &drive.job;
+    let (ground, gap, belief) = (job.ground.name(), job.gap.name(), job.belief.name());
+    format!("{ground}, {gap}, {belief}, seed {}: {:?} after {:.1} s", job.seed, drive.end, drive.time_s)
+}
+
+/// What was found in the recorded drives, and the table.
+pub fn text(report: &Report) -> String {
+    let mut told = String::from("  found in the recorded drives\n");
+    for found in &report.diagnoses {
+        let effects: Vec<String> = found.found.iter().map(effect_text).collect();
+        let effects = if effects.is_empty() { "nothing".to_owned() } else { effects.join(", ") };
+        let truth = found.truth.as_ref().map_or("nothing".to_owned(), effect_text);
+        told += &format!("    {:<14} {effects}; true: {truth}\n", found.gap.name());
+    }
+    told += &format!(
+        "\n  {:<7}{:<14}{:<10}{:>8}  {:<22}{:<22}{:<22}{:<22}\n",
+        "", "gap", "model", "goal", "time [s]", "off course RMS [m]", "speed RMS [m/s]", "plan RMS [m]"
+    );
+    told.extend(report.rows.iter().map(row_text));
+    told
+}
+
+/// Id and parameters.
+fn effect_text(effect: &bicycle::Effect) -> String {
+    let description = effect.description();
+    let numbers = description.parameters.iter().zip(effect.values());
+    let numbers: Vec<String> =
+        numbers.map(|(parameter, value)| format!("{} {value:.3}", parameter.name)).collect();
+    format!("{} ({})", description.id, numbers.join(", "))
+}
+
+fn row_text(row: &Row) -> String {
+    let mean = |mean: Option<Mean>| {
+        mean.map_or("-".to_owned(), |mean| format!("{:.2} [{:.2}, {:.2}]", mean.value, mean.low, mean.high))
+    };
+    format!(
+        "  {:<7}{:<14}{:<10}{:>8}  {:<22}{:<22}{:<22}{:<22}\n",
+        row.ground.name(),
+        row.gap.name(),
+        row.belief.name(),
+        format!("{} of {}", row.n_goal, row.n),
+        mean(row.time_s),
+        mean(row.across_rms_m),
+        mean(row.speed_rms_mps),
+        mean(row.plan_rms_m)
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bench::gap_closed_loop::{Belief, Differences, Gap, Ground};
+
+    #[test]
+    fn a_row_tells_counts_and_intervals_and_leaves_out_what_there_is_not() {
+        let mean = Some(Mean { value: 0.284, low: 0.2, high: 0.3333 });
+        let nothing =
+            Differences { across_rms_m: None, across_max_m: None, speed_rms_mps: None, plan_rms_m: None };
+        let row = Row {
+            ground: Ground::Course,
+            gap: Gap::SteerLag,
+            belief: Belief::Repaired,
+            n: 10,
+            n_goal: 7,
+            wilson: [0.4, 0.9],
+            time_s: None,
+            across_rms_m: mean,
+            across_max_m: None,
+            speed_rms_mps: None,
+            plan_rms_m: None,
+            less_nominal: nothing,
+        };
+        let told = row_text(&row);
+        for part in ["course", "steer_lag", "repaired", "7 of 10", "0.28 [0.20, 0.33]", "-"] {
+            assert!(told.contains(part), "{part} in {told}");
+        }
+    }
+}

@@ -1,0 +1,57 @@
+//! The report for a terminal.
+
+use bench::learning::{Report, Row, Verdict};
+
+use super::tables;
+
+/// What was driven, in lines.
+pub(super) fn testbed(report: &Report) -> String {
+    let testbed = &report.testbed;
+    format!(
+        "  {}, testbed of seed {}: {} maps, {} trials each, for training, validation and test\n  \
+         {} training and {} validation footprints, unevenness up to {:.4} m (median of the training drives)\n  \
+         {} test footprints at height scale {:.3}, {:.1} % out of distribution\n",
+        testbed.vehicle,
+        testbed.seed,
+        testbed.n_maps,
+        testbed.n_trials,
+        testbed.n_training,
+        testbed.n_validation,
+        testbed.unevenness_max_m,
+        testbed.n_test,
+        testbed.test_height_scale,
+        100.0 * testbed.share_out_of_distribution
+    )
+}
+
+/// Everything, within 110 columns.
+pub fn text(report: &Report) -> String {
+    let [one, two] = tables::paper_tables(report);
+    let mut tables = vec![tables::settings(report), one, two, tables::heads(report), tables::excess(report)];
+    tables.push(tables::curve(report));
+    tables.extend(report.evidence_of(Row::Pietra).map(|evidence| tables::evidence(report, evidence)));
+    tables.push(tables::calibration(report));
+    let tables: Vec<String> = tables.iter().map(|table| table.text()).collect();
+    format!("\n{}\n{}\n{}", testbed(report), tables.join("\n"), verdicts(report))
+}
+
+/// How many rules hold.
+pub(super) fn rules(report: &Report) -> String {
+    let n_passed = report.verdicts.iter().filter(|verdict| verdict.is_passed).count();
+    format!("Rules: {n_passed} of {} hold", report.verdicts.len())
+}
+
+fn verdicts(report: &Report) -> String {
+    let width = report.verdicts.iter().map(|verdict| verdict.rule.chars().count()).max().unwrap_or(0);
+    let line = |verdict: &Verdict| {
+        let passed = if verdict.is_passed { "passed" } else { "FAILED" };
+        format!("  {passed}  {:<width$}  {}\n", verdict.rule, verdict.found)
+    };
+    let lines: String = report.verdicts.iter().map(line).collect();
+    format!("  {}\n{lines}", rules(report))
+}
+
+/// A duration for people.
+pub fn duration(seconds: f64) -> String {
+    if seconds < 90.0 { format!("{seconds:.1} s") } else { format!("{:.1} min", seconds / 60.0) }
+}
