@@ -21,8 +21,8 @@ pub mod plant;
 pub mod prior_map;
 mod spread;
 mod stopwatch;
+pub mod sweep;
 pub mod traction_map;
-mod turns;
 
 pub use error::BenchError;
 pub use spread::Spread;

@@ -7,6 +7,7 @@ mod learned_map;
 mod learning;
 mod navigation;
 mod plant;
+mod sweep;
 
 use ::bench::{BenchError, control, prior_map};
 use serde::Serialize;
