@@ -13,6 +13,8 @@ pub const TRACKS_MAX: usize = 16;
 const FOLLOWED_MAX: usize = 64;
 /// Nearer to the vehicle's body than this a thing may be there unseen [m].
 const BESIDE_M: f64 = 0.8;
+/// Where a thing stood for so long is where it may later be seen to have left [s].
+const SETTLED_S: f64 = 3.0;
 /// A scan that shows a point within this distance of a place has looked at it, however slim what stood there [m].
 const LOOKED_AT_M: f64 = 0.3;
 /// Shares by which a radius follows a larger and a smaller one: a scan may see one side of a thing only, or take it
@@ -39,7 +41,7 @@ struct Followed {
     number: u64,
     estimate: Estimate,
     radius_m: f64,
-    /// Where it was first seen [m].
+    /// Where it was first seen, or stood for a while [m].
     anchor_m: [f64; 2],
     /// Whether it was ever seen to move. Who did may set off again at any moment.
     has_moved: bool,
@@ -238,6 +240,10 @@ impl Followed {
         let has_left = away_m > self.radius_m + config.moved_min_m;
         self.has_moved |= is_fast && has_left && self.n_scans >= config.scans_min;
         self.standing_s = if is_fast { 0.0 } else { self.standing_s + elapsed_s };
+        if !self.has_moved && self.standing_s > SETTLED_S {
+            // Its centre wanders slowly as other sides of it come into view.
+            self.anchor_m = position_m;
+        }
     }
 
     fn track(&self) -> Track {
