@@ -253,7 +253,7 @@ fn a_partial_update_equals_the_whole_map_bit_by_bit() {
             for cell in region.cells() {
                 surface[cell] = changed[cell];
             }
-            partly.update_dirty(&surface, &region).unwrap();
+            partly.update(&surface).unwrap();
             assert_eq!(partly.risk_map(), map_of(&checkpoint, Unfamiliar::Fuse, &surface, risk).risk_map());
         }
     }
@@ -279,11 +279,11 @@ fn a_moved_window_or_another_level_is_a_whole_new_map() {
     let moved = GridGeometry { origin: [3, 5], ..RISK };
     let mut map = map_of(&checkpoint, Unfamiliar::Fuse, &surface, RISK);
     map.place_at(moved.origin);
-    map.update_dirty(&surface, &CellRegion { rows: 0..0, cols: 0..0 }).unwrap();
+    map.update(&surface).unwrap();
     assert_eq!(map.risk_map(), map_of(&checkpoint, Unfamiliar::Fuse, &surface, moved).risk_map());
     let careful = CvarLevel::new(0.1).unwrap();
     map.set_level(careful);
-    map.update_dirty(&surface, &CellRegion { rows: 0..1, cols: 0..1 }).unwrap();
+    map.update(&surface).unwrap();
     let mut fresh = BeliefMap::new(
         &CAR,
         &Learned { level: careful, ..learned(&checkpoint, Unfamiliar::Fuse) },
