@@ -259,6 +259,30 @@ fn a_partial_update_equals_the_whole_map_bit_by_bit() {
     }
 }
 
+/// Networks whose patch reaches beyond all that physics feels of a pose.
+#[test]
+fn what_networks_alone_read_is_judged_anew() {
+    let mut checkpoint = checkpoint(Method::Vanilla, 9);
+    checkpoint.sidecar.layout.height_patch.spacing_m *= 4.0;
+    let open = SurfaceCell::certain(0.3, TerrainClass::Open, 0.0);
+    let mut surface = GridMap::filled(SURFACE, open);
+    let mut map = map_of(&checkpoint, Unfamiliar::Fuse, &surface, RISK);
+    let before = map.risk_map().clone();
+    let bump = Cell { row: 20, col: 22 };
+    surface[bump] = SurfaceCell { height_m: 0.4, ..open };
+    map.update(&surface).unwrap();
+    assert_eq!(map.risk_map(), map_of(&checkpoint, Unfamiliar::Fuse, &surface, RISK).risk_map());
+    let [bump_x_m, bump_y_m] = SURFACE.centre_m(bump);
+    let is_far = |[x_m, y_m, _]: [f64; 3]| (x_m - bump_x_m).hypot(y_m - bump_y_m) > 0.6;
+    let changed = poses(&before.view())
+        .into_iter()
+        .filter(|&(cell, yaw, pose)| {
+            is_far(pose) && map.risk_map().view().risk(cell, yaw) != before.view().risk(cell, yaw)
+        })
+        .count();
+    assert!(changed > 20, "{changed}");
+}
+
 #[test]
 fn the_map_does_not_depend_on_the_number_of_threads() {
     let surface = rough(SURFACE, 13);
