@@ -271,7 +271,8 @@ fn what_networks_alone_read_is_judged_anew() {
     let bump = Cell { row: 20, col: 22 };
     surface[bump] = SurfaceCell { height_m: 0.4, ..open };
     map.update(&surface).unwrap();
-    assert_eq!(map.risk_map(), map_of(&checkpoint, Unfamiliar::Fuse, &surface, RISK).risk_map());
+    let whole = map_of(&checkpoint, Unfamiliar::Fuse, &surface, RISK);
+    assert!(map.risk_map() == whole.risk_map(), "the map that followed is not the map made whole");
     let [bump_x_m, bump_y_m] = SURFACE.centre_m(bump);
     let is_far = |[x_m, y_m, _]: [f64; 3]| (x_m - bump_x_m).hypot(y_m - bump_y_m) > 0.6;
     let changed = poses(&before.view())
