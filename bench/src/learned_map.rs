@@ -148,7 +148,7 @@ fn measure_network(
         predicted?;
         let block = block(&mut rng);
         roughen(&mut ground, &block, &mut rng);
-        let (changed_ms, done) = timed_ms(|| map.update_dirty(&ground, &block));
+        let (changed_ms, done) = timed_ms(|| map.update(&ground));
         done?;
         if round > 0 {
             let round_ms = [full_ms, changed_ms, prior_ms, networks_ms];

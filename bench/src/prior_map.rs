@@ -81,7 +81,7 @@ pub fn measure(request: Request) -> Result<Report, BenchError> {
         done?;
         let block = block(&mut rng);
         roughen(&mut ground, &block, &mut rng);
-        let (part_ms, done) = timed_ms(|| pool.install(|| map.update_dirty(&ground, &block)));
+        let (part_ms, done) = timed_ms(|| pool.install(|| map.update(&ground)));
         done?;
         if round > 0 {
             full_ms.push(whole_ms);

@@ -88,7 +88,7 @@ impl RiskMaker {
         payload: &[[f32; 8]],
     ) -> Result<Result<(), Refusal>, NavigatorError> {
         let Some(next) = payload::surface_map(header, payload) else { return Ok(Err(Refusal::Malformed)) };
-        self.assessor.judge(&surface_header(header), next).map(Ok)
+        self.assessor.judge(&surface_header(header), &next).map(Ok)
     }
 
     /// Number of elements of the message; `None` before the first surface or without a goal.
