@@ -165,7 +165,7 @@ impl<M: Driven> Pilot<M> {
     pub fn answer(&mut self, now_ns: u64, maps: &RiskMessages<'_>) -> DecisionMessage<M::Command> {
         let cycle = self.cycle;
         let chosen = self.choose(now_ns, maps);
-        let used = chosen.and_then(|(author, map)| Some((author, map.header, risk_input(map)?)));
+        let used = chosen.and_then(|(source, map)| Some((source, map.header, risk_input(map)?)));
         if let Some((_, header, _)) = used {
             self.note_map(header.valid_at_ns);
         }
@@ -194,7 +194,7 @@ impl<M: Driven> Pilot<M> {
             decided_at_ns: now_ns,
             odometry: self.ledger.take_count(),
             odometry_at_ns,
-            risk: used.map(|(author, header, _)| (author, header)),
+            risk: used.map(|(source, header, _)| (source, header)),
             held: [id_of(&maps.learned), id_of(&maps.physics)],
             tracks: self.tracks.map_or_else(Default::default, |tracks| tracks.id),
             mission: mission.map_or_else(Default::default, |mission| mission.id),

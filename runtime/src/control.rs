@@ -80,7 +80,7 @@ struct Inputs {
     odometry_at_ns: Option<u64>,
 }
 
-/// The newest map of an author.
+/// The newest map of a source.
 struct MapInput {
     inlet: Inlet<RiskHeader, [f32; 4]>,
     held: Option<Message<RiskHeader, [f32; 4]>>,
