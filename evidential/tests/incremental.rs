@@ -137,6 +137,7 @@ proptest! {
             recentre_m: 0.3,
             fading_m2ps: 1e-4,
             gap_radius_m: 0.2,
+            publish_turns: 2,
             ..ElevationConfig::scaled_to(CAR.length_m)
         };
         let mut elevation = ElevationMap::new(config).unwrap();
