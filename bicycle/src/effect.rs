@@ -206,6 +206,11 @@ impl Effect {
         self.stages().contains(&Stage::Sensors)
     }
 
+    /// Whether it changes how the body moves, whatever the actuators reach and the sensors say.
+    pub fn acts_on_body(&self) -> bool {
+        self.stages().iter().any(|stage| matches!(stage, Stage::Drive | Stage::Motion))
+    }
+
     /// The factor by which the speed that is reached exceeds the one that is commanded.
     pub(crate) fn speed_ratio(&self) -> f64 {
         match self {

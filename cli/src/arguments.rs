@@ -32,7 +32,9 @@ pub use collect::{CollectArguments, CollectMap, CollectSplit, CollectWorld};
 pub use crossings::{BenchCrossingsArguments, CrossingHandling};
 pub use deviation::AskedDeviation;
 pub use drive::{Correct, DriveArguments, MapSource, Method, Pace};
-pub use gap::{GapApplyArguments, GapCommand, GapDiagnoseArguments, GapEffectsArguments};
+pub use gap::{
+    GapApplyArguments, GapCommand, GapDiagnoseArguments, GapEffectsArguments, GapSimulatorArguments,
+};
 pub use gap_check::{GapScoreArguments, GapSealArguments};
 pub use inspect::InspectArguments;
 pub use kernels::{InstructionSet, KernelArguments, ThreadArguments};

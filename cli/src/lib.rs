@@ -80,7 +80,7 @@
 //!
 //! The one binary, `surefoot`: arguments, progress and files around the crates that do the work. [`run`]
 //! reads the arguments, calls the command's handler and turns its result into an exit code: 0 success, 1 the work
-//! failed, 2 bad usage or input. Errors are printed here and nowhere else, one line each.
+//! failed, 2 bad usage or input, 3 a limit that was asked for is exceeded. Errors are printed here and nowhere else, one line each.
 
 pub mod arguments;
 mod bench;
@@ -107,7 +107,7 @@ use clap::error::ErrorKind;
 use navigator::Order;
 
 use arguments::{Arguments, BenchCommand, Command, TrainCommand};
-pub use failure::{UsageError, WorkFailed};
+pub use failure::{LimitExceeded, UsageError, WorkFailed};
 
 /// Runs the command line of this process.
 pub fn run() -> ExitCode {

@@ -12,6 +12,7 @@ fn named(id: &str, parameters: &[(&str, f64)]) -> NamedEffect {
 
 fn answer(verdict: Verdict, effects: Vec<NamedEffect>) -> Answer {
     Answer {
+        schema_version: sim_to_real::SCHEMA_VERSION,
         case: "c".to_owned(),
         steering: Steering::Angle,
         verdict,
@@ -31,6 +32,8 @@ fn answer(verdict: Verdict, effects: Vec<NamedEffect>) -> Answer {
             learned_bound_closed: None,
             position_error_2s_m: None,
         },
+        errors_by_quantity: Vec::new(),
+        in_simulator: None,
         advice: Vec::new(),
     }
 }
