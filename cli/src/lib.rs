@@ -171,6 +171,7 @@ fn dispatch(command: Command) -> anyhow::Result<()> {
         }
         Command::Bench { command: BenchCommand::Crossings(crossings) } => bench::run_crossings(&crossings),
         Command::Bench { command: BenchCommand::Plant(plant) } => bench::run_plant(&plant),
+        Command::Bench { command: BenchCommand::Scaling(scaling) } => bench::run_scaling(&scaling),
         Command::Bench { command: BenchCommand::Gap(gap) } => bench::run_gap(&gap),
         Command::Bench { command: BenchCommand::Learning(learning) } => bench::run_learning(&learning),
         Command::Bench { command: BenchCommand::Navigation(navigation) } => {

@@ -208,15 +208,15 @@ impl BeliefMap {
         self.layers.fusion.per_level = level.reciprocal();
     }
 
-    /// Takes over the whole surface and judges every pose. What lies beyond the surface's window is unknown.
+    /// Takes over the whole surface and judges every pose. What lies beyond the surface's window is unknown. Returns how
+    /// many poses were judged.
     ///
     /// # Errors
     /// The surface has another resolution than the map was made for.
-    pub fn update_all(&mut self, surface: &GridMap<SurfaceCell>) -> Result<(), BeliefMapError> {
+    pub fn update_all(&mut self, surface: &GridMap<SurfaceCell>) -> Result<usize, BeliefMapError> {
         self.layers.field.read_all(surface)?;
         self.layers.ground.read(surface);
-        self.fill(surface);
-        Ok(())
+        Ok(self.fill(surface))
     }
 
     /// Takes over a surface and judges anew only the poses that read something which changed since the last update; the

@@ -71,7 +71,7 @@ impl RiskEstimator {
     pub fn update_all(&mut self, surface: &GridMap<SurfaceCell>) -> Result<(), BeliefMapError> {
         match self {
             Self::Prior(map) => Ok(map.update_all(surface)?),
-            Self::Networks(map) => map.update_all(surface),
+            Self::Networks(map) => map.update_all(surface).map(drop),
         }
     }
 
