@@ -11,8 +11,8 @@ use iceoryx2::prelude::ZeroCopySend;
 
 use crate::message::{
     CheckpointHeader, CommandRecord, DecisionRecord, ImuRecord, MissionRecord, OdometryRecord, OrderHeader,
-    PointRecord, RiskHeader, ScanHeader, Stamp, StatusRecord, StuckRecord, SurfaceHeader, TrackRecord,
-    TracksHeader,
+    PlanRecord, PointRecord, RiskHeader, ScanHeader, Stamp, StatusRecord, StuckRecord, SurfaceHeader,
+    TrackRecord, TracksHeader,
 };
 use crate::payload;
 pub use bus::{Bus, Cleared, RunName, RunNameError};
@@ -100,6 +100,10 @@ pub const COMMAND: Channel<Stamp, CommandRecord> =
 /// What each decision was made from: control.
 pub const DECISION: Channel<Stamp, DecisionRecord> =
     Channel { name: "decision", depth: 16, history: 0, n_readers: 2, check: payload::check_anything };
+/// The way that the last command begins, one place for each step of the plan, the vehicle's own first: control, with
+/// every command to drive.
+pub const PLAN: Channel<Stamp, PlanRecord> =
+    Channel { name: "plan", depth: 1, history: 0, n_readers: 1, check: payload::check_plan };
 /// Where the vehicle got stuck: control.
 pub const STUCK: Channel<Stamp, StuckRecord> =
     Channel { name: "stuck", depth: 8, history: 0, n_readers: 3, check: payload::check_stuck };

@@ -285,6 +285,18 @@ record! {
 }
 
 record! {
+    /// A place of the way that is meant to be driven.
+    PlanRecord = "surefoot.Plan" {
+        /// Rear axle's centre in the frame of the map that it was planned on, east and north [m].
+        position_m: [f64; 2],
+        /// Heading [rad].
+        yaw_rad: f64,
+        /// Speed there [m/s].
+        speed_mps: f64,
+    }
+}
+
+record! {
     /// Where the vehicle got stuck.
     StuckRecord = "surefoot.Stuck" {
         /// Rear axle's centre [m].
@@ -369,7 +381,7 @@ record! {
 record! {
     /// How a process is doing, twice a second.
     StatusRecord = "surefoot.Status" {
-        /// 1 plant, 2 mapping, 3 learning, 4 control, 5 recorder, 6 mission.
+        /// 1 plant, 2 mapping, 3 learning, 4 control, 5 recorder, 6 mission, 7 ros.
         role: u64,
         /// Process id.
         process: u64,
@@ -387,7 +399,7 @@ record! {
         n_refused: u64,
         /// Looks at a channel that the transport broke off.
         n_failed: u64,
-        /// Figure of the role's own: speed [m/s], jumps made out, futures sampled, recorded bytes.
+        /// Figure of the role's own: speed [m/s], jumps made out, futures sampled, recorded bytes, messages of the robot.
         figure: f64,
     }
 }
@@ -408,6 +420,7 @@ pub fn layouts() -> Vec<RecordLayout> {
         RiskHeader::layout(),
         CommandRecord::layout(),
         DecisionRecord::layout(),
+        PlanRecord::layout(),
         StuckRecord::layout(),
         MissionRecord::layout(),
         OrderHeader::layout(),

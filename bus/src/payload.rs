@@ -9,7 +9,7 @@ use xxhash_rust::xxh3::xxh3_64;
 use crate::message::{RiskHeader, SurfaceHeader};
 pub(crate) use check::{
     check_anything, check_checkpoint, check_command, check_imu, check_mission, check_odometry, check_order,
-    check_risk, check_scan, check_stuck, check_surface, check_tracks,
+    check_plan, check_risk, check_scan, check_stuck, check_surface, check_tracks,
 };
 
 /// Yaw bins beyond which nobody believes a map.
@@ -154,8 +154,8 @@ mod tests {
     use super::*;
     use crate::channel::{FUTURE_NS, Refusal};
     use crate::message::{
-        CheckpointHeader, CommandRecord, Grid, ImuRecord, MissionRecord, OrderHeader, PointRecord,
-        ScanHeader, Stamp, StuckRecord, TRACKS_MAX, TrackRecord, TracksHeader,
+        CheckpointHeader, CommandRecord, Grid, ImuRecord, MissionRecord, OrderHeader, PlanRecord,
+        PointRecord, ScanHeader, Stamp, StuckRecord, TRACKS_MAX, TrackRecord, TracksHeader,
     };
     use traversability::{GroundFlags, RiskMap};
 
@@ -290,6 +290,18 @@ mod tests {
         assert_eq!(check_stuck(&stamp, &[lost]), Err(Refusal::NonFinite));
         let nowhere = MissionRecord { goal_m: [0.0, f64::NAN], ..MissionRecord::default() };
         assert_eq!(check_mission(&stamp, &[nowhere]), Err(Refusal::NonFinite));
+    }
+
+    #[test]
+    fn a_plan_is_places_of_numbers() {
+        let (stamp, place) = (Stamp::default(), PlanRecord::default());
+        assert_eq!(check_plan(&stamp, &[place, place]), Ok(()));
+        assert_eq!(check_plan(&stamp, &[]), Err(Refusal::Malformed));
+        let nowhere = PlanRecord { position_m: [0.0, f64::NAN], ..place };
+        let wild = PlanRecord { speed_mps: f64::INFINITY, ..place };
+        for broken in [nowhere, wild] {
+            assert_eq!(check_plan(&stamp, &[place, broken]), Err(Refusal::NonFinite));
+        }
     }
 
     #[test]

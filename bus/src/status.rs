@@ -22,11 +22,16 @@ pub enum Role {
     Recorder,
     /// Orders to what the vehicle is told to do.
     Mission,
+    /// The topics of a robot that speaks ROS 2.
+    Ros,
 }
 
 impl Role {
     /// All of them.
-    pub const ALL: [Self; 6] =
+    pub const ALL: [Self; 7] =
+        [Self::Plant, Self::Mapping, Self::Learning, Self::Control, Self::Recorder, Self::Mission, Self::Ros];
+    /// Those of a run whose vehicle is simulated.
+    pub const SIMULATED: [Self; 6] =
         [Self::Plant, Self::Mapping, Self::Learning, Self::Control, Self::Recorder, Self::Mission];
 
     /// Name on the command line.
@@ -38,6 +43,7 @@ impl Role {
             Self::Control => "control",
             Self::Recorder => "recorder",
             Self::Mission => "mission",
+            Self::Ros => "ros",
         }
     }
 
@@ -50,6 +56,7 @@ impl Role {
             Self::Control => "status_control",
             Self::Recorder => "status_recorder",
             Self::Mission => "status_mission",
+            Self::Ros => "status_ros",
         })
     }
 }

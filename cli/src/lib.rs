@@ -30,6 +30,7 @@
 //! - [`bus`]: the contract with a vehicle: messages in shared memory, channels, ages, watchdog.
 //! - [`runtime`]: the chain as processes over these channels, with recorder and replay.
 //! - [`simulator`]: the simulated vehicle as one driver of that contract.
+//! - [`ros`](::ros): a robot's topics in ROS 2 as another.
 //! - [`sim_to_real`]: which effect separates recorded drives of a robot from those of its simulator.
 //! - [`formats`]: every file that is read or written.
 //! - [`python`](../surefoot_native/index.html): the planner as a wheel for Python, over NumPy arrays.
@@ -58,6 +59,7 @@
 //! | send and read messages of a run | `cargo run -p bus --example publish_and_read` |
 //! | learn how old messages may be | `cargo run -p runtime --example limits_of_rates` |
 //! | command the simulated vehicle from a program of your own | `cargo run -p simulator --example command_the_plant` |
+//! | read a point cloud of ROS 2 | `cargo run -p ros --example read_a_cloud` |
 //! | draw a drive of your own | `cargo run -p report --example draw_a_drive` |
 //! | find out why simulator and robot disagree | `cargo run -p sim_to_real --example diagnose_a_delay` |
 //!

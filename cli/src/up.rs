@@ -4,6 +4,7 @@ mod learn;
 mod live;
 mod robot;
 mod roles;
+mod ros;
 
 use std::ffi::OsString;
 use std::path::Path;
@@ -77,6 +78,7 @@ fn refuse_what_concerns_another_role(arguments: &UpArguments) -> Result<(), Usag
                 UpRole::Control,
                 UpRole::Recorder,
                 UpRole::Mission,
+                UpRole::Ros,
             ],
         ),
     ];

@@ -361,6 +361,20 @@ static_assert(offsetof(SurefootDecisionRecord, planned_steering_rad) == 276, "De
 static_assert(offsetof(SurefootDecisionRecord, duration_ns) == 280, "DecisionRecord.duration_ns");
 static_assert(offsetof(SurefootDecisionRecord, lateness_ns) == 288, "DecisionRecord.lateness_ns");
 
+/* A place of the way that is meant to be driven. Known to the channels as surefoot.Plan. */
+typedef struct SurefootPlanRecord {
+    /* Rear axle's centre in the frame of the map that it was planned on, east and north [m]. */
+    double position_m[2];
+    /* Heading [rad]. */
+    double yaw_rad;
+    /* Speed there [m/s]. */
+    double speed_mps;
+} SurefootPlanRecord;
+static_assert(sizeof(SurefootPlanRecord) == 32, "PlanRecord");
+static_assert(offsetof(SurefootPlanRecord, position_m) == 0, "PlanRecord.position_m");
+static_assert(offsetof(SurefootPlanRecord, yaw_rad) == 16, "PlanRecord.yaw_rad");
+static_assert(offsetof(SurefootPlanRecord, speed_mps) == 24, "PlanRecord.speed_mps");
+
 /* Where the vehicle got stuck. Known to the channels as surefoot.Stuck. */
 typedef struct SurefootStuckRecord {
     /* Rear axle's centre [m]. */
@@ -470,7 +484,7 @@ static_assert(offsetof(SurefootCheckpointHeader, original_emd2) == 88, "Checkpoi
 
 /* How a process is doing, twice a second. Known to the channels as surefoot.Status. */
 typedef struct SurefootStatusRecord {
-    /* 1 plant, 2 mapping, 3 learning, 4 control, 5 recorder, 6 mission. */
+    /* 1 plant, 2 mapping, 3 learning, 4 control, 5 recorder, 6 mission, 7 ros. */
     uint64_t role;
     /* Process id. */
     uint64_t process;
@@ -488,7 +502,7 @@ typedef struct SurefootStatusRecord {
     uint64_t n_refused;
     /* Looks at a channel that the transport broke off. */
     uint64_t n_failed;
-    /* Figure of the role's own: speed [m/s], jumps made out, futures sampled, recorded bytes. */
+    /* Figure of the role's own: speed [m/s], jumps made out, futures sampled, recorded bytes, messages of the robot. */
     double figure;
 } SurefootStatusRecord;
 static_assert(sizeof(SurefootStatusRecord) == 112, "StatusRecord");

@@ -475,6 +475,29 @@ assert DecisionRecord.duration_ns.offset == 280
 assert DecisionRecord.lateness_ns.offset == 288
 
 
+class PlanRecord(ctypes.Structure):
+    """A place of the way that is meant to be driven."""
+
+    _fields_ = [
+        # Rear axle's centre in the frame of the map that it was planned on, east and north [m].
+        ("position_m", ctypes.c_double * 2),
+        # Heading [rad].
+        ("yaw_rad", ctypes.c_double),
+        # Speed there [m/s].
+        ("speed_mps", ctypes.c_double),
+    ]
+
+    @staticmethod
+    def type_name() -> str:
+        return "surefoot.Plan"
+
+
+assert ctypes.sizeof(PlanRecord) == 32
+assert PlanRecord.position_m.offset == 0
+assert PlanRecord.yaw_rad.offset == 16
+assert PlanRecord.speed_mps.offset == 24
+
+
 class StuckRecord(ctypes.Structure):
     """Where the vehicle got stuck."""
 
@@ -622,7 +645,7 @@ class StatusRecord(ctypes.Structure):
     """How a process is doing, twice a second."""
 
     _fields_ = [
-        # 1 plant, 2 mapping, 3 learning, 4 control, 5 recorder, 6 mission.
+        # 1 plant, 2 mapping, 3 learning, 4 control, 5 recorder, 6 mission, 7 ros.
         ("role", ctypes.c_uint64),
         # Process id.
         ("process", ctypes.c_uint64),
@@ -640,7 +663,7 @@ class StatusRecord(ctypes.Structure):
         ("n_refused", ctypes.c_uint64),
         # Looks at a channel that the transport broke off.
         ("n_failed", ctypes.c_uint64),
-        # Figure of the role's own: speed [m/s], jumps made out, futures sampled, recorded bytes.
+        # Figure of the role's own: speed [m/s], jumps made out, futures sampled, recorded bytes, messages of the robot.
         ("figure", ctypes.c_double),
     ]
 

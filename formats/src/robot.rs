@@ -1,5 +1,7 @@
 //! A robot in TOML: what it is, which processes of it run here, how often and how late they may speak, where it may be.
 
+mod ros;
+
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
@@ -7,6 +9,7 @@ use serde::Deserialize;
 use terrain::Mount;
 
 use crate::{ConfigError, ConfigText, shipped_vehicle_text};
+pub use ros::{RobotRos, RosClock, RosCommand, RosLabels, RosTopics};
 
 /// Version of the robot files that this program reads.
 const FORMAT: u32 = 1;
@@ -52,6 +55,8 @@ pub struct RobotFile {
     /// Limits below those of the machine.
     #[serde(default)]
     pub safety: RobotSafety,
+    /// Its topics, where it speaks ROS 2.
+    pub ros: Option<RobotRos>,
 }
 
 /// How the ground is judged.
@@ -191,6 +196,9 @@ pub fn parse_robot(text: &ConfigText) -> Result<RobotFile, ConfigError> {
     if let Some((field, found)) = robot.first_not_positive() {
         return Err(text.refuse(field, "a finite number > 0", found));
     }
+    if let Some(ros) = &robot.ros {
+        ros.check(text)?;
+    }
     for (place, RobotSensor { name, mount }) in robot.sensors.iter().enumerate() {
         let field = |field: &str| format!("sensors[{place}].{field}");
         if robot.sensors[..place].iter().any(|before| before.name == *name) {
@@ -299,6 +307,12 @@ keep_out_m = [[[3.0, 0.0], [4.0, 0.0], [4.0, 1.0]]]
 
 [safety]
 speed_max_mps = 0.8
+
+[ros]
+vehicle_frame = "rear_axle"
+command = "twist"
+labels = { field = "label", open = [1, 40] }
+topics = { points = ["front/points", "rear/points"], pause = "" }
 "#;
 
     fn told(text: &str) -> String {
@@ -318,8 +332,19 @@ speed_max_mps = 0.8
         assert_eq!(robot.sensors[1].mount.own_body[0].max_m, [0.0, 0.3, 0.5]);
         assert_eq!((robot.mission.goals_m.len(), robot.areas.keep_out_m[0].len()), (2, 3));
         assert_eq!(robot.safety, RobotSafety { speed_max_mps: Some(0.8), ..RobotSafety::default() });
+        let ros = robot.ros.unwrap();
+        assert_eq!((ros.vehicle_frame.as_str(), ros.command), ("rear_axle", RosCommand::Twist));
+        assert_eq!((ros.topics.points.len(), ros.topics.odometry.as_str()), (2, "odom"));
+        assert_eq!(ros.labels.unwrap().open, [1, 40]);
         let shipped = parse_robot(&ConfigText::new("r", "format = 1\nvehicle = \"rc_car\"")).unwrap();
         assert_eq!(shipped.relative_to(folder.path()).vehicle, "rc_car");
+    }
+
+    #[test]
+    fn the_robot_of_ros_that_comes_along_says_what_is_so_without_a_word() {
+        let text = include_str!("../../examples/ros/robot.toml");
+        let robot = parse_robot(&ConfigText::new("robot.toml", text)).unwrap();
+        assert_eq!(robot.ros, Some(RobotRos::default()));
     }
 
     #[test]
@@ -341,6 +366,13 @@ speed_max_mps = 0.8
             lost.contains("sensors[1].mount.attitude_rad: expected a finite number, found inf"),
             "{lost}"
         );
+        let ros = |from: &str, to: &str| told(&WHOLE.replace(from, to));
+        let slow = ros("command = \"twist\"", "command_hz = 0.5");
+        assert_eq!(slow, "robot.toml:44: ros.command_hz: expected a number from 1 to 200, found 0.5");
+        assert!(ros("command = \"twist\"", "domain_id = 233").contains("ros.domain_id: expected 0 to 232"));
+        assert!(ros("\"rear_axle\"", "\"\"").contains("ros.vehicle_frame: expected a name, found none"));
+        assert!(ros("command = \"twist\"", "namespace = \"car\"").contains("begins with a slash"));
+        assert!(ros("\"twist\"", "\"steering\"").contains("ros.command"));
         let unknown = told(&WHOLE.replace("speed_max_mps", "top_speed"));
         assert!(unknown.contains("safety.top_speed") && unknown.contains("an unknown key"), "{unknown}");
         assert!(told("format = 1").contains("vehicle"));

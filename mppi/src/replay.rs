@@ -26,7 +26,12 @@ impl<M: Driven, S: StepCost, R: RolloutCost> Controller<M, S, R> {
 
     /// Where the plan leads over `map`, the predicted start first.
     pub fn nominal_trajectory(&self, map: RiskMapView<'_>) -> Vec<M::State> {
-        self.trajectory(map, self.plan.nominal.iter().copied())
+        self.nominal_states(map).collect()
+    }
+
+    /// The same, state by state as they are asked for. Allocates nothing.
+    pub fn nominal_states<'a>(&'a self, map: RiskMapView<'a>) -> impl Iterator<Item = M::State> + 'a {
+        self.states(map, self.plan.nominal.iter().copied())
     }
 
     /// The `n` cheapest rollouts of the last cycle over `map`, the cheapest first.
@@ -39,19 +44,23 @@ impl<M: Driven, S: StepCost, R: RolloutCost> Controller<M, S, R> {
         let rollout = |&(cost_s, index, lane): &(f32, usize, usize)| {
             let chunk = &self.chunks[index];
             let weight = chunk.weights.0[lane] / self.diagnostics().normalizer;
-            Rollout { cost_s, weight, states: self.trajectory(map, chunk.controls_of(lane)) }
+            Rollout { cost_s, weight, states: self.states(map, chunk.controls_of(lane)).collect() }
         };
         order.iter().take(n).map(rollout).collect()
     }
 
-    fn trajectory(&self, map: RiskMapView<'_>, controls: impl Iterator<Item = Control>) -> Vec<M::State> {
+    fn states<'a>(
+        &'a self,
+        map: RiskMapView<'a>,
+        controls: impl Iterator<Item = Control> + 'a,
+    ) -> impl Iterator<Item = M::State> + 'a {
         let judge = self.judge_over(map);
         let mut memory = self.slots.map(f64::from);
-        let walk = |state: &mut MotionState, (t, control)| {
+        let walk = move |state: &mut MotionState, (t, control)| {
             *state = judge.step(state, control, &mut memory, t);
             Some(M::State::from(*state))
         };
         let led_to = controls.enumerate().scan(self.start, walk);
-        std::iter::once(self.start.into()).chain(led_to).collect()
+        std::iter::once(self.start.into()).chain(led_to)
     }
 }

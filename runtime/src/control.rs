@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
-use bicycle::{Decision, ImuSample, Model};
-use navigator::{Config, Pilot, PilotAges, RiskMessage, RiskMessages};
+use bicycle::{Decision, ImuSample, Model, State};
+use navigator::{Config, Pilot, PilotAges, RiskMapSource, RiskMessage, RiskMessages};
 
 use crate::RuntimeError;
 use crate::budget::Budget;
@@ -12,14 +12,15 @@ use crate::convert::{
 };
 use bus::ages::AgeLimits;
 use bus::channel::{
-    Bus, COMMAND, Counts, DECISION, IMU, Inlet, MISSION, Message, ODOMETRY, Outlet, RISK, RISK_PHYSICS,
+    Bus, COMMAND, Counts, DECISION, IMU, Inlet, MISSION, Message, ODOMETRY, Outlet, PLAN, RISK, RISK_PHYSICS,
     STUCK, TRACKS,
 };
 use bus::clock::{self, Clock, Cycle};
 use bus::message::{
-    CommandRecord, DecisionRecord, ImuRecord, MissionRecord, OdometryRecord, RiskHeader, Stamp, StuckRecord,
-    TrackRecord, TracksHeader,
+    CommandRecord, DecisionRecord, ImuRecord, MissionRecord, OdometryRecord, PlanRecord, RiskHeader, Stamp,
+    StuckRecord, TrackRecord, TracksHeader,
 };
+use bus::payload::risk_views;
 use bus::status::{Health, Meter, Role};
 
 /// Share of the period that a decision may take; the rest is for what else the processor does.
@@ -64,6 +65,7 @@ pub struct Control {
     inputs: Inputs,
     commands: Outlet<Stamp, CommandRecord>,
     decisions: Outlet<Stamp, DecisionRecord>,
+    plans: Outlet<Stamp, PlanRecord>,
     stuck: Outlet<Stamp, StuckRecord>,
     meter: Meter,
 }
@@ -147,7 +149,7 @@ impl Control {
     /// A channel that cannot be used, settings that cannot be.
     pub fn new(bus: &Bus, setup: ControlSetup) -> Result<Self, RuntimeError> {
         let ControlSetup { model, config, corrector, seed, period_s, ages } = setup;
-        let n_max = config.controller.n_rollouts;
+        let (n_max, n_steps) = (config.controller.n_rollouts, config.controller.n_steps);
         let ages = PilotAges { learned_ns: ages.learned_ns, mission_ns: ages.mission_ns };
         let pilot = Pilot::new(model, &config, seed)?.with_ages(ages);
         let pilot = match &corrector {
@@ -161,6 +163,7 @@ impl Control {
             pilot,
             commands: bus.outlet(&COMMAND, 1)?,
             decisions: bus.outlet(&DECISION, 1)?,
+            plans: bus.outlet(&PLAN, n_steps + 1)?,
             stuck: bus.outlet(&STUCK, 1)?,
             meter: Meter::new(bus, Role::Control)?,
         })
@@ -182,11 +185,36 @@ impl Control {
         self.commands.send_one(Stamp::default(), record.command, began_ns)?;
         let record = DecisionRecord { duration_ns: self.clock.now_ns() - began_ns, lateness_ns, ..record };
         self.decisions.send_one(Stamp::default(), record, began_ns)?;
+        if matches!(answer.decision, Decision::Drive(_))
+            && let Some((author, _)) = answer.risk
+        {
+            self.tell_plan(author, began_ns)?;
+        }
         if let Some((at_ns, pose)) = answer.stuck {
             let record = StuckRecord { position_m: pose.position_m, yaw_rad: pose.yaw_rad };
             self.stuck.send_one(Stamp::default(), record, at_ns)?;
         }
         Ok(())
+    }
+
+    /// Where the plan leads over the map that it was made on.
+    fn tell_plan(&mut self, author: RiskMapSource, at_ns: u64) -> Result<(), RuntimeError> {
+        let Inputs { learned, physics, .. } = &self.inputs;
+        let map = match author {
+            RiskMapSource::Learned => learned,
+            RiskMapSource::Physics => physics,
+        };
+        let views = map.held.as_ref().and_then(|map| risk_views(map.header(), map.payload()));
+        let Some((view, _)) = views else { return Ok(()) };
+        let mut states = self.pilot.controller().nominal_states(view);
+        let place = |state: State| PlanRecord {
+            position_m: [state.x_m, state.y_m],
+            yaw_rad: state.yaw_rad,
+            speed_mps: state.speed_mps,
+        };
+        // There is one state more than steps, as many as there is room for.
+        let loan = self.plans.write(self.plans.n_max(), |_| states.next().map(place).unwrap_or_default())?;
+        Ok(self.plans.send(loan, at_ns).map(drop)?)
     }
 
     fn report(&mut self, lateness_ns: u64, n_missed: u64) -> Result<(), RuntimeError> {

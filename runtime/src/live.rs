@@ -32,13 +32,14 @@ const MAP_NS: u64 = SECOND_NS / 2;
 /// Messages that wait for a client; of more, the oldest is dropped.
 const BACKLOG: usize = 64;
 /// Topics of the statuses, by [`Role::ALL`].
-const STATUS_TOPICS: [&str; 6] = [
+const STATUS_TOPICS: [&str; 7] = [
     "/status/plant",
     "/status/mapping",
     "/status/learning",
     "/status/control",
     "/status/recorder",
     "/status/mission",
+    "/status/ros",
 ];
 
 /// Serves a live view on this address until `is_over` says to end; `tell` hears where.

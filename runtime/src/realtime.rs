@@ -21,7 +21,7 @@ pub fn configure_thread(role: Role) -> String {
 fn priority(role: Role) -> Option<u8> {
     match role {
         Role::Control => Some(50),
-        Role::Plant => Some(45),
+        Role::Plant | Role::Ros => Some(45),
         Role::Mapping | Role::Mission => Some(40),
         Role::Learning | Role::Recorder => None,
     }

@@ -343,6 +343,7 @@ impl std::fmt::Display for StatusLine {
             Role::Control => &["odometry", "learned map", "physics map", "mission"],
             Role::Recorder => &[],
             Role::Mission => &["odometry"],
+            Role::Ros => &["command", "odometry", "scan"],
         };
         write!(formatter, "{:9}", self.role.name())?;
         let Some((age_s, status)) = self.status.filter(|_| self.process.is_some()) else {

@@ -8,8 +8,9 @@ use super::risk_views;
 use crate::channel::{FUTURE_NS, Refusal};
 use crate::message::mission::EMERGENCY_STOP;
 use crate::message::{
-    CheckpointHeader, CommandRecord, ImuRecord, MissionRecord, OdometryRecord, OrderHeader, PointRecord,
-    RiskHeader, ScanHeader, Stamp, StuckRecord, SurfaceHeader, TRACKS_MAX, TrackRecord, TracksHeader,
+    CheckpointHeader, CommandRecord, ImuRecord, MissionRecord, OdometryRecord, OrderHeader, PlanRecord,
+    PointRecord, RiskHeader, ScanHeader, Stamp, StuckRecord, SurfaceHeader, TRACKS_MAX, TrackRecord,
+    TracksHeader,
 };
 
 fn check_one<T>(payload: &[T]) -> Result<&T, Refusal> {
@@ -56,6 +57,15 @@ pub(crate) fn check_imu(stamp: &Stamp, samples: &[ImuRecord]) -> Result<(), Refu
 /// Some points may be no numbers, as sensors give them; the map drops these.
 pub(crate) fn check_scan(header: &ScanHeader, _: &[PointRecord]) -> Result<(), Refusal> {
     require(header.origin_m.iter().all(|value| value.is_finite()), Refusal::NonFinite)
+}
+
+pub(crate) fn check_plan(_: &Stamp, places: &[PlanRecord]) -> Result<(), Refusal> {
+    require(!places.is_empty(), Refusal::Malformed)?;
+    let is_finite = |place: &PlanRecord| {
+        let [x_m, y_m] = place.position_m;
+        [x_m, y_m, place.yaw_rad, place.speed_mps].iter().all(|value| value.is_finite())
+    };
+    require(places.iter().all(is_finite), Refusal::NonFinite)
 }
 
 pub(crate) fn check_surface(header: &SurfaceHeader, payload: &[[f32; 8]]) -> Result<(), Refusal> {

@@ -179,6 +179,8 @@ pub enum UpRole {
     Recorder,
     /// Orders to what the vehicle is told to do
     Mission,
+    /// A ROS 2 node that is the driver of the robot in --robot, by the part `ros` of its file
+    Ros,
     /// The live view that `--live` serves
     Live,
 }
@@ -203,6 +205,7 @@ impl UpRole {
             Self::Control => Some(Role::Control),
             Self::Recorder => Some(Role::Recorder),
             Self::Mission => Some(Role::Mission),
+            Self::Ros => Some(Role::Ros),
         }
     }
 }

@@ -41,6 +41,8 @@ pub(super) fn described(arguments: &UpArguments) -> Result<UpArguments, UsageErr
     arguments.odometry_rate = rates.odometry_hz.unwrap_or(arguments.odometry_rate);
     arguments.scan_rate = rates.scan_hz.unwrap_or(arguments.scan_rate);
     arguments.third_parties = robot.third_parties.unwrap_or(arguments.third_parties);
+    // The node shows maps that no other driver reads.
+    arguments.third_parties += usize::from(robot.ros.is_some());
     let drive = &mut arguments.drive;
     drive.vehicle = Some(robot.vehicle.clone());
     (drive.model, drive.config) = (robot.model.clone(), robot.config.clone());
@@ -80,12 +82,13 @@ fn refuse_other_roles(arguments: &UpArguments) -> Result<(), UsageError> {
 
 /// The processes that are to run here: of a robot, those that its file names, and never a simulated vehicle.
 pub(super) fn roles(arguments: &UpArguments) -> Result<Vec<Role>, UsageError> {
-    let all = || Ok(Role::ALL.to_vec());
+    let all = || Ok(Role::SIMULATED.to_vec());
     arguments.described.as_ref().map_or_else(all, |robot| roles_of(robot).map_err(UsageError))
 }
 
 fn roles_of(robot: &RobotFile) -> Result<Vec<Role>, String> {
-    let own: Vec<Role> = Role::ALL.into_iter().filter(|role| *role != Role::Plant).collect();
+    let is_own = |role: &Role| *role != Role::Plant && (*role != Role::Ros || robot.ros.is_some());
+    let own: Vec<Role> = Role::ALL.into_iter().filter(is_own).collect();
     let Some(names) = &robot.roles else { return Ok(own) };
     let named = |name: &String| {
         let names = || own.iter().map(|role| role.name()).collect::<Vec<_>>().join(", ");

@@ -22,7 +22,7 @@ use std::ffi::OsString;
 use std::sync::Arc;
 use traversability::CvarLevel;
 
-use super::{learn, robot};
+use super::{learn, robot, ros};
 use crate::arguments::UpArguments;
 use crate::drive::scene::{self, Machine};
 use crate::summary::revision;
@@ -176,6 +176,7 @@ pub(super) fn run(arguments: &UpArguments, role: Role) -> anyhow::Result<()> {
             control::run(&join(arguments)?, setup, is_over)?;
         }
         Role::Mission => run_mission(arguments, &machine, ages)?,
+        Role::Ros => ros::run(arguments, &machine, ages)?,
         Role::Recorder => {
             let setup = recorder_setup(arguments, machine, ages)?;
             std::fs::create_dir_all(&setup.folder)?;

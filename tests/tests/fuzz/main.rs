@@ -85,6 +85,7 @@ targets! {
     mission: 512, 0, 4 * MB, messages::mission, messages::read_mission;
     order: 4096, 64, 64 * KB, messages::order, messages::read_order;
     stuck: 512, 0, 4 * MB, messages::stuck, messages::read_stuck;
+    plan: 512, 0, 4 * MB, messages::plan, messages::read_plan;
     status: 8192, 0, 64 * KB, messages::status, messages::read_status;
     learned: 4096, 64, 64 * KB, messages::learned, messages::read_learned;
 }

@@ -9,8 +9,8 @@ use bus::channel::{self, Channel, Element, Header};
 use bus::layout::Scalar;
 use bus::message::{
     CheckpointHeader, CommandRecord, DecisionRecord, Grid, ImuRecord, MissionRecord, OdometryRecord,
-    OrderHeader, RiskHeader, ScanHeader, StatusRecord, StuckRecord, SurfaceHeader, TrackRecord, TracksHeader,
-    layouts,
+    OrderHeader, PlanRecord, RiskHeader, ScanHeader, StatusRecord, StuckRecord, SurfaceHeader, TrackRecord,
+    TracksHeader, layouts,
 };
 use bus::payload::{RiskParts, surface_map};
 use bus::status::Role;
@@ -454,6 +454,21 @@ pub fn read_stuck() -> Reader {
         let (header, cells) = drive.surface();
         maker.update(header, cells).unwrap().unwrap();
         Drive::risk_of(&mut maker).unwrap();
+    })
+}
+
+static PLAN: LazyLock<Whole> = LazyLock::new(|| {
+    let place = PlanRecord { position_m: [2.0, 2.0], yaw_rad: 0.3, speed_mps: 1.0 };
+    Whole::one(place, "PlanRecord")
+});
+
+pub fn plan(rng: &mut Rng) -> Vec<u8> {
+    PLAN.broken(rng)
+}
+
+pub fn read_plan() -> Reader {
+    reader(channel::PLAN, |_, places: &[PlanRecord]| {
+        assert!(places.iter().all(|place| place.yaw_rad.is_finite()));
     })
 }
 

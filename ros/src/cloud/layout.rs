@@ -1,0 +1,206 @@
+//! Where the numbers of a cloud's points lie.
+
+use crate::message::{PointCloud2, PointField};
+
+/// Points of a cloud at the most: some ten times what the largest sensors send.
+const POINTS_MAX: usize = 1 << 24;
+
+/// Why a cloud cannot be read. Every message is one line.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum LayoutError {
+    /// A field is missing.
+    #[error("fields: expected one named {expected:?}, found {}", names(.found))]
+    NoField {
+        /// What it has to be called.
+        expected: String,
+        /// What there is.
+        found: Vec<String>,
+    },
+    /// A field is of no kind of number, or of several.
+    #[error("field {name:?}: expected one number of datatype 1 to 8, found {count} of datatype {datatype}")]
+    Kind {
+        /// Its name.
+        name: String,
+        /// What it says.
+        datatype: u8,
+        /// How many of them.
+        count: u32,
+    },
+    /// A field reaches beyond its point.
+    #[error("field {name:?}: expected to end within the {step} bytes of a point, found it to end at {end}")]
+    Beyond {
+        /// Its name.
+        name: String,
+        /// Bytes of a point.
+        step: u32,
+        /// Where it ends.
+        end: u64,
+    },
+    /// Rows are shorter than their points.
+    #[error("row_step: expected at least {expected} for {width} points of {step} bytes, found {found}")]
+    Row {
+        /// Bytes that the points take.
+        expected: u64,
+        /// Points of a row.
+        width: u32,
+        /// Bytes of a point.
+        step: u32,
+        /// What it says.
+        found: u32,
+    },
+    /// The data are shorter than the rows.
+    #[error("data: expected {expected} bytes for {height} rows of {row} bytes, found {found}")]
+    Short {
+        /// Bytes that the rows take.
+        expected: u64,
+        /// Rows.
+        height: u32,
+        /// Bytes of a row.
+        row: u32,
+        /// What there is.
+        found: usize,
+    },
+    /// More points than anybody measures.
+    #[error("width x height: expected at most {POINTS_MAX} points, found {found}")]
+    TooMany {
+        /// How many it says.
+        found: u64,
+    },
+}
+
+fn names(found: &[String]) -> String {
+    if found.is_empty() { "none".to_owned() } else { found.join(", ") }
+}
+
+/// A number of every point.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Number {
+    offset: usize,
+    kind: Kind,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Kind {
+    I8,
+    U8,
+    I16,
+    U16,
+    I32,
+    U32,
+    F32,
+    F64,
+}
+
+impl Kind {
+    fn of(datatype: u8) -> Option<Self> {
+        let all = [Self::I8, Self::U8, Self::I16, Self::U16, Self::I32, Self::U32, Self::F32, Self::F64];
+        all.get(usize::from(datatype).wrapping_sub(1)).copied()
+    }
+
+    fn size(self) -> usize {
+        match self {
+            Self::I8 | Self::U8 => 1,
+            Self::I16 | Self::U16 => 2,
+            Self::I32 | Self::U32 | Self::F32 => 4,
+            Self::F64 => 8,
+        }
+    }
+}
+
+/// Where the places of a cloud's points lie, and their labels; everything lies within its data.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Layout {
+    axes: [Number; 3],
+    label: Option<Number>,
+    width: usize,
+    height: usize,
+    point_step: usize,
+    row_step: usize,
+    is_bigendian: bool,
+}
+
+impl Layout {
+    /// The layout of a cloud, with the field of this name as label.
+    pub(super) fn new(cloud: &PointCloud2, label: Option<&str>) -> Result<Self, LayoutError> {
+        let number = |name: &str| number(cloud, name);
+        let layout = Self {
+            axes: [number("x")?, number("y")?, number("z")?],
+            label: label.map(number).transpose()?,
+            width: cloud.width as usize,
+            height: cloud.height as usize,
+            point_step: cloud.point_step as usize,
+            row_step: cloud.row_step as usize,
+            is_bigendian: cloud.is_bigendian,
+        };
+        check_size(cloud)?;
+        Ok(layout)
+    }
+
+    pub(super) fn n_points(&self) -> usize {
+        self.width * self.height
+    }
+
+    /// A point's place [m], and its label.
+    pub(super) fn point(&self, data: &[u8], place: usize) -> ([f32; 3], Option<i64>) {
+        let start = place / self.width * self.row_step + place % self.width * self.point_step;
+        let bytes = &data[start..start + self.point_step];
+        let read = |number: Number| self.number(bytes, number);
+        // A label is a whole number: what is none is that of nothing.
+        (self.axes.map(|axis| read(axis) as f32), self.label.map(|label| read(label) as i64))
+    }
+
+    fn number(&self, point: &[u8], Number { offset, kind }: Number) -> f64 {
+        let size = kind.size();
+        let mut bytes = [0_u8; 8];
+        bytes[..size].copy_from_slice(&point[offset..offset + size]);
+        if self.is_bigendian {
+            bytes[..size].reverse();
+        }
+        let [a, b, c, d, ..] = bytes;
+        match kind {
+            Kind::I8 => f64::from(a as i8),
+            Kind::U8 => f64::from(a),
+            Kind::I16 => f64::from(i16::from_le_bytes([a, b])),
+            Kind::U16 => f64::from(u16::from_le_bytes([a, b])),
+            Kind::I32 => f64::from(i32::from_le_bytes([a, b, c, d])),
+            Kind::U32 => f64::from(u32::from_le_bytes([a, b, c, d])),
+            Kind::F32 => f64::from(f32::from_le_bytes([a, b, c, d])),
+            Kind::F64 => f64::from_le_bytes(bytes),
+        }
+    }
+}
+
+fn number(cloud: &PointCloud2, name: &str) -> Result<Number, LayoutError> {
+    let Some(field) = cloud.fields.iter().find(|field| field.name == name) else {
+        let found = cloud.fields.iter().map(|field| field.name.clone()).collect();
+        return Err(LayoutError::NoField { expected: name.to_owned(), found });
+    };
+    let PointField { offset, datatype, count, .. } = *field;
+    // Some drivers say 0 where they mean one.
+    let kind = Kind::of(datatype).filter(|_| count <= 1);
+    let kind = kind.ok_or_else(|| LayoutError::Kind { name: name.to_owned(), datatype, count })?;
+    let end = u64::from(offset) + kind.size() as u64;
+    if end > u64::from(cloud.point_step) {
+        return Err(LayoutError::Beyond { name: name.to_owned(), step: cloud.point_step, end });
+    }
+    Ok(Number { offset: offset as usize, kind })
+}
+
+/// Everything that the numbers say lies within the data.
+fn check_size(cloud: &PointCloud2) -> Result<(), LayoutError> {
+    let PointCloud2 { width, height, point_step: step, row_step: row, .. } = *cloud;
+    let n_points = u64::from(width) * u64::from(height);
+    if n_points > POINTS_MAX as u64 {
+        return Err(LayoutError::TooMany { found: n_points });
+    }
+    let of_row = u64::from(width) * u64::from(step);
+    if u64::from(row) < of_row {
+        return Err(LayoutError::Row { expected: of_row, width, step, found: row });
+    }
+    // The last row may leave out what lies behind its points.
+    let expected = u64::from(height.saturating_sub(1)) * u64::from(row) + if height > 0 { of_row } else { 0 };
+    if (cloud.data.len() as u64) < expected {
+        return Err(LayoutError::Short { expected, height, row, found: cloud.data.len() });
+    }
+    Ok(())
+}

@@ -1,0 +1,256 @@
+//! What comes from the robot, as the bus says it: frames found, stamps told on the bus's clock, everything checked.
+
+use nalgebra::Isometry3;
+
+use bus::message::{ImuRecord, OdometryRecord};
+
+use crate::cloud::{self, Classes, LayoutError, Sweep};
+use crate::goals::{self, GoalError};
+use crate::message::{Imu, Odometry, Path, PointCloud2, PoseArray, PoseStamped, TfMessage};
+use crate::odometry::{self, Agreement, Disagreement, Frames, OdometryError};
+use crate::rigid::{self, PoseError};
+use crate::stamps::{Arrival, StampClock, StampError};
+use crate::transforms::{TransformError, Transforms};
+
+/// Why a message is not taken over. Every message is one line.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum IntakeError {
+    /// When it was measured cannot be told.
+    #[error(transparent)]
+    Stamp(#[from] StampError),
+    /// It is no odometry of the vehicle.
+    #[error(transparent)]
+    Odometry(#[from] OdometryError),
+    /// Its velocity is of another frame.
+    #[error(transparent)]
+    Disagreement(#[from] Disagreement),
+    /// It is no cloud.
+    #[error(transparent)]
+    Layout(#[from] LayoutError),
+    /// Where it was measured cannot be told.
+    #[error(transparent)]
+    Transform(#[from] TransformError),
+    /// It is no transform of a frame.
+    #[error("frame {frame:?}: {source}")]
+    Frame {
+        /// The frame that it tells of.
+        frame: String,
+        /// Why.
+        source: PoseError,
+    },
+    /// Its numbers are none.
+    #[error(transparent)]
+    Pose(#[from] PoseError),
+    /// It is nowhere to go to.
+    #[error(transparent)]
+    Goal(#[from] GoalError),
+    /// Of a cloud, no point could be used.
+    #[error("data: expected returns of the sensor, found {found} points, none of which is a place")]
+    NoReturn {
+        /// Points of the cloud.
+        found: usize,
+    },
+    /// It is older than one that came before.
+    #[error("stamp: expected one after that of the message before, found one {by_s:.3} s before it")]
+    OutOfOrder {
+        /// By how much [s].
+        by_s: f64,
+    },
+}
+
+/// A scan for the bus.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TakenScan {
+    /// When it was measured [ns].
+    pub at_ns: u64,
+    /// Where its rays start, in the frame of the points [m].
+    pub origin_m: [f32; 3],
+    /// Whose frame that is: 0 = the vehicle's body, else the sensor of this number.
+    pub sensor: u32,
+    /// The points.
+    pub sweep: Sweep,
+}
+
+/// What is known of the robot's frames and clocks.
+#[derive(Clone, Debug)]
+pub struct Intake {
+    frames: Frames,
+    classes: Classes,
+    /// Frames of the sensors that the robot file mounts, numbered from 1.
+    sensors: Vec<String>,
+    clock: StampClock,
+    transforms: Transforms,
+    agreement: Agreement,
+    scanned_at_ns: u64,
+    felt_at_ns: u64,
+}
+
+impl Intake {
+    /// Nothing has come yet.
+    pub fn new(
+        frames: Frames,
+        classes: Classes,
+        sensors: Vec<String>,
+        clock: StampClock,
+        transforms: Transforms,
+    ) -> Self {
+        let agreement = Agreement::default();
+        Self { frames, classes, sensors, clock, transforms, agreement, scanned_at_ns: 0, felt_at_ns: 0 }
+    }
+
+    /// The clock of the robot's stamps.
+    pub fn clock(&self) -> &StampClock {
+        &self.clock
+    }
+
+    /// Where the vehicle is, and when it was there [ns].
+    ///
+    /// # Errors
+    /// See [`IntakeError`].
+    pub fn odometry(
+        &mut self,
+        odometry: &Odometry,
+        arrival: Arrival,
+    ) -> Result<(u64, OdometryRecord), IntakeError> {
+        let at_ns = self.at_ns(odometry.header.stamp.nanoseconds(), arrival)?;
+        let record = odometry::odometry_record(odometry, &self.transforms, &self.frames)?;
+        self.agreement.check(&record, at_ns)?;
+        Ok((at_ns, record))
+    }
+
+    /// A sweep of a sensor: in its own frame where the robot file mounts one of the name of the cloud's frame, else in
+    /// that of the vehicle; of at most `n_max` points.
+    ///
+    /// # Errors
+    /// See [`IntakeError`].
+    pub fn cloud(
+        &mut self,
+        cloud: &PointCloud2,
+        arrival: Arrival,
+        n_max: usize,
+    ) -> Result<TakenScan, IntakeError> {
+        let stamp_ns = cloud.header.stamp.nanoseconds();
+        let at_ns = self.at_ns(stamp_ns, arrival)?;
+        if at_ns < self.scanned_at_ns {
+            return Err(IntakeError::OutOfOrder { by_s: (self.scanned_at_ns - at_ns) as f64 * 1e-9 });
+        }
+        let frame = &cloud.header.frame_id;
+        let (sensor, motion) = match self.sensors.iter().position(|sensor| sensor == frame) {
+            Some(place) => (place as u32 + 1, Isometry3::identity()),
+            None => (0, self.transforms.between(frame, &self.frames.vehicle, stamp_ns)?),
+        };
+        let sweep = cloud::sweep(cloud, &self.classes, &motion, n_max)?;
+        if sweep.points.is_empty() {
+            return Err(IntakeError::NoReturn { found: sweep.n_without_place });
+        }
+        self.scanned_at_ns = at_ns;
+        let origin_m = motion.translation.vector.map(|axis_m| axis_m as f32).into();
+        Ok(TakenScan { at_ns, origin_m, sensor, sweep })
+    }
+
+    /// What the inertial unit feels, in the vehicle's frame. What a lever arm adds is left in: units sit near the middle.
+    ///
+    /// # Errors
+    /// See [`IntakeError`].
+    pub fn imu(&mut self, imu: &Imu, arrival: Arrival) -> Result<ImuRecord, IntakeError> {
+        let stamp_ns = imu.header.stamp.nanoseconds();
+        let at_ns = self.at_ns(stamp_ns, arrival)?;
+        if at_ns <= self.felt_at_ns {
+            return Err(IntakeError::OutOfOrder { by_s: (self.felt_at_ns - at_ns) as f64 * 1e-9 });
+        }
+        let motion = self.transforms.between(&imu.header.frame_id, &self.frames.vehicle, stamp_ns)?;
+        let acceleration = rigid::axes("linear_acceleration", imu.linear_acceleration)?;
+        let rate = rigid::axes("angular_velocity", imu.angular_velocity)?;
+        self.felt_at_ns = at_ns;
+        let [acceleration, rate] = [acceleration, rate].map(|vector| motion.rotation * vector);
+        Ok(ImuRecord {
+            valid_at_ns: at_ns,
+            acceleration_mps2: acceleration.map(|axis| axis as f32).into(),
+            angular_rate_radps: rate.map(|axis| axis as f32).into(),
+        })
+    }
+
+    /// Where frames stay for good.
+    ///
+    /// # Errors
+    /// [`IntakeError::Frame`] of the last one that is none; the others are taken over.
+    pub fn fixed_frames(&mut self, told: &TfMessage) -> Result<(), IntakeError> {
+        self.frames_told(told, |tree, parent, child, _, motion| tree.fix(parent, child, motion))
+    }
+
+    /// Where frames are now. Errors: as [`Intake::fixed_frames`].
+    ///
+    /// # Errors
+    /// As [`Intake::fixed_frames`].
+    pub fn moving_frames(&mut self, told: &TfMessage) -> Result<(), IntakeError> {
+        self.frames_told(told, |tree, parent, child, at_ns, motion| tree.place(parent, child, at_ns, motion))
+    }
+
+    fn frames_told(
+        &mut self,
+        told: &TfMessage,
+        take: impl Fn(&mut Transforms, &str, &str, i64, Isometry3<f64>),
+    ) -> Result<(), IntakeError> {
+        let mut refused = Ok(());
+        for stamped in &told.transforms {
+            let (header, child) = (&stamped.header, &stamped.child_frame_id);
+            match rigid::motion_of_transform(&stamped.transform) {
+                Ok(motion) => {
+                    let at_ns = header.stamp.nanoseconds();
+                    take(&mut self.transforms, &header.frame_id, child, at_ns, motion);
+                }
+                Err(source) => refused = Err(IntakeError::Frame { frame: child.clone(), source }),
+            }
+        }
+        refused
+    }
+
+    /// The simulator's time.
+    ///
+    /// # Errors
+    /// It has jumped.
+    pub fn simulated_time(&mut self, clock_ns: i64, arrival: Arrival) -> Result<(), IntakeError> {
+        let ticked = self.clock.tick(clock_ns, arrival);
+        self.after_jump(ticked)
+    }
+
+    /// A goal in the map [m].
+    ///
+    /// # Errors
+    /// See [`GoalError`].
+    pub fn goal(&self, goal: &PoseStamped) -> Result<Vec<[f64; 2]>, IntakeError> {
+        Ok(goals::of_pose(goal, &self.transforms, &self.frames.map)?)
+    }
+
+    /// Goals in the map, in their order [m].
+    ///
+    /// # Errors
+    /// See [`GoalError`].
+    pub fn goals(&self, goals: &PoseArray) -> Result<Vec<[f64; 2]>, IntakeError> {
+        Ok(goals::of_array(goals, &self.transforms, &self.frames.map)?)
+    }
+
+    /// The corners of a path in the map [m].
+    ///
+    /// # Errors
+    /// See [`GoalError`].
+    pub fn path(&self, path: &Path) -> Result<Vec<[f64; 2]>, IntakeError> {
+        Ok(goals::of_path(path, &self.transforms, &self.frames.map)?)
+    }
+
+    fn at_ns(&mut self, stamp_ns: i64, arrival: Arrival) -> Result<u64, IntakeError> {
+        let at_ns = self.clock.at_ns(stamp_ns, arrival);
+        self.after_jump(at_ns)
+    }
+
+    /// Of a clock that has jumped, the frames of before are of another time.
+    fn after_jump<T>(&mut self, told: Result<T, StampError>) -> Result<T, IntakeError> {
+        if let Err(StampError::Jumped { .. }) = told {
+            self.transforms.forget_moving();
+        }
+        Ok(told?)
+    }
+}
+
+#[cfg(test)]
+mod tests;

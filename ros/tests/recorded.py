@@ -1,0 +1,87 @@
+"""Messages as rclpy lays them out in bytes, which the Rust tests read: `python3 ros/tests/recorded.py` writes them anew."""
+
+from pathlib import Path
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from geometry_msgs.msg import Point, Pose, PoseArray, PoseStamped, Quaternion, TwistStamped, Vector3
+from nav_msgs.msg import OccupancyGrid, Odometry
+from nav_msgs.msg import Path as Way
+from rclpy.serialization import serialize_message
+from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import Imu, PointCloud2, PointField
+from std_msgs.msg import Bool, Header
+
+FOLDER = Path(__file__).parents[1] / "src/message/recorded"
+
+
+def header(frame: str) -> Header:
+    told = Header(frame_id=frame)
+    told.stamp.sec, told.stamp.nanosec = 1_700_000_000, 123_456_789
+    return told
+
+
+def pose(x: float) -> Pose:
+    return Pose(position=Point(x=x, y=2.0, z=3.0), orientation=Quaternion(x=0.5, y=-0.5, z=0.5, w=0.5))
+
+
+def odometry() -> Odometry:
+    told = Odometry(header=header("odom"), child_frame_id="base_link")
+    told.pose.pose = pose(1.0)
+    told.pose.covariance[7] = 0.25
+    told.twist.twist.linear, told.twist.twist.angular = Vector3(x=4.0, y=5.0, z=6.0), Vector3(x=7.0, y=8.0, z=9.0)
+    told.twist.covariance[35] = 0.125
+    return told
+
+
+def cloud() -> PointCloud2:
+    told = PointCloud2(header=header("lidar"), height=1, width=2, is_bigendian=True, point_step=3, row_step=6)
+    told.fields = [PointField(name="x", offset=1, datatype=7, count=1), PointField(name="ring", offset=2, datatype=4)]
+    told.data, told.is_dense = bytes(range(6)), True
+    return told
+
+
+def imu() -> Imu:
+    told = Imu(header=header("imu"))
+    told.orientation_covariance[0] = -1.0
+    told.angular_velocity, told.linear_acceleration = Vector3(x=0.1, y=0.2, z=0.3), Vector3(x=1.0, y=2.0, z=9.81)
+    return told
+
+
+def grid() -> OccupancyGrid:
+    told = OccupancyGrid(header=header("map"), data=[0, 100, -1])
+    told.info.resolution, told.info.width, told.info.height, told.info.origin = 0.25, 3, 1, pose(-1.0)
+    return told
+
+
+def twist() -> TwistStamped:
+    told = TwistStamped(header=header("base_link"))
+    told.twist.linear.x, told.twist.angular.z = 1.5, -0.5
+    return told
+
+
+def diagnosis() -> DiagnosticArray:
+    values = [KeyValue(key="age", value="0.1")]
+    status = DiagnosticStatus(level=b"\x02", name="input", message="no scan", hardware_id="car", values=values)
+    return DiagnosticArray(header=header(""), status=[status])
+
+
+def messages() -> dict:
+    stamped = PoseStamped(header=header("map"), pose=pose(1.0))
+    return {
+        "bool": Bool(data=True),
+        "clock": Clock(clock=header("").stamp),
+        "odometry": odometry(),
+        "point_cloud": cloud(),
+        "imu": imu(),
+        "pose_stamped": stamped,
+        "pose_array": PoseArray(header=header("map"), poses=[pose(1.0), pose(-1.0)]),
+        "path": Way(header=header("odom"), poses=[stamped]),
+        "occupancy_grid": grid(),
+        "twist_stamped": twist(),
+        "diagnostic_array": diagnosis(),
+    }
+
+
+if __name__ == "__main__":
+    for name, message in messages().items():
+        (FOLDER / f"{name}.cdr").write_bytes(serialize_message(message))
