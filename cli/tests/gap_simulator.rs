@@ -228,7 +228,11 @@ fn a_simulator_that_fails_on_the_way_is_told_in_one_line() {
             &[],
             "run 1: expected an answer of the protocol, found one where",
         ),
-        ("hello(); asked(); hello(); asked()", &[], "run 1: expected a motion, found another hello"),
+        (
+            "hello(); asked(); say(type='hello', protocol=1, name='s'); asked()",
+            &[],
+            "run 1: expected a motion, found another hello",
+        ),
     ] {
         let told = failure(script, more);
         assert!(told.contains(expected), "{script}: {told}");

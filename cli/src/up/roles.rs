@@ -145,25 +145,7 @@ pub(super) fn run(arguments: &UpArguments, role: Role) -> anyhow::Result<()> {
             };
             mapping::run(&join(arguments)?, &setup, is_over)?;
         }
-        Role::Learning => {
-            let (belief, checkpoint) = belief(&machine)?;
-            let setup = LearningSetup {
-                vehicle: &machine.vehicle,
-                config: machine.config.clone(),
-                belief,
-                checkpoint,
-                level: level(arguments)?,
-                limits: machine.model.limits,
-            };
-            let bus = join(arguments)?;
-            match learn::school(arguments, &machine)? {
-                None => learning::run(&bus, &setup, is_over)?,
-                Some(school) => {
-                    let tell = &mut |told: Told<'_>| learn::tell(told, &arguments.drive.results.out);
-                    learning::run_and_learn(&bus, &setup, school, is_over, tell)?;
-                }
-            }
-        }
+        Role::Learning => run_learning(arguments, &machine)?,
         Role::Control => {
             let Machine { model, mut config, knowledge, .. } = machine;
             if arguments.realtime {
@@ -183,6 +165,27 @@ pub(super) fn run(arguments: &UpArguments, role: Role) -> anyhow::Result<()> {
             recorder::run(&join(arguments)?, setup, is_over, &mut |line| {
                 eprintln!("surefoot recorder: {line}");
             })?;
+        }
+    }
+    Ok(())
+}
+
+fn run_learning(arguments: &UpArguments, machine: &Machine) -> anyhow::Result<()> {
+    let (belief, checkpoint) = belief(machine)?;
+    let setup = LearningSetup {
+        vehicle: &machine.vehicle,
+        config: machine.config.clone(),
+        belief,
+        checkpoint,
+        level: level(arguments)?,
+        limits: machine.model.limits,
+    };
+    let bus = join(arguments)?;
+    match learn::school(arguments, machine)? {
+        None => learning::run(&bus, &setup, &interrupt::interrupted)?,
+        Some(school) => {
+            let tell = &mut |told: Told<'_>| learn::tell(told, &arguments.drive.results.out);
+            learning::run_and_learn(&bus, &setup, school, &interrupt::interrupted, tell)?;
         }
     }
     Ok(())

@@ -33,13 +33,14 @@ pub fn page(page: &Page<'_>) -> String {
         html::heading(&answer.case, page.drives),
         format!("<p class=\"verdict\">{}</p>\n", escaped(&text::verdict(answer))),
         doubts(page.doubts),
+        // What the user's own simulator says counts for more than its calibrated image.
+        answer.in_simulator.as_ref().map_or(String::new(), in_simulator::section),
         section("Which", &(effects(answer) + &figures(&["ranking.png"]))),
         section("Where", &(places(answer) + &figures(&["places.png", "ground.png"]))),
         section(
             "How far",
             &(shrink(answer) + &in_units(answer) + &figures(&["residuals.png", "heldout.png"])),
         ),
-        answer.in_simulator.as_ref().map_or(String::new(), in_simulator::section),
         section("What next", &next(answer)),
         section("How to read this", reading(page.reference)),
         html::soft(page.program),
