@@ -30,7 +30,7 @@
 //! - [`bus`]: the contract with a vehicle: messages in shared memory, channels, ages, watchdog.
 //! - [`runtime`]: the chain as processes over these channels, with recorder and replay.
 //! - [`simulator`]: the simulated vehicle as one driver of that contract.
-//! - [`ros`](::ros): a robot's topics in ROS 2 as another.
+//! - [`ros`]: a robot's topics in ROS 2 as another.
 //! - [`sim_to_real`]: which effect separates recorded drives of a robot from those of its simulator.
 //! - [`formats`]: every file that is read or written.
 //! - [`python`](../surefoot_native/index.html): the planner as a wheel for Python, over NumPy arrays.
