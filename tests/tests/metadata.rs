@@ -8,12 +8,13 @@ use std::sync::LazyLock;
 use cargo_metadata::{Metadata, MetadataCommand, Package};
 
 /// The slugs of crates.io's categories that fit a crate of this workspace.
-const CATEGORIES: [&str; 8] = [
+const CATEGORIES: [&str; 9] = [
     "command-line-utilities",
     "concurrency",
     "development-tools::profiling",
     "development-tools::testing",
     "mathematics",
+    "network-programming",
     "parser-implementations",
     "science::robotics",
     "simulation",
