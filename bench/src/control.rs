@@ -86,23 +86,27 @@ pub struct Split {
 /// # Errors
 /// No update asked for, or an instruction set or threads that are not to be had.
 pub fn measure(request: Request) -> Result<Report, BenchError> {
-    if request.n_updates == 0 {
+    measure_config(config(request.work, request.n_threads, request.isa), request.work, request.n_updates)
+}
+
+/// The same of a controller with other settings than the work has.
+pub(crate) fn measure_config(config: Config, work: Work, n_updates: usize) -> Result<Report, BenchError> {
+    if n_updates == 0 {
         return Err(BenchError::NoUpdates);
     }
-    let model = model(request.work)?;
+    let model = model(work)?;
     let map = random_map();
     let mut field = CostToGo::new(CostToGoConfig::default(), &model.limits, N_ROWS, N_COLS)?;
     field.update(map.view(), GOAL_M)?;
-    let terminal = match request.work {
+    let terminal = match work {
         Work::Bound | Work::Effects => Terminal::StraightLine,
         Work::Drive => Terminal::CostToGo(field.view()),
     };
     let objective = Objective::Goal { goal_m: GOAL_M, tolerance_m: TOLERANCE_M, terminal };
-    let config = config(&request);
-    let step_s = config.step_s;
+    let (step_s, threads) = (config.step_s, config.n_threads);
     let mut controller = Controller::new(config, model, SEED)?;
-    let mut laps = Laps::with_room_for(request.n_updates);
-    for cycle in 0..N_WARM_UP + request.n_updates as u64 {
+    let mut laps = Laps::with_room_for(n_updates);
+    for cycle in 0..N_WARM_UP + n_updates as u64 {
         let state = state(cycle, step_s);
         let input = Input { state, elapsed_s: step_s, map: map.view(), objective, cycle };
         let lap = Laps::of(&mut controller, &input);
@@ -111,14 +115,7 @@ pub fn measure(request: Request) -> Result<Report, BenchError> {
         }
     }
     let (ms, split_ms) = laps.spread();
-    Ok(Report {
-        threads: request.n_threads,
-        updates: request.n_updates,
-        config: request.work,
-        isa: controller.diagnostics().isa,
-        ms,
-        split_ms,
-    })
+    Ok(Report { threads, updates: n_updates, config: work, isa: controller.diagnostics().isa, ms, split_ms })
 }
 
 /// Times of all updates [ms].
@@ -161,12 +158,13 @@ impl Laps {
     }
 }
 
-fn config(request: &Request) -> Config {
-    let config = match request.work {
+/// The settings of a work.
+pub(crate) fn config(work: Work, n_threads: usize, isa: Isa) -> Config {
+    let config = match work {
         Work::Bound | Work::Effects => Config::minimal(),
         Work::Drive => Config::default(),
     };
-    Config { n_threads: request.n_threads, isa: request.isa, ..config }
+    Config { n_threads, isa, ..config }
 }
 
 /// The full-size vehicle; the limits of the bound's work are those of the hand-written yardstick.
@@ -246,7 +244,7 @@ mod tests {
     #[test]
     fn the_work_is_that_of_the_yardstick() {
         for work in [Work::Bound, Work::Effects, Work::Drive] {
-            let config = config(&Request { work, ..REQUEST });
+            let config = config(work, 1, Isa::Auto);
             assert_eq!((config.n_rollouts, config.n_steps, config.n_iterations), (1024, 50, 1));
         }
         let view_of = random_map();

@@ -8,11 +8,10 @@ mod run;
 use bicycle::Vehicle;
 use mppi::Isa;
 use navigator::{Config, MovingConfig};
-use scenarios::{EpisodeConfig, Outcome, WorldError};
+use scenarios::{EpisodeConfig, Outcome};
 use serde::{Deserialize, Serialize};
 
-use crate::closed_loop::DriveError;
-use crate::turns::in_turns;
+use crate::sweep::{SweepError, hash_of, sweep};
 use run::Job;
 pub use run::{Contact, Crossing, Moment};
 
@@ -46,6 +45,8 @@ pub struct Request {
     pub handlings: Vec<Handling>,
     /// Runs of each row.
     pub n_runs: u64,
+    /// Number of the first of them: each number is a run of its own, whatever runs beside it.
+    pub first_run: u64,
     /// Decides all runs.
     pub seed: u64,
     /// People in each run.
@@ -110,45 +111,6 @@ impl Report {
     }
 }
 
-/// Why there is no table.
-#[derive(Debug, thiserror::Error)]
-pub enum CrossingsError {
-    /// Nothing to drive.
-    #[error("expected at least one run, one walker and one way of dealing with them, found none")]
-    NoRuns,
-    /// The vehicle cannot be read.
-    #[error(transparent)]
-    Vehicle(#[from] formats::ConfigError),
-    /// The configuration has no form in JSON, hence no hash.
-    #[error("config_hash: {reason}")]
-    Hash {
-        /// What stands against it.
-        reason: String,
-    },
-    /// The system refused the threads.
-    #[error("threads: {0}")]
-    Threads(#[from] rayon::ThreadPoolBuildError),
-    /// A run could not begin or go on; one that ends badly is a result and no error.
-    #[error("{run}: {source}")]
-    Run {
-        /// Handling and number.
-        run: String,
-        /// Why.
-        source: Box<BrokenRun>,
-    },
-}
-
-/// Why a run could not begin or go on.
-#[derive(Debug, thiserror::Error)]
-pub enum BrokenRun {
-    /// There is no such world.
-    #[error(transparent)]
-    World(#[from] WorldError),
-    /// The plant or the planner gave up.
-    #[error(transparent)]
-    Loop(#[from] DriveError),
-}
-
 /// What all runs have in common.
 struct Settings {
     vehicle: Vehicle,
@@ -162,37 +124,33 @@ struct Settings {
 ///
 /// # Errors
 /// Nothing to drive, no threads to be had, or a run that could not begin or go on.
-pub fn measure(request: &Request, after_run: impl Fn(&Crossing) + Sync) -> Result<Report, CrossingsError> {
+pub fn measure(request: &Request, after_run: impl Fn(&Crossing) + Sync) -> Result<Report, SweepError> {
     let jobs: Vec<Job> = request
         .handlings
         .iter()
-        .flat_map(|&handling| (0..request.n_runs).map(move |number| Job { handling, number }))
+        .flat_map(|&handling| {
+            (0..request.n_runs).map(move |k| Job { handling, number: request.first_run + k })
+        })
         .collect();
     if jobs.is_empty() || request.n_walkers == 0 {
-        return Err(CrossingsError::NoRuns);
+        let expected = "at least one run, one walker and one way of dealing with them";
+        return Err(SweepError::NoDrives { expected });
     }
     let settings = settings(request)?;
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(request.n_threads).build()?;
-    let runs = in_turns(&pool, jobs.len(), |index| {
-        let told = |source| CrossingsError::Run { run: jobs[index].to_string(), source: Box::new(source) };
-        let run = jobs[index].drive(&settings).map_err(told)?;
-        after_run(&run);
-        Ok::<_, CrossingsError>(run)
-    })?;
+    let runs = sweep(&jobs, request.n_threads, |job| job.drive(&settings), after_run)?;
     Ok(Report {
         vehicle: VEHICLE,
         seed: request.seed,
         n_runs: request.n_runs,
         n_walkers: request.n_walkers,
         isa: settings.config.controller.isa,
-        config_hash: formats::config_hash(&settings.config)
-            .map_err(|error| CrossingsError::Hash { reason: error.to_string() })?,
+        config_hash: hash_of(&settings.config)?,
         rows: runs.chunks(request.n_runs as usize).filter_map(Row::of).collect(),
         runs,
     })
 }
 
-fn settings(request: &Request) -> Result<Settings, CrossingsError> {
+fn settings(request: &Request) -> Result<Settings, SweepError> {
     let vehicle = formats::read_vehicle(VEHICLE)?;
     let mut config = Config { moving: Some(MovingConfig::default()), ..Config::for_vehicle(&vehicle) };
     config.controller.n_threads = 1;
@@ -234,6 +192,7 @@ mod tests {
         Request {
             handlings: vec![Handling::Tracked, Handling::Mapped],
             n_runs,
+            first_run: 0,
             seed: 1000,
             n_walkers: 2,
             time_limit_s: 1.0,
@@ -249,7 +208,7 @@ mod tests {
             Request { n_walkers: 0, ..request(1, 1) },
             request(0, 1),
         ] {
-            assert!(matches!(measure(&nothing, |_| ()), Err(CrossingsError::NoRuns)));
+            assert!(matches!(measure(&nothing, |_| ()), Err(SweepError::NoDrives { .. })));
         }
     }
 
@@ -263,6 +222,12 @@ mod tests {
             assert_eq!(tracked.trail[0].walkers_m, mapped.trail[0].walkers_m);
         }
         assert_ne!(report.runs[0].trail[0].walkers_m, report.runs[1].trail[0].walkers_m);
+        let second = measure(&Request { first_run: 1, ..request(1, 1) }, |_| ()).unwrap();
+        assert_eq!(
+            [&second.runs[0], &second.runs[1]],
+            [&report.runs[1], &report.runs[3]],
+            "alone as among others"
+        );
     }
 
     #[test]

@@ -22,7 +22,7 @@ use serde::Serialize;
 use sim_to_real::Verdict;
 
 use crate::closed_loop::DriveError;
-use crate::turns::in_turns;
+use crate::sweep::in_turns;
 pub use belief::Belief;
 use belief::Simulator;
 pub use drive::{DriveResult, End, Ground, Job};

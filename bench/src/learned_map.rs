@@ -135,7 +135,7 @@ fn measure_network(
     let mut map = BeliefMap::new(geometry, &learned, resolution_m, WINDOW, N_YAWS, instructions)?;
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(SEED);
     let mut ground = GridMap::filled(WINDOW, SurfaceCell::UNKNOWN);
-    roughen(&mut ground, &CellRegion::whole(&WINDOW), &mut rng);
+    roughen(&mut ground, CellRegion::whole(&WINDOW).cells(), &mut rng);
     let footprints = footprints(&learned.checkpoint.sidecar.layout, &ground);
     let mut ms: [Vec<f64>; 4] = Default::default();
     // The first round only warms up.
@@ -147,8 +147,8 @@ fn measure_network(
         let (networks_ms, predicted) = timed_ms(|| predict(&predictor, &footprints));
         predicted?;
         let block = block(&mut rng);
-        roughen(&mut ground, &block, &mut rng);
-        let (changed_ms, done) = timed_ms(|| map.update_dirty(&ground, &block));
+        roughen(&mut ground, block.cells(), &mut rng);
+        let (changed_ms, done) = timed_ms(|| map.update(&ground));
         done?;
         if round > 0 {
             let round_ms = [full_ms, changed_ms, prior_ms, networks_ms];

@@ -1,5 +1,5 @@
 //! What things cost on this machine, and the tables that are published: one update of the controller ([`control`]), a
-//! risk map of the physics prior ([`prior_map`]) and of what was learned ([`learned_map`]), learning ([`learning`],
+//! risk map of the physics prior ([`prior_map`]) and of what was learned ([`learned_map`]), how both grow ([`scaling`]), learning ([`learning`],
 //! [`traction_map`]), navigation ([`navigation`]), inverse kinodynamics ([`mod@kinodynamics`]), diagnoses ([`gap_score`], [`gap_closed_loop`]) and the plant itself
 //! ([`plant`]). A part of [Surefoot](../cli/index.html).
 //!
@@ -19,10 +19,11 @@ pub mod learning;
 pub mod navigation;
 pub mod plant;
 pub mod prior_map;
+pub mod scaling;
 mod spread;
 mod stopwatch;
+pub mod sweep;
 pub mod traction_map;
-mod turns;
 
 pub use error::BenchError;
 pub use spread::Spread;

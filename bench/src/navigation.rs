@@ -10,14 +10,14 @@ mod row;
 use bicycle::Vehicle;
 use mppi::Isa;
 use navigator::Config;
-use scenarios::{EpisodeConfig, RockFieldConfig, RockFieldError};
+use scenarios::{EpisodeConfig, RockFieldConfig};
 use serde::Serialize;
 use traversability::CvarLevel;
 
-use crate::closed_loop::{DriveError, Method};
-use crate::turns::in_turns;
-use drive::Job;
+use crate::closed_loop::Method;
+use crate::sweep::{SweepError, hash_of, sweep};
 pub use drive::{DriveResult, name_of_outcome};
+use drive::{Finished, Job};
 pub use row::{Row, WILSON_Z, wilson_interval};
 
 /// Name of the machine that drives.
@@ -75,45 +75,6 @@ impl Report {
     }
 }
 
-/// Why there is no table.
-#[derive(Debug, thiserror::Error)]
-pub enum NavigationError {
-    /// Nothing to drive.
-    #[error("expected at least one seed, one method and, for physics, one alpha, found none")]
-    NoDrives,
-    /// The vehicle cannot be read.
-    #[error(transparent)]
-    Vehicle(#[from] formats::ConfigError),
-    /// The configuration has no form in JSON, hence no hash.
-    #[error("config_hash: {reason}")]
-    Hash {
-        /// What stands against it.
-        reason: String,
-    },
-    /// The system refused the threads.
-    #[error("threads: {0}")]
-    Threads(#[from] rayon::ThreadPoolBuildError),
-    /// A drive could not begin or go on; a drive that ends badly is a result and no error.
-    #[error("{drive}: {source}")]
-    Drive {
-        /// Method, level and seed.
-        drive: String,
-        /// Why.
-        source: Box<BrokenDrive>,
-    },
-}
-
-/// Why a drive could not begin or go on.
-#[derive(Debug, thiserror::Error)]
-pub enum BrokenDrive {
-    /// There is no such world.
-    #[error(transparent)]
-    Field(#[from] RockFieldError),
-    /// The plant or the planner gave up.
-    #[error(transparent)]
-    Loop(#[from] DriveError),
-}
-
 /// What all drives have in common.
 struct Settings {
     field: RockFieldConfig,
@@ -126,23 +87,16 @@ struct Settings {
 ///
 /// # Errors
 /// Nothing to drive, no threads to be had, or a drive that could not begin or go on.
-pub fn measure(
-    request: &Request,
-    after_drive: impl Fn(&DriveResult) + Sync,
-) -> Result<Report, NavigationError> {
+pub fn measure(request: &Request, after_drive: impl Fn(&DriveResult) + Sync) -> Result<Report, SweepError> {
     let jobs = jobs(request);
     if jobs.is_empty() {
-        return Err(NavigationError::NoDrives);
+        return Err(SweepError::NoDrives {
+            expected: "at least one seed, one method and, for physics, one alpha",
+        });
     }
     let settings = settings(request)?;
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(request.n_threads).build()?;
-    let finished = in_turns(&pool, jobs.len(), |index| {
-        let told =
-            |source| NavigationError::Drive { drive: jobs[index].to_string(), source: Box::new(source) };
-        let finished = jobs[index].drive(&settings).map_err(told)?;
-        after_drive(&finished.result);
-        Ok::<_, NavigationError>(finished)
-    })?;
+    let after = |finished: &Finished| after_drive(&finished.result);
+    let finished = sweep(&jobs, request.n_threads, |job| job.drive(&settings), after)?;
     let isa = finished.first().map_or(request.isa, |finished| finished.isa);
     let drives: Vec<DriveResult> = finished.into_iter().map(|finished| finished.result).collect();
     Ok(Report {
@@ -151,8 +105,7 @@ pub fn measure(
         n_seeds: request.n_seeds,
         time_limit_s: request.time_limit_s,
         isa,
-        config_hash: formats::config_hash(&settings.config)
-            .map_err(|error| NavigationError::Hash { reason: error.to_string() })?,
+        config_hash: hash_of(&settings.config)?,
         rows: drives.chunks(request.n_seeds as usize).filter_map(Row::of).collect(),
         drives,
     })
@@ -168,7 +121,7 @@ fn jobs(request: &Request) -> Vec<Job> {
         .collect()
 }
 
-fn settings(request: &Request) -> Result<Settings, NavigationError> {
+fn settings(request: &Request) -> Result<Settings, SweepError> {
     let vehicle = formats::read_vehicle(VEHICLE)?;
     let mut config = Config::for_vehicle(&vehicle);
     config.controller.n_threads = 1;
@@ -214,7 +167,7 @@ mod tests {
             request(&[Method::Physics], &[], 1),
             request(&[Method::Physics], &[0.4], 0),
         ] {
-            assert!(matches!(measure(&nothing, |_| ()), Err(NavigationError::NoDrives)));
+            assert!(matches!(measure(&nothing, |_| ()), Err(SweepError::NoDrives { .. })));
         }
     }
 

@@ -7,7 +7,7 @@ use physics_prior::{Assumption, PriorConfig, PriorMap};
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use serde::Serialize;
-use terrain::{CellRegion, GridGeometry, GridMap, SurfaceCell, TerrainClass};
+use terrain::{Cell, CellRegion, GridGeometry, GridMap, SurfaceCell, TerrainClass};
 use traversability::CvarLevel;
 
 pub(crate) const WINDOW: GridGeometry =
@@ -73,15 +73,15 @@ pub fn measure(request: Request) -> Result<Report, BenchError> {
     let mut map = PriorMap::new(&vehicle.geometry, &assumption, resolution_m, WINDOW, N_YAWS, instructions)?;
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(SEED);
     let mut ground = GridMap::filled(WINDOW, SurfaceCell::UNKNOWN);
-    roughen(&mut ground, &CellRegion::whole(&WINDOW), &mut rng);
+    roughen(&mut ground, CellRegion::whole(&WINDOW).cells(), &mut rng);
     let (mut full_ms, mut changed_ms) = (Vec::new(), Vec::new());
     // The first round only warms up.
     for round in 0..=request.n_updates {
         let (whole_ms, done) = timed_ms(|| pool.install(|| map.update_all(&ground)));
         done?;
         let block = block(&mut rng);
-        roughen(&mut ground, &block, &mut rng);
-        let (part_ms, done) = timed_ms(|| pool.install(|| map.update_dirty(&ground, &block)));
+        roughen(&mut ground, block.cells(), &mut rng);
+        let (part_ms, done) = timed_ms(|| pool.install(|| map.update(&ground)));
         done?;
         if round > 0 {
             full_ms.push(whole_ms);
@@ -108,9 +108,14 @@ pub(crate) fn block(rng: &mut Xoshiro256PlusPlus) -> CellRegion {
 }
 
 /// Rough ground, some of it under plants, as uncertain as a range sensor leaves it.
-pub(crate) fn roughen(ground: &mut GridMap<SurfaceCell>, region: &CellRegion, rng: &mut Xoshiro256PlusPlus) {
-    for cell in region.cells() {
-        let [x_m, y_m] = WINDOW.centre_m(cell);
+pub(crate) fn roughen(
+    ground: &mut GridMap<SurfaceCell>,
+    cells: impl Iterator<Item = Cell>,
+    rng: &mut Xoshiro256PlusPlus,
+) {
+    let geometry = *ground.geometry();
+    for cell in cells {
+        let [x_m, y_m] = geometry.centre_m(cell);
         let waves_m = 0.15 * (0.9 * x_m).sin() * (0.7 * y_m).cos();
         let height_m = waves_m as f32 + rng.random_range(-0.02..0.02);
         let (class, plants_m) = match rng.random_range(0..4) {
@@ -147,7 +152,8 @@ mod tests {
     #[test]
     fn every_part_of_the_ground_is_known() {
         let mut ground = GridMap::filled(WINDOW, SurfaceCell::UNKNOWN);
-        roughen(&mut ground, &CellRegion::whole(&WINDOW), &mut Xoshiro256PlusPlus::seed_from_u64(SEED));
+        let cells = CellRegion::whole(&WINDOW).cells();
+        roughen(&mut ground, cells, &mut Xoshiro256PlusPlus::seed_from_u64(SEED));
         assert!(ground.values().iter().all(|cell| cell.is_known() && cell.height_m.is_finite()));
     }
 }

@@ -1,18 +1,30 @@
 //! The catalogue of effects: what a real machine does and the kinematic bicycle does not.
 //!
-//! An effect is one file: its id, what it is, its parameters with bounds and units, and how it changes a step.
+//! An effect is its id, what it is, its parameters with bounds and units, and how it changes a step. Effects of one shape
+//! are a family in one file, which says once how they act; the others have a file each.
 //! It acts at one or more stages of a step: on the command before the actuators follow it, on the
 //! acceleration, on the motion before the ground takes its share, or on what the sensors say. Effects of a model
 //! act in the order in which the model lists them, and the same effect may stand there more than once: two
-//! lags in series are two lags. To add one, write the file and name it in [`catalogue!`] below.
+//! lags in series are two lags. To add one, write it and name it in [`catalogue!`] below.
 
+mod actuator;
+mod command;
 mod definition;
-mod delay_line;
-mod gradient;
-mod lag;
+mod drag;
+mod drive_lag;
+mod feed_forward;
+mod friction;
+mod gravity;
+mod limit;
+mod mass;
 mod prepared;
-mod ramp;
+mod rear_slip;
 mod sensors;
+mod speed_integral;
+mod speed_loop;
+mod steer_linkage;
+mod wind;
+mod yaw_gain;
 
 pub use definition::{Description, Parameter, Role};
 pub(crate) use definition::{Driving, Moving};
@@ -45,7 +57,7 @@ pub struct EffectError {
 
 macro_rules! catalogue {
     ($($module:ident::$name:ident),* $(,)?) => {
-        $(mod $module; pub use $module::$name;)*
+        $(pub use $module::$name;)*
 
         /// One effect with its parameters; in files a table with the key `id`.
         #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -143,44 +155,44 @@ macro_rules! catalogue {
 }
 
 catalogue! {
-    steer_delay::SteerDelay,
-    speed_delay::SpeedDelay,
-    motor_deadband::MotorDeadband,
-    speed_scale::SpeedScale,
-    steer_gain::SteerGain,
-    steer_bias::SteerBias,
-    backlash::Backlash,
-    steer_rate::SteerRate,
-    steer_lag::SteerLag,
-    speed_lag::SpeedLag,
-    accel_limit::AccelLimit,
+    actuator::SteerDelay,
+    actuator::SpeedDelay,
+    command::MotorDeadband,
+    command::SpeedScale,
+    command::SteerGain,
+    command::SteerBias,
+    actuator::Backlash,
+    actuator::SteerRate,
+    actuator::SteerLag,
+    actuator::SpeedLag,
+    actuator::AccelLimit,
     speed_loop::SpeedLoop,
     feed_forward::FeedForward,
     speed_integral::SpeedIntegral,
-    hill_compensation::HillCompensation,
-    compensation_loss::CompensationLoss,
-    drive_limit::DriveLimit,
-    drive_power::DrivePower,
-    drive_force_limit::DriveForceLimit,
+    gravity::HillCompensation,
+    gravity::CompensationLoss,
+    limit::DriveLimit,
+    limit::DrivePower,
+    limit::DriveForceLimit,
     drive_lag::DriveLag,
     mass::Mass,
-    rolling_drag::RollingDrag,
-    quad_drag::QuadDrag,
-    veg_drag::VegDrag,
-    loose_drag::LooseDrag,
-    cornering_drag::CorneringDrag,
-    slope_gravity::SlopeGravity,
-    cross_slope::CrossSlope,
+    drag::RollingDrag,
+    drag::QuadDrag,
+    drag::VegDrag,
+    drag::LooseDrag,
+    drag::CorneringDrag,
+    gravity::SlopeGravity,
+    gravity::CrossSlope,
     wind::Wind,
     steer_linkage::SteerLinkage,
-    understeer::Understeer,
-    steer_yield::SteerYield,
+    yaw_gain::Understeer,
+    yaw_gain::SteerYield,
     rear_slip::RearSlip,
     friction::Friction,
-    pose_latency::PoseLatency,
-    odom_scale::OdomScale,
-    gyro_bias::GyroBias,
-    yaw_misalign::YawMisalign,
+    sensors::PoseLatency,
+    sensors::OdomScale,
+    sensors::GyroBias,
+    sensors::YawMisalign,
 }
 
 impl Effect {
@@ -192,6 +204,11 @@ impl Effect {
     /// Whether it changes what the sensors say.
     pub fn acts_on_sensors(&self) -> bool {
         self.stages().contains(&Stage::Sensors)
+    }
+
+    /// Whether it changes how the body moves, whatever the actuators reach and the sensors say.
+    pub fn acts_on_body(&self) -> bool {
+        self.stages().iter().any(|stage| matches!(stage, Stage::Drive | Stage::Motion))
     }
 
     /// The factor by which the speed that is reached exceeds the one that is commanded.

@@ -194,7 +194,7 @@ record! {
         /// Yaw bins; bin k is centred at (k + 1/2) 2 pi / n_yaws.
         n_yaws: u64,
         /// Who judged the ground: 1 = what was learned, 2 = physics alone.
-        author: u64,
+        map_source: u64,
         /// The map of the ground that was judged.
         surface: Source,
         /// When the odometry was measured in whose frame that map lies [ns].
@@ -246,7 +246,7 @@ record! {
         /// The risk map; none when there was none.
         risk: Source,
         /// Who made that map: 0 = none, 1 = what was learned, 2 = physics alone.
-        author: u64,
+        map_source: u64,
         /// What was said last of where to go.
         mission: Source,
         /// The newest map of what was learned that there was to choose from.

@@ -176,7 +176,7 @@ mod tests {
         let known = map.view();
         let payload = (0..parts.n_elements()).map(|place| parts.element(&known, place)).collect();
         let header =
-            RiskHeader { grid: Grid::from(&geometry), n_yaws: 3, author: 1, ..RiskHeader::default() };
+            RiskHeader { grid: Grid::from(&geometry), n_yaws: 3, map_source: 1, ..RiskHeader::default() };
         (map, header, payload)
     }
 
@@ -238,7 +238,7 @@ mod tests {
         assert_eq!(refused(header, &payload[1..]), Refusal::Malformed);
         assert_eq!(refused(RiskHeader { n_yaws: u64::MAX, ..header }, &payload), Refusal::Malformed);
         assert_eq!(refused(RiskHeader { n_yaws: 0, ..header }, &payload), Refusal::Malformed);
-        assert_eq!(refused(RiskHeader { author: 3, ..header }, &payload), Refusal::Malformed);
+        assert_eq!(refused(RiskHeader { map_source: 3, ..header }, &payload), Refusal::Malformed);
         let huge = Grid { n_rows: u64::MAX, ..header.grid };
         assert_eq!(refused(RiskHeader { grid: huge, ..header }, &payload), Refusal::Malformed);
         // Times are interpolated between rows: one alone is none, however right its length is.

@@ -17,6 +17,7 @@ mod plant;
 mod replay;
 mod results;
 mod route;
+mod scaling;
 mod train;
 mod up;
 mod values;
@@ -32,7 +33,9 @@ pub use collect::{CollectArguments, CollectMap, CollectSplit, CollectWorld};
 pub use crossings::{BenchCrossingsArguments, CrossingHandling};
 pub use deviation::AskedDeviation;
 pub use drive::{Correct, DriveArguments, MapSource, Method, Pace};
-pub use gap::{GapApplyArguments, GapCommand, GapDiagnoseArguments, GapEffectsArguments};
+pub use gap::{
+    GapApplyArguments, GapCommand, GapDiagnoseArguments, GapEffectsArguments, GapSimulatorArguments,
+};
 pub use gap_check::{GapScoreArguments, GapSealArguments};
 pub use inspect::InspectArguments;
 pub use kernels::{InstructionSet, KernelArguments, ThreadArguments};
@@ -46,6 +49,7 @@ pub use plant::BenchPlantArguments;
 pub use replay::ReplayArguments;
 pub use results::{JsonArguments, ResultArguments};
 pub use route::{BareGround, RouteArguments};
+pub use scaling::BenchScalingArguments;
 pub use train::{TrainArguments, TrainCommand};
 pub use up::{UpArguments, UpRole};
 pub use values::{Goal, StartPose, WorldSource, place_with_minus};

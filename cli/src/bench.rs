@@ -7,6 +7,8 @@ mod learned_map;
 mod learning;
 mod navigation;
 mod plant;
+mod scaling;
+mod sweep;
 
 use ::bench::{BenchError, control, prior_map};
 use serde::Serialize;
@@ -20,6 +22,7 @@ pub(crate) use learned_map::run_learned_map;
 pub(crate) use learning::run_learning;
 pub(crate) use navigation::run_navigation;
 pub(crate) use plant::run_plant;
+pub(crate) use scaling::run_scaling;
 
 pub(crate) fn run_control(arguments: &BenchControlArguments) -> anyhow::Result<()> {
     arguments.copy.prepare()?;

@@ -1,4 +1,4 @@
-//! The two ways a command fails, and the line and exit code that tell them apart.
+//! The ways a command fails, and the line and exit code that tell them apart.
 
 use std::process::ExitCode;
 
@@ -14,6 +14,11 @@ pub struct UsageError(pub String);
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{0}")]
 pub struct WorkFailed(pub String);
+
+/// The work succeeded and what it found is more than the user allows. Ends in exit code 3. The message says by how much.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{0}")]
+pub struct LimitExceeded(pub String);
 
 impl UsageError {
     /// Bad input as another crate's error tells it, with its causes.
@@ -82,10 +87,12 @@ pub(crate) fn one_line(error: &anyhow::Error) -> String {
     told.split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
-/// 2 for bad usage or input anywhere in the chain, else 1.
+/// 2 for bad usage or input anywhere in the chain, 3 for a limit that is exceeded, else 1.
 pub(crate) fn exit_code(error: &anyhow::Error) -> ExitCode {
     if error.chain().any(|cause| cause.is::<UsageError>()) || error.is::<UsageError>() {
         ExitCode::from(2)
+    } else if error.is::<LimitExceeded>() {
+        ExitCode::from(3)
     } else {
         ExitCode::from(1)
     }

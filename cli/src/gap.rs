@@ -6,6 +6,7 @@ mod diagnose;
 mod drives;
 mod effects;
 mod follow_up;
+mod in_simulator;
 mod machine;
 mod outputs;
 mod predictions;
@@ -13,6 +14,7 @@ mod progress;
 mod request;
 mod score;
 mod seal;
+mod simulator;
 mod workers;
 
 use crate::arguments::GapCommand;

@@ -82,7 +82,7 @@
 //!
 //! The one binary, `surefoot`: arguments, progress and files around the crates that do the work. [`run`]
 //! reads the arguments, calls the command's handler and turns its result into an exit code: 0 success, 1 the work
-//! failed, 2 bad usage or input. Errors are printed here and nowhere else, one line each.
+//! failed, 2 bad usage or input, 3 a limit that was asked for is exceeded. Errors are printed here and nowhere else, one line each.
 
 pub mod arguments;
 mod bench;
@@ -109,7 +109,7 @@ use clap::error::ErrorKind;
 use navigator::Order;
 
 use arguments::{Arguments, BenchCommand, Command, TrainCommand};
-pub use failure::{UsageError, WorkFailed};
+pub use failure::{LimitExceeded, UsageError, WorkFailed};
 
 /// Runs the command line of this process.
 pub fn run() -> ExitCode {
@@ -173,6 +173,7 @@ fn dispatch(command: Command) -> anyhow::Result<()> {
         }
         Command::Bench { command: BenchCommand::Crossings(crossings) } => bench::run_crossings(&crossings),
         Command::Bench { command: BenchCommand::Plant(plant) } => bench::run_plant(&plant),
+        Command::Bench { command: BenchCommand::Scaling(scaling) } => bench::run_scaling(&scaling),
         Command::Bench { command: BenchCommand::Gap(gap) } => bench::run_gap(&gap),
         Command::Bench { command: BenchCommand::Learning(learning) } => bench::run_learning(&learning),
         Command::Bench { command: BenchCommand::Navigation(navigation) } => {

@@ -80,6 +80,37 @@ fn plant_writes_its_curves_and_labels() {
 }
 
 #[test]
+fn scaling_writes_curves_and_picture() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let out = folder.path().join("out");
+    let mut words = vec!["bench", "scaling", "--over", "steps,threads", "--threads", "2", "--updates", "1"];
+    words.extend(["--maps", "1", "--out", out.to_str().expect("UTF-8")]);
+    let output = surefoot(&words);
+    assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+    let told = String::from_utf8_lossy(&output.stdout);
+    assert!(told.contains("steps of the horizon") && told.contains("judged anew"), "{told}");
+    let written: Value =
+        serde_json::from_slice(&std::fs::read(out.join("scaling.json")).expect("the file")).expect("JSON");
+    assert_eq!((&written["threads"], &written["maps"]), (&2.into(), &1.into()));
+    let values = |curve: usize| -> Vec<f64> {
+        let points = written["curves"][curve]["points"].as_array().expect("points").iter();
+        points.map(|point| point["value"].as_f64().expect("a number")).collect()
+    };
+    for (curve, over) in ["steps", "controller_threads", "map_threads"].into_iter().enumerate() {
+        assert_eq!(written["curves"][curve]["over"], over, "{written}");
+    }
+    assert_eq!(values(0), [10.0, 25.0, 50.0, 75.0, 100.0, 150.0]);
+    assert_eq!((values(1), values(2)), (vec![1.0, 2.0], vec![1.0, 2.0]));
+    assert_eq!(written["curves"][2]["points"][0]["judged_share"], 1.0);
+    assert!(std::fs::read(out.join("scaling.png")).expect("the picture").starts_with(b"\x89PNG"));
+
+    let refused = surefoot(&["bench", "scaling", "--over", "height"]);
+    assert_eq!(refused.status.code(), Some(2));
+    let told = String::from_utf8_lossy(&refused.stderr);
+    assert!(told.contains("height") && told.contains("rollouts"), "{told}");
+}
+
+#[test]
 fn navigation_writes_table_and_picture() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let path = |name: &str| folder.path().join(name);

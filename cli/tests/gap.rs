@@ -377,3 +377,53 @@ fn the_catalogue_in_the_docs_is_the_programs() {
         assert!(told.contains(description.id) && told.contains(description.meaning), "{}", description.id);
     }
 }
+
+/// The held-out drive of the late servo is far from the simulator; the sound one is not.
+#[test]
+fn a_gap_above_the_limit_ends_with_a_code_of_its_own_once_all_is_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let case = write_case(folder.path(), "gate", &drive("real_heldout.csv"));
+    let cache = cache();
+    let words =
+        |limit| ["diagnose", &case, "--json", "a.json", "--baseline-cache", &cache, "--fail-above", limit];
+    let output = surefoot(folder.path(), &words("1.2"));
+    let told = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(3), "{told}");
+    let answer: Answer = serde_json::from_slice(&fs::read(folder.path().join("a.json")).unwrap()).unwrap();
+    let ratio = answer.shrink.before.unwrap() / answer.shrink.floor;
+    assert!(ratio > 1.2 && answer.schema_version == sim_to_real::SCHEMA_VERSION, "{answer:?}");
+    let expected = format!(
+        "surefoot: --fail-above: expected at most 1.2 times the simulator's error on its own drives, found {ratio:.2}"
+    );
+    assert_eq!(told.lines().last(), Some(expected.as_str()));
+    succeed(folder.path(), &words("50"));
+
+    let told = refuse(folder.path(), &words("0"));
+    assert!(told.contains("--fail-above: expected a finite number above 0, found \"0\""), "{told}");
+    let text = fs::read_to_string(&case).unwrap();
+    let without = text.lines().filter(|line| !line.starts_with("heldout")).collect::<Vec<_>>().join("\n");
+    fs::write(&case, without).unwrap();
+    let told = refuse(folder.path(), &words("2"));
+    assert!(told.contains("--fail-above: expected held-out drives to measure, found none"), "{told}");
+}
+
+#[test]
+fn a_part_that_is_unknown_is_applied_only_by_force() {
+    let folder = tempfile::tempdir().unwrap();
+    let case = write_case(folder.path(), "part", &drive("real_heldout.csv"));
+    succeed(folder.path(), &["diagnose", &case, "--json", "a.json", "--baseline-cache", &cache()]);
+    let path = folder.path().join("a.json");
+    let text = fs::read_to_string(&path).unwrap().replace("\"effects\",", "\"effects_and_unknown\",");
+    fs::write(&path, &text).unwrap();
+    let words = ["apply", "a.json", "--model", "rc_car", "--out", "m.toml"];
+    let told = refuse(folder.path(), &words);
+    assert!(told.contains("verdict: expected 'effects', or --force, found 'effects_and_unknown'"), "{told}");
+    assert!(!folder.path().join("m.toml").exists());
+    succeed(folder.path(), &[&words[..], &["--force"]].concat());
+    assert!(fs::read_to_string(folder.path().join("m.toml")).unwrap().contains("steer_lag"));
+
+    let newer = text.replace("\"schema_version\": 1", "\"schema_version\": 2");
+    fs::write(&path, newer).unwrap();
+    let told = refuse(folder.path(), &words);
+    assert!(told.contains("schema_version: expected at most 1, found 2"), "{told}");
+}

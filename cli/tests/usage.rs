@@ -79,6 +79,7 @@ fn every_command_has_help() {
         &["bench", "control", "--help"],
         &["bench", "prior-map", "--help"],
         &["bench", "crossings", "--help"],
+        &["bench", "scaling", "--help"],
     ] {
         let output = surefoot(words);
         assert_eq!(output.status.code(), Some(0), "{words:?}");

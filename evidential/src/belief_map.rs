@@ -11,9 +11,9 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use bicycle::Geometry;
 use bicycle::lanes::Instructions;
-use physics_prior::{Assumption, PriorConfig, PriorField, PriorMapError};
+use physics_prior::{ASKED, Assumption, PoseLine, PriorConfig, PriorField, PriorMapError};
 use rayon::prelude::*;
-use terrain::{CellRegion, GridGeometry, GridMap, SurfaceCell};
+use terrain::{GridGeometry, GridMap, SurfaceCell};
 use traversability::{CvarLevel, Ground, PartialMoments, Risk, RiskMap};
 
 use crate::predictor::{Predictor, PredictorError};
@@ -87,6 +87,8 @@ pub enum BeliefMapError {
 pub struct BeliefMap {
     layers: BeliefLayers,
     map: RiskMap,
+    /// Whether a pose is unlike the training data, shape [row, col, yaw].
+    is_unfamiliar: Vec<bool>,
     scratches: Vec<Scratch>,
 }
 
@@ -133,8 +135,8 @@ impl Fusion {
     }
 }
 
-/// Footprints that a thread takes at a time, at least: so many that a last block, which may not be full, is cheap.
-const TASK_LANES: usize = 960;
+/// Rows of cells that a thread takes at a time: so many that a last block, which may not be full, is cheap.
+const TASK_ROWS: usize = 4;
 
 impl BeliefMap {
     /// A map in the window `risk` for surfaces of the given resolution; [`Risk::OUTSIDE`] until it is updated.
@@ -178,7 +180,12 @@ impl BeliefMap {
             (learned, surface_resolution_m, n_yaws),
             instructions,
         );
-        Ok(Self { layers, map: RiskMap::constant(risk, n_yaws, Risk::OUTSIDE), scratches: Vec::new() })
+        Ok(Self {
+            layers,
+            map: RiskMap::constant(risk, n_yaws, Risk::OUTSIDE),
+            is_unfamiliar: vec![false; risk.n_cells() * n_yaws],
+            scratches: Vec::new(),
+        })
     }
 
     /// The map as of the last update.
@@ -186,53 +193,42 @@ impl BeliefMap {
         &self.map
     }
 
-    /// Moves the window to another origin on the lattice of risk cells; the next update is a full one.
+    /// Moves the window to another origin on the lattice of risk cells; the next update makes the map whole again.
     pub fn place_at(&mut self, origin: [i64; 2]) {
         if self.layers.field.place_at(origin) {
-            self.map.place_at(origin);
+            self.map.geometry().roll(&mut self.is_unfamiliar, origin, false);
+            self.map.roll_to(origin);
             self.layers.place_ground();
         }
     }
 
-    /// Judges at another level from the next update on, which is a full one.
+    /// Judges at another level from the next update on.
     pub fn set_level(&mut self, level: CvarLevel) {
         self.layers.field.set_level(level);
         self.layers.fusion.per_level = level.reciprocal();
     }
 
-    /// Takes over the whole surface. What lies beyond its window is unknown. Returns the cells that were judged: all.
+    /// Takes over the whole surface and judges every pose. What lies beyond the surface's window is unknown. Returns how
+    /// many poses were judged.
     ///
     /// # Errors
     /// The surface has another resolution than the map was made for.
-    pub fn update_all(&mut self, surface: &GridMap<SurfaceCell>) -> Result<CellRegion, BeliefMapError> {
-        let dirty = self.layers.field.read_all(surface)?;
-        self.layers.read_ground(surface, None);
-        self.fill(surface, &dirty);
-        Ok(dirty)
+    pub fn update_all(&mut self, surface: &GridMap<SurfaceCell>) -> Result<usize, BeliefMapError> {
+        self.layers.field.read_all(surface)?;
+        self.layers.ground.read(surface);
+        Ok(self.fill(surface))
     }
 
-    /// Takes over the cells of the surface that changed since the last update, and judges anew only the poses that
-    /// they reach; the result is that of [`BeliefMap::update_all`], bit by bit. It is a full update when one of the
-    /// windows or the level changed. Returns the cells that were judged.
+    /// Takes over a surface and judges anew only the poses that read something which changed since the last update; the
+    /// result is that of [`BeliefMap::update_all`], bit by bit. Returns how many poses were judged, neighbours of those
+    /// among them.
     ///
     /// # Errors
     /// The surface has another resolution than the map was made for.
-    pub fn update_dirty(
-        &mut self,
-        surface: &GridMap<SurfaceCell>,
-        changed: &CellRegion,
-    ) -> Result<CellRegion, BeliefMapError> {
-        let is_whole = self.layers.field.is_outdated(surface);
-        let by_prior = self.layers.field.read_changed(surface, changed)?;
-        let dirty = if is_whole {
-            self.layers.read_ground(surface, None);
-            by_prior
-        } else {
-            let by_networks = self.layers.read_ground(surface, Some(changed));
-            union(by_prior, by_networks)
-        };
-        self.fill(surface, &dirty);
-        Ok(dirty)
+    pub fn update(&mut self, surface: &GridMap<SurfaceCell>) -> Result<usize, BeliefMapError> {
+        self.layers.field.read(surface)?;
+        self.layers.ground.read(surface);
+        Ok(self.fill(surface))
     }
 
     /// Bytes that the map takes while it is updated: ground, prior, networks, buffers and result.
@@ -244,66 +240,51 @@ impl BeliefMap {
             + layers.field.n_bytes()
             + layers.ground.n_bytes()
             + layers.predictor.n_bytes()
+            + size_of_val(&*self.is_unfamiliar)
             + self.scratches.iter().map(Scratch::n_bytes).sum::<usize>()
     }
 
-    fn fill(&mut self, surface: &GridMap<SurfaceCell>, dirty: &CellRegion) {
-        if dirty.n_cells() == 0 {
-            return;
-        }
+    /// Judges the poses that changed; returns how many.
+    fn fill(&mut self, surface: &GridMap<SurfaceCell>) -> usize {
         let n_threads = rayon::current_num_threads();
         let (layers, workspace) = (&self.layers, self.layers.predictor.workspace());
         self.scratches.resize_with(n_threads, || Scratch::new(workspace.clone()));
         let (geometry, scratches) = (*self.map.geometry(), &mut self.scratches);
-        self.map.fill(|risks, ground| {
-            let tasks = Mutex::new(tasks(&geometry, (risks, ground), layers.n_yaws, dirty).into_iter());
-            scratches.par_iter_mut().for_each(|scratch| {
+        let is_unfamiliar = &mut self.is_unfamiliar;
+        let n_judged = self.map.fill(|risks, ground| {
+            let tasks = tasks(&geometry, (risks, ground, is_unfamiliar), layers.n_yaws);
+            let tasks = Mutex::new(tasks);
+            let work = |scratch: &mut Scratch| {
                 let next = || tasks.lock().unwrap_or_else(PoisonError::into_inner).next();
-                while let Some(task) = next() {
-                    task.run(layers, surface, scratch);
-                }
-            });
+                std::iter::from_fn(next).map(|task| task.run(layers, surface, scratch)).sum::<usize>()
+            };
+            scratches.par_iter_mut().map(work).sum()
         });
+        self.layers.field.note_judged();
+        n_judged
     }
 }
 
-/// The dirty part of a map, a few rows at a time.
+/// A map, a few rows at a time.
 fn tasks<'a>(
     geometry: &GridGeometry,
-    (risks, ground): (&'a mut [Risk], &'a mut [Ground]),
+    (risks, ground, is_unfamiliar): (&'a mut [Risk], &'a mut [Ground], &'a mut [bool]),
     n_yaws: usize,
-    dirty: &CellRegion,
-) -> Vec<RowTask<'a>> {
-    let n_cols = geometry.n_cols;
-    let n_rows = (TASK_LANES / (dirty.cols.len() * n_yaws)).max(1);
-    let [west, south] = geometry.origin;
-    let cells = dirty.rows.start * n_cols..dirty.rows.end * n_cols;
-    let risks = risks[cells.start * n_yaws..cells.end * n_yaws].chunks_mut(n_rows * n_cols * n_yaws);
-    let slices = risks.zip(ground[cells].chunks_mut(n_rows * n_cols));
-    let task = |(index, (risks, ground)): (usize, (&'a mut [Risk], &'a mut [Ground]))| {
-        let first = south + (dirty.rows.start + index * n_rows) as i64;
+) -> impl Iterator<Item = RowTask<'a>> {
+    let GridGeometry { origin: [west, south], n_cols, .. } = *geometry;
+    let n_cells = TASK_ROWS * n_cols;
+    let poses = risks.chunks_mut(n_cells * n_yaws).zip(is_unfamiliar.chunks_mut(n_cells * n_yaws));
+    let slices = poses.zip(ground.chunks_mut(n_cells)).enumerate();
+    slices.map(move |(index, ((risks, is_unfamiliar), ground))| {
+        let first = south + (index * TASK_ROWS) as i64;
         RowTask {
             rows: first..first + (ground.len() / n_cols) as i64,
-            cols: west + dirty.cols.start as i64..west + dirty.cols.end as i64,
-            west,
+            cols: west..west + n_cols as i64,
             risks,
             ground,
+            is_unfamiliar,
         }
-    };
-    slices.enumerate().map(task).collect()
-}
-
-fn union(a: CellRegion, b: CellRegion) -> CellRegion {
-    if a.n_cells() == 0 {
-        return b;
-    }
-    if b.n_cells() == 0 {
-        return a;
-    }
-    CellRegion {
-        rows: a.rows.start.min(b.rows.start)..a.rows.end.max(b.rows.end),
-        cols: a.cols.start.min(b.cols.start)..a.cols.end.max(b.cols.end),
-    }
+    })
 }
 
 impl BeliefLayers {
@@ -334,7 +315,8 @@ impl BeliefLayers {
             }
         }
         let window = GridGeometry { resolution_m, ..*field.window() };
-        let ground = PatchGround::unknown(window, ratio, layout.height_scale_m);
+        let felt = stencils.iter().flat_map(|stencil| &stencil.felt);
+        let ground = PatchGround::unknown(window, ratio, layout.height_scale_m, felt);
         let mut layers =
             Self { field, ground, stencils, n_yaws, reach, layout, predictor, fusion, instructions };
         layers.place_ground();
@@ -351,7 +333,8 @@ impl BeliefLayers {
         let resolution_m = self.ground.window().resolution_m;
         let window =
             GridGeometry { resolution_m, origin: [first(0), first(1)], n_rows: count(1), n_cols: count(0) };
-        self.ground = self.ground.moved_to(window);
+        let felt = self.stencils.iter().flat_map(|stencil| &stencil.felt);
+        self.ground = self.ground.moved_to(window, felt);
         for (index, stencil) in self.stencils.iter_mut().enumerate() {
             let col = ratio.like(index / self.n_yaws % ratio.n_phases(), risk.origin[0]);
             stencil.lay_on(self.ground.planes(), [ratio.base(col), ratio.base(risk.origin[1])]);
@@ -364,31 +347,11 @@ impl BeliefLayers {
         &self.stencils[(row_phase * ratio.n_phases() + col_phase) * self.n_yaws + yaw]
     }
 
-    /// Takes over what changed of the surface, everything for `None`; returns the cells whose networks read that.
-    fn read_ground(&mut self, surface: &GridMap<SurfaceCell>, changed: Option<&CellRegion>) -> CellRegion {
-        let window = *self.field.window();
-        let Some(changed) = changed else {
-            let ground = *self.ground.window();
-            let n = [ground.n_cols, ground.n_rows];
-            let last = [0, 1].map(|axis| ground.origin[axis] + n[axis] as i64 - 1);
-            self.ground.read(surface, ground.origin, last);
-            return CellRegion::whole(&window);
-        };
-        if changed.n_cells() == 0 {
-            return CellRegion { rows: 0..0, cols: 0..0 };
-        }
-        let origin = surface.geometry().origin;
-        let min = [origin[0] + changed.cols.start as i64, origin[1] + changed.rows.start as i64];
-        let max = [origin[0] + changed.cols.end as i64 - 1, origin[1] + changed.rows.end as i64 - 1];
-        self.ground.read(surface, min, max);
-        let readers = |axis: usize, n: usize| {
-            let reads = |index: &usize| {
-                let base = self.field.ratio().base(window.origin[axis] + *index as i64);
-                base + self.reach[0][axis] <= max[axis] && base + self.reach[1][axis] >= min[axis]
-            };
-            let start = (0..n).find(reads).unwrap_or(n);
-            start..(start..n).rev().find(reads).map_or(start, |last| last + 1)
-        };
-        CellRegion { rows: readers(1, window.n_rows), cols: readers(0, window.n_cols) }
+    /// Of the poses of a line, one bit each: those that are to be judged.
+    fn changed(&self, line: &PoseLine) -> u64 {
+        let PoseLine { cell, yaw, n_lanes } = *line;
+        let base = cell.map(|index| self.field.ratio().base(index));
+        let by_networks = self.ground.changed(&self.stencil(cell, yaw).felt, base);
+        self.field.changed(line) | (by_networks & (u64::MAX >> (ASKED - n_lanes)))
     }
 }

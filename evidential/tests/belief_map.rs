@@ -253,10 +253,35 @@ fn a_partial_update_equals_the_whole_map_bit_by_bit() {
             for cell in region.cells() {
                 surface[cell] = changed[cell];
             }
-            partly.update_dirty(&surface, &region).unwrap();
+            partly.update(&surface).unwrap();
             assert_eq!(partly.risk_map(), map_of(&checkpoint, Unfamiliar::Fuse, &surface, risk).risk_map());
         }
     }
+}
+
+/// Networks whose patch reaches beyond all that physics feels of a pose.
+#[test]
+fn what_networks_alone_read_is_judged_anew() {
+    let mut checkpoint = checkpoint(Method::Vanilla, 9);
+    checkpoint.sidecar.layout.height_patch.spacing_m *= 4.0;
+    let open = SurfaceCell::certain(0.3, TerrainClass::Open, 0.0);
+    let mut surface = GridMap::filled(SURFACE, open);
+    let mut map = map_of(&checkpoint, Unfamiliar::Fuse, &surface, RISK);
+    let before = map.risk_map().clone();
+    let bump = Cell { row: 20, col: 22 };
+    surface[bump] = SurfaceCell { height_m: 0.4, ..open };
+    map.update(&surface).unwrap();
+    let whole = map_of(&checkpoint, Unfamiliar::Fuse, &surface, RISK);
+    assert!(map.risk_map() == whole.risk_map(), "the map that followed is not the map made whole");
+    let [bump_x_m, bump_y_m] = SURFACE.centre_m(bump);
+    let is_far = |[x_m, y_m, _]: [f64; 3]| (x_m - bump_x_m).hypot(y_m - bump_y_m) > 0.6;
+    let changed = poses(&before.view())
+        .into_iter()
+        .filter(|&(cell, yaw, pose)| {
+            is_far(pose) && map.risk_map().view().risk(cell, yaw) != before.view().risk(cell, yaw)
+        })
+        .count();
+    assert!(changed > 20, "{changed}");
 }
 
 #[test]
@@ -279,11 +304,11 @@ fn a_moved_window_or_another_level_is_a_whole_new_map() {
     let moved = GridGeometry { origin: [3, 5], ..RISK };
     let mut map = map_of(&checkpoint, Unfamiliar::Fuse, &surface, RISK);
     map.place_at(moved.origin);
-    map.update_dirty(&surface, &CellRegion { rows: 0..0, cols: 0..0 }).unwrap();
+    map.update(&surface).unwrap();
     assert_eq!(map.risk_map(), map_of(&checkpoint, Unfamiliar::Fuse, &surface, moved).risk_map());
     let careful = CvarLevel::new(0.1).unwrap();
     map.set_level(careful);
-    map.update_dirty(&surface, &CellRegion { rows: 0..1, cols: 0..1 }).unwrap();
+    map.update(&surface).unwrap();
     let mut fresh = BeliefMap::new(
         &CAR,
         &Learned { level: careful, ..learned(&checkpoint, Unfamiliar::Fuse) },

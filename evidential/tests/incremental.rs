@@ -10,8 +10,7 @@ use evidential::{BeliefMap, Learned, Method, Unfamiliar};
 use physics_prior::{Assumption, PriorMap};
 use proptest::prelude::*;
 use terrain::{
-    CellRegion, ElevationConfig, ElevationMap, GridGeometry, GridMap, Pose, RangePoint, Scan, SurfaceCell,
-    TerrainClass,
+    ElevationConfig, ElevationMap, GridGeometry, GridMap, Pose, RangePoint, Scan, SurfaceCell, TerrainClass,
 };
 use traversability::{CvarLevel, RiskMap};
 use untrained::{CAR, checkpoint};
@@ -107,9 +106,10 @@ impl Maps {
         }
     }
 
-    fn update(&mut self, surface: &GridMap<SurfaceCell>, changed: &CellRegion) {
-        self.prior.update_dirty(surface, changed).unwrap();
-        self.belief.update_dirty(surface, changed).unwrap();
+    /// Returns how many poses the networks judged.
+    fn update(&mut self, surface: &GridMap<SurfaceCell>) -> usize {
+        self.prior.update(surface).unwrap();
+        self.belief.update(surface).unwrap()
     }
 }
 
@@ -137,24 +137,53 @@ proptest! {
             recentre_m: 0.3,
             fading_m2ps: 1e-4,
             gap_radius_m: 0.2,
+            publish_turns: 2,
             ..ElevationConfig::scaled_to(CAR.length_m)
         };
         let mut elevation = ElevationMap::new(config).unwrap();
         let (mut pose, mut now_ns) = (Pose { z_m: 1.0, ..Pose::default() }, 0);
         let everything = [-2.0..2.0, -2.0..2.0];
         elevation.fuse(&scan(now_ns, &pose, &everything, 0.0), &pose).unwrap();
-        elevation.take_changed();
         let mut followed = Maps::whole(RISK, elevation.surface());
         for step in steps {
             now_ns += step.elapsed_ns;
             (pose.x_m, pose.y_m) = (pose.x_m + step.way_m[0], pose.y_m + step.way_m[1]);
             elevation.fuse(&scan(now_ns, &pose, &step.seen_m, step.bump_m), &pose).unwrap();
-            let changed = elevation.take_changed().unwrap_or(CellRegion { rows: 0..0, cols: 0..0 });
             followed.follow(&pose);
-            followed.update(elevation.surface(), &changed);
+            followed.update(elevation.surface());
             let whole = Maps::whole(*followed.prior.risk_map().geometry(), elevation.surface());
             prop_assert!(bits(followed.prior.risk_map()) == bits(whole.prior.risk_map()), "the prior's map");
             prop_assert!(bits(followed.belief.risk_map()) == bits(whole.belief.risk_map()), "the learned map");
         }
     }
+}
+
+/// What is judged anew is what reads a cell that changed, and what entered the window.
+#[test]
+fn little_is_judged_where_little_changed() {
+    let window = GridGeometry { n_rows: 40, n_cols: 44, ..RISK };
+    let around = GridGeometry { origin: [-29, -28], n_rows: 80, n_cols: 84, ..RISK };
+    let level = SurfaceCell::certain(0.1, TerrainClass::Open, 0.0);
+    let mut surface = GridMap::filled(around, level);
+    let mut maps = Maps::whole(window, &surface);
+    let n_poses = window.n_cells() * N_YAWS;
+    assert_eq!(maps.update(&surface), 0, "nothing changed");
+    // The car covers less than five by five cells, and wheels feel one more around.
+    surface[terrain::Cell { row: 40, col: 42 }] = SurfaceCell { height_m: 0.12, ..level };
+    let n_judged = maps.update(&surface);
+    assert!((N_YAWS * 9..N_YAWS * 120).contains(&n_judged), "{n_judged}");
+    let is_whole = |maps: &Maps, surface: &GridMap<SurfaceCell>| {
+        let whole = Maps::whole(*maps.prior.risk_map().geometry(), surface);
+        bits(maps.belief.risk_map()) == bits(whole.belief.risk_map())
+            && bits(maps.prior.risk_map()) == bits(whole.prior.risk_map())
+    };
+    assert!(is_whole(&maps, &surface));
+    // Twice before the next update; four columns of 44 are new, and the border of before.
+    for origin in [[-7, -8], [-5, -8]] {
+        maps.prior.place_at(origin);
+        maps.belief.place_at(origin);
+    }
+    let n_judged = maps.update(&surface);
+    assert!((n_poses / 11..n_poses / 4).contains(&n_judged), "{n_judged} of {n_poses}");
+    assert!(is_whole(&maps, &surface));
 }

@@ -232,7 +232,7 @@ typedef struct SurefootRiskHeader {
     /* Yaw bins; bin k is centred at (k + 1/2) 2 pi / n_yaws. */
     uint64_t n_yaws;
     /* Who judged the ground: 1 = what was learned, 2 = physics alone. */
-    uint64_t author;
+    uint64_t map_source;
     /* The map of the ground that was judged. */
     SurefootSource surface;
     /* When the odometry was measured in whose frame that map lies [ns]. */
@@ -252,7 +252,7 @@ static_assert(sizeof(SurefootRiskHeader) == 176, "RiskHeader");
 static_assert(offsetof(SurefootRiskHeader, stamp) == 0, "RiskHeader.stamp");
 static_assert(offsetof(SurefootRiskHeader, grid) == 40, "RiskHeader.grid");
 static_assert(offsetof(SurefootRiskHeader, n_yaws) == 80, "RiskHeader.n_yaws");
-static_assert(offsetof(SurefootRiskHeader, author) == 88, "RiskHeader.author");
+static_assert(offsetof(SurefootRiskHeader, map_source) == 88, "RiskHeader.map_source");
 static_assert(offsetof(SurefootRiskHeader, surface) == 96, "RiskHeader.surface");
 static_assert(offsetof(SurefootRiskHeader, odometry_at_ns) == 112, "RiskHeader.odometry_at_ns");
 static_assert(offsetof(SurefootRiskHeader, stuck) == 120, "RiskHeader.stuck");
@@ -299,7 +299,7 @@ typedef struct SurefootDecisionRecord {
     /* The risk map; none when there was none. */
     SurefootSource risk;
     /* Who made that map: 0 = none, 1 = what was learned, 2 = physics alone. */
-    uint64_t author;
+    uint64_t map_source;
     /* What was said last of where to go. */
     SurefootSource mission;
     /* The newest map of what was learned that there was to choose from. */
@@ -342,7 +342,7 @@ static_assert(offsetof(SurefootDecisionRecord, decided_at_ns) == 40, "DecisionRe
 static_assert(offsetof(SurefootDecisionRecord, odometry) == 48, "DecisionRecord.odometry");
 static_assert(offsetof(SurefootDecisionRecord, n_odometry) == 64, "DecisionRecord.n_odometry");
 static_assert(offsetof(SurefootDecisionRecord, risk) == 72, "DecisionRecord.risk");
-static_assert(offsetof(SurefootDecisionRecord, author) == 88, "DecisionRecord.author");
+static_assert(offsetof(SurefootDecisionRecord, map_source) == 88, "DecisionRecord.map_source");
 static_assert(offsetof(SurefootDecisionRecord, mission) == 96, "DecisionRecord.mission");
 static_assert(offsetof(SurefootDecisionRecord, learned) == 112, "DecisionRecord.learned");
 static_assert(offsetof(SurefootDecisionRecord, physics) == 128, "DecisionRecord.physics");

@@ -321,7 +321,7 @@ class RiskHeader(ctypes.Structure):
         # Yaw bins; bin k is centred at (k + 1/2) 2 pi / n_yaws.
         ("n_yaws", ctypes.c_uint64),
         # Who judged the ground: 1 = what was learned, 2 = physics alone.
-        ("author", ctypes.c_uint64),
+        ("map_source", ctypes.c_uint64),
         # The map of the ground that was judged.
         ("surface", Source),
         # When the odometry was measured in whose frame that map lies [ns].
@@ -347,7 +347,7 @@ assert ctypes.sizeof(RiskHeader) == 176
 assert RiskHeader.stamp.offset == 0
 assert RiskHeader.grid.offset == 40
 assert RiskHeader.n_yaws.offset == 80
-assert RiskHeader.author.offset == 88
+assert RiskHeader.map_source.offset == 88
 assert RiskHeader.surface.offset == 96
 assert RiskHeader.odometry_at_ns.offset == 112
 assert RiskHeader.stuck.offset == 120
@@ -406,7 +406,7 @@ class DecisionRecord(ctypes.Structure):
         # The risk map; none when there was none.
         ("risk", Source),
         # Who made that map: 0 = none, 1 = what was learned, 2 = physics alone.
-        ("author", ctypes.c_uint64),
+        ("map_source", ctypes.c_uint64),
         # What was said last of where to go.
         ("mission", Source),
         # The newest map of what was learned that there was to choose from.
@@ -455,7 +455,7 @@ assert DecisionRecord.decided_at_ns.offset == 40
 assert DecisionRecord.odometry.offset == 48
 assert DecisionRecord.n_odometry.offset == 64
 assert DecisionRecord.risk.offset == 72
-assert DecisionRecord.author.offset == 88
+assert DecisionRecord.map_source.offset == 88
 assert DecisionRecord.mission.offset == 96
 assert DecisionRecord.learned.offset == 112
 assert DecisionRecord.physics.offset == 128

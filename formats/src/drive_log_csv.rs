@@ -6,8 +6,8 @@ use std::path::Path;
 use bicycle::{Column, DriveLog, DriveLogError, DriveRow};
 use csv::{ErrorKind, StringRecord};
 
-use crate::OutputError;
 use crate::results::write_atomic;
+use crate::{ColumnNames, OutputError};
 
 /// A drive log with the columns that have no meaning for Surefoot, so that writing it again loses nothing.
 #[derive(Clone, Debug, Default)]
@@ -59,9 +59,16 @@ pub enum DriveLogFileError {
 /// Errors: unreadable file, no `t`, a column named twice, rows of another length than the header, a cell that is no
 /// finite number, `t` that does not grow strictly within a run, a run whose rows do not stand together, no row.
 pub fn read_drive_log_csv(path: &Path) -> Result<DriveLogFile, DriveLogFileError> {
+    read_drive_log_csv_named(path, &ColumnNames::default())
+}
+
+/// Reads a drive log whose columns have names of their own.
+///
+/// Errors: those of [`read_drive_log_csv`]; neither a column that stands for one of ours nor that itself.
+pub fn read_drive_log_csv_named(path: &Path, names: &ColumnNames) -> Result<DriveLogFile, DriveLogFileError> {
     let file = path.display().to_string();
     match std::fs::read(path) {
-        Ok(text) => read(&text).map_err(|problem| problem.of(file, &text)),
+        Ok(text) => read(&text, names).map_err(|problem| problem.of(file, &text)),
         Err(source) => Err(DriveLogFileError::Unreadable { file, source }),
     }
 }
@@ -121,9 +128,11 @@ enum Meaning {
     Other(usize),
 }
 
-fn read(text: &[u8]) -> Result<DriveLogFile, Problem> {
+fn read(text: &[u8], names: &ColumnNames) -> Result<DriveLogFile, Problem> {
     let mut reader = csv::Reader::from_reader(text);
     let header: Vec<String> = reader.headers()?.iter().map(|name| clean(name).to_owned()).collect();
+    let renamed = names.renamed(&header);
+    let header = renamed.map_err(|expected| Problem::new(0, "header", &expected, only(&header)))?;
     let mut file = DriveLogFile::default();
     let meanings = meanings(&header, &mut file.other_columns)?;
     let mut record = StringRecord::new();
@@ -143,13 +152,17 @@ fn clean(name: &str) -> &str {
     name.trim_start_matches('\u{feff}').trim()
 }
 
+fn only(header: &[String]) -> String {
+    format!("only: {}", header.join(", "))
+}
+
 fn meanings(header: &[String], other_columns: &mut Vec<OtherColumn>) -> Result<Vec<Meaning>, Problem> {
     let repeated = header.iter().enumerate().find(|(index, name)| header[..*index].contains(name));
     if let Some((_, name)) = repeated {
         return Err(Problem::new(0, "header", "each column once", format!("'{name}' twice")));
     }
     if !header.iter().any(|name| name == "t") {
-        return Err(Problem::new(0, "header", "a column 't'", format!("only: {}", header.join(", "))));
+        return Err(Problem::new(0, "header", "a column 't'", only(header)));
     }
     let mut meaning = |name: &String| match name.as_str() {
         "run" => Meaning::Run,

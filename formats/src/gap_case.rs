@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 
 use crate::{ConfigError, ConfigText};
-pub use drive::{DriveFileError, ReadDrive, read_drive};
+pub use drive::{DriveFileError, ReadDrive, read_drive, read_drive_named};
 pub use grid::GapGround;
 pub use labels::{GapKind, GapLabel, parse_gap_labels, read_gap_labels};
 pub use vehicle::{GapNoise, GapVehicle, GapVehicleError, read_gap_vehicle};

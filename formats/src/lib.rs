@@ -17,6 +17,7 @@
 //! ```
 
 mod cells;
+mod column_names;
 mod config;
 mod drive_log_csv;
 mod elevation;
@@ -34,16 +35,18 @@ mod skid_steer;
 mod traction_map;
 mod vehicle;
 
+pub use column_names::{ColumnNames, ColumnNamesError};
 pub use config::{ConfigError, ConfigText};
 pub use drive_log_csv::{
-    DriveLogFile, DriveLogFileError, OtherColumn, read_drive_log_csv, write_drive_log_csv,
+    DriveLogFile, DriveLogFileError, OtherColumn, read_drive_log_csv, read_drive_log_csv_named,
+    write_drive_log_csv,
 };
 pub use elevation::{
     ElevationError, ElevationFile, ElevationLayers, PngScale, read_elevation, read_elevation_png,
 };
 pub use gap_case::{
     DriveFileError, GapCase, GapGround, GapKind, GapLabel, GapNoise, GapVehicle, GapVehicleError, ReadDrive,
-    parse_gap_labels, read_drive, read_gap_case, read_gap_labels, read_gap_vehicle,
+    parse_gap_labels, read_drive, read_drive_named, read_gap_case, read_gap_labels, read_gap_vehicle,
 };
 pub use gap_case_write::{
     GapSeal, GapSealError, read_sealed_labels, write_gap_case, write_gap_labels, write_gap_seal,

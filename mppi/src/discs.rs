@@ -94,15 +94,15 @@ impl MovingDiscs {
         self.discs[..self.n * self.n_steps].chunks_exact(self.n_steps.max(1)).map(move |places| &places[t])
     }
 
-    /// From the rim of a disc to the body at a pose [m]; negative where they overlap.
-    fn gap_m(&self, state: &MotionState, disc: &Disc) -> f64 {
+    /// From the body at a pose to a place [m]; 0 within the body.
+    pub fn distance_m(&self, state: &MotionState, [x_m, y_m]: [f64; 2]) -> f64 {
         let (sin, cos) = libm::sincos(state.yaw_rad);
-        let [east_m, north_m] = [disc.centre_m[0] - state.x_m, disc.centre_m[1] - state.y_m];
+        let [east_m, north_m] = [x_m - state.x_m, y_m - state.y_m];
         let (ahead_m, left_m) = (cos * east_m + sin * north_m, cos * north_m - sin * east_m);
         let Outline { front_m, rear_m, half_width_m } = self.outline;
         let beyond_m = (ahead_m - front_m).max(-rear_m - ahead_m).max(0.0);
         let beside_m = (left_m.abs() - half_width_m).max(0.0);
-        libm::hypot(beyond_m, beside_m) - disc.radius_m
+        libm::hypot(beyond_m, beside_m)
     }
 }
 
@@ -132,7 +132,7 @@ impl StepCost for MovingDiscs {
     }
 
     fn forbids(&self, t: usize, state: &MotionState) -> bool {
-        self.at(t).any(|disc| self.gap_m(state, disc) < 0.0)
+        self.at(t).any(|disc| self.distance_m(state, disc.centre_m) < disc.radius_m)
     }
 
     fn foresight_s(&self) -> Option<f64> {

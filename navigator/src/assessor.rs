@@ -1,11 +1,9 @@
 //! The second part of the pipeline: the map of the ground becomes risk and time to the goal.
 
-mod change;
-
 use bicycle::lanes::Instructions;
 use bicycle::{Geometry, MotionLimits};
 use mppi::{CostToGo, CostToGoView};
-use terrain::{CellRegion, DistantPosition, GridMap, SurfaceCell};
+use terrain::{DistantPosition, GridMap, SurfaceCell};
 use traversability::{CvarLevel, Risk, RiskMapView};
 
 use crate::areas::Barrier;
@@ -14,7 +12,6 @@ use crate::risk::{Belief, RiskLayer};
 use crate::{
     Config, Jump, MessageId, MissionMessage, NavigatorError, RiskHeader, StuckMessage, SurfaceHeader,
 };
-use change::changed_region;
 
 /// Judges the ground and finds the least time over it to the goal. Only what has changed since the map of the ground
 /// before is judged anew.
@@ -23,9 +20,7 @@ pub struct Assessor {
     barrier: Barrier,
     recipe: Recipe,
     cost_to_go: CostToGo,
-    /// The map of the ground that was judged last.
-    surface: Option<GridMap<SurfaceCell>>,
-    /// What it said of itself.
+    /// What the map of the ground that was judged last said of itself.
     judged: Option<SurfaceHeader>,
     /// Life of the surveyor and all jumps that it has told of.
     shift: (u64, Jump),
@@ -82,7 +77,6 @@ impl Assessor {
                 window.n_rows,
                 window.n_cols,
             )?,
-            surface: None,
             judged: None,
             shift: (0, Jump::NONE),
             frame: Frame::default(),
@@ -116,7 +110,6 @@ impl Assessor {
         other.judge_at(self.level())?;
         self.layer.stuck().iter().for_each(|(at_ns, pose)| other.layer.note_stuck(*pose, *at_ns));
         (self.layer, self.barrier, self.recipe) = (other.layer, other.barrier, other.recipe);
-        self.surface = None;
         Ok(())
     }
 
@@ -168,17 +161,13 @@ impl Assessor {
     pub fn judge(
         &mut self,
         header: &SurfaceHeader,
-        surface: GridMap<SurfaceCell>,
+        surface: &GridMap<SurfaceCell>,
     ) -> Result<(), NavigatorError> {
         self.hear_surface(header);
-        let changed = self.surface.as_ref().map_or_else(
-            || CellRegion::whole(surface.geometry()),
-            |last| changed_region(last, &surface).unwrap_or(CellRegion { rows: 0..0, cols: 0..0 }),
-        );
         let [x_m, y_m, _] = header.odometry.position_m;
         DistantPosition::check([x_m, y_m], self.layer.resolution_m())?;
-        self.layer.update([x_m, y_m], self.barrier.bar(&surface), &changed)?;
-        (self.surface, self.judged) = (Some(surface), Some(*header));
+        self.layer.update([x_m, y_m], self.barrier.bar(surface))?;
+        self.judged = Some(*header);
         Ok(())
     }
 

@@ -133,7 +133,7 @@ pub struct RiskMessage<'a> {
     pub content: Option<(RiskMapView<'a>, CostToGoView<'a>)>,
 }
 
-/// The newest risk map of each author.
+/// The newest risk map of each source.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct RiskMessages<'a> {
     /// By whoever judges the ground as the method says.
@@ -231,7 +231,7 @@ pub struct DecisionMessage<C = Command> {
     pub odometry_at_ns: u64,
     /// The risk map that it was made on.
     pub risk: Option<(RiskMapSource, RiskHeader)>,
-    /// The newest risk map of each author that there was to choose from: learned, physics.
+    /// The newest risk map of each source that there was to choose from: learned, physics.
     pub held: [MessageId; 2],
     /// What was known last of what moves.
     pub tracks: MessageId,

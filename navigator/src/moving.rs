@@ -1,11 +1,16 @@
 //! What moves: how it is tracked, what its nearness costs, and how near a plan may come.
 
+use bicycle::MotionState;
 use mppi::{Disc, DiscPrices, MovingDiscs, Outline};
 use serde::{Deserialize, Serialize};
 use terrain::BodyBox;
 use tracking::{TRACKS_MAX, Track, TrackingConfig};
 
 use crate::{Jump, TracksMessage};
+
+/// Who leaves somebody who stands closer than he should may come closer by half of what is left, within these [m]: no way out
+/// of a narrow place leads straight away.
+const LEAVING_SLACK_M: [f64; 2] = [0.01, 0.05];
 
 /// How moving obstacles are dealt with.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -76,8 +81,10 @@ impl MovingConfig {
     }
 }
 
-/// When the steps of a plan are, and in which frame it is made.
+/// When the steps of a plan are, in which frame it is made, and from where.
 pub(crate) struct Horizon<'a> {
+    /// Where the vehicle is, in the frame of the plan.
+    pub vehicle: MotionState,
     /// From the scan that the tracks are of to the start of the first step [s].
     pub begins_s: f64,
     /// Of a step [s].
@@ -86,7 +93,8 @@ pub(crate) struct Horizon<'a> {
     pub shift: Option<&'a Jump>,
 }
 
-/// Lays the places where tracked things will be over the steps of a plan.
+/// Lays the places where tracked things will be over the steps of a plan. Who stands closer than the clearance may be left,
+/// but not come closer to.
 pub(crate) fn lay_out(
     discs: &mut MovingDiscs,
     tracks: &TracksMessage,
@@ -97,12 +105,18 @@ pub(crate) fn lay_out(
     let density_m2ps3 = config.tracking.acceleration_density_m2ps3;
     for track in tracks.tracks() {
         let track = horizon.shift.map_or(*track, |jump| carried(track, jump));
+        let [east_mps, north_mps] = track.velocity_mps;
+        let stands = libm::hypot(east_mps, north_mps) < config.tracking.speed_min_mps;
+        let gap_m = discs.distance_m(&horizon.vehicle, track.position_m) - track.radius_m;
+        let [least_m, most_m] = LEAVING_SLACK_M;
+        let slack_m = (0.5 * gap_m).clamp(least_m, most_m);
+        let clearance_max_m = if stands { gap_m - slack_m } else { f64::INFINITY };
         discs.add(|t| {
             let place = track.predicted(horizon.begins_s + horizon.step_s * (t + 1) as f64, density_m2ps3);
             let uncertain_m = (config.place_std * place.std_m).min(config.uncertainty_max_m);
             Disc {
-                centre_m: place.position_m,
-                radius_m: place.radius_m + config.clearance_m + uncertain_m,
+                centre_m: if stands { track.position_m } else { place.position_m },
+                radius_m: place.radius_m + (config.clearance_m + uncertain_m).min(clearance_max_m),
                 margin_m: config.margin_m,
             }
         });
@@ -139,6 +153,12 @@ mod tests {
         MovingConfig { tracking: exact, clearance_m: 0.2, ..MovingConfig::default() }
     }
 
+    /// From a vehicle that is far away.
+    fn horizon() -> Horizon<'static> {
+        let vehicle = MotionState { x_m: -50.0, ..MotionState::default() };
+        Horizon { vehicle, begins_s: 0.0, step_s: 0.1, shift: None }
+    }
+
     fn forbidden(discs: &MovingDiscs, t: usize, [x_m, y_m]: [f64; 2]) -> bool {
         discs.forbids(t, &bicycle::MotionState { x_m, y_m, ..bicycle::MotionState::default() })
     }
@@ -146,7 +166,7 @@ mod tests {
     #[test]
     fn places_lie_where_the_tracks_lead_by_the_end_of_each_step() {
         let mut discs = config().discs(&BodyBox::EMPTY, 20);
-        let horizon = Horizon { begins_s: 0.3, step_s: 0.1, shift: None };
+        let horizon = Horizon { begins_s: 0.3, ..horizon() };
         lay_out(&mut discs, &message(&[track([5.0, 1.0], [-1.0, 0.5])]), &config(), &horizon);
         // Step 6 ends 1 s after the scan: at (4, 1.5) m.
         assert!(forbidden(&discs, 6, [4.0, 1.02]) && !forbidden(&discs, 6, [4.0, 0.98]));
@@ -160,7 +180,7 @@ mod tests {
     fn a_frame_that_moved_takes_places_and_ways_along() {
         let mut discs = config().discs(&BodyBox::EMPTY, 20);
         let jump = Jump { step_m: [10.0, 0.0, 0.0], yaw_rad: std::f64::consts::FRAC_PI_2 };
-        let horizon = Horizon { begins_s: 0.0, step_s: 0.1, shift: Some(&jump) };
+        let horizon = Horizon { shift: Some(&jump), ..horizon() };
         lay_out(&mut discs, &message(&[track([3.0, 0.0], [1.0, 0.0])]), &config(), &horizon);
         assert!(forbidden(&discs, 9, [10.0, 4.0]) && !forbidden(&discs, 9, [4.0, 0.0]));
     }
@@ -170,13 +190,28 @@ mod tests {
         let variance = Variance { position_m2: 0.16, ..Variance::default() };
         let unsure = Track { variance, ..track([5.0, 0.0], [0.0; 2]) };
         let wild = Track { variance: Variance { position_m2: 1e6, ..variance }, ..unsure };
-        let horizon = Horizon { begins_s: 0.0, step_s: 0.1, shift: None };
+        let horizon = horizon();
         for (track, radius_m) in [(unsure, 0.9), (wild, 0.5 + MovingConfig::default().uncertainty_max_m)] {
             let mut discs = config().discs(&BodyBox::EMPTY, 5);
             lay_out(&mut discs, &message(&[track]), &config(), &horizon);
             assert!(forbidden(&discs, 0, [5.0 - radius_m + 0.01, 0.0]), "{radius_m}");
             assert!(!forbidden(&discs, 0, [5.0 - radius_m - 0.01, 0.0]), "{radius_m}");
         }
+    }
+
+    /// He stands 0.5 m from the vehicle, a point, and 0.2 m of that are between his side and it: it may be left, but not come
+    /// closer to. Who walks is kept away from as ever.
+    #[test]
+    fn who_stands_too_close_may_be_left() {
+        let vehicle = MotionState { x_m: 4.5, ..MotionState::default() };
+        let variance = Variance { position_m2: 0.04, ..Variance::default() };
+        let close = Track { variance, ..track([5.0, 0.0], [0.0; 2]) };
+        let mut discs = config().discs(&BodyBox::EMPTY, 5);
+        lay_out(&mut discs, &message(&[close]), &config(), &Horizon { vehicle, ..horizon() });
+        assert!(forbidden(&discs, 4, [4.56, 0.0]) && !forbidden(&discs, 4, [4.54, 0.0]));
+        let walks = Track { velocity_mps: [0.0, 0.3], ..close };
+        lay_out(&mut discs, &message(&[walks]), &config(), &Horizon { vehicle, ..horizon() });
+        assert!(forbidden(&discs, 0, [4.49, 0.0]), "0.3 m of radius, 0.2 of clearance, 0.2 unsure");
     }
 
     #[test]

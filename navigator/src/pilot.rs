@@ -165,7 +165,7 @@ impl<M: Driven> Pilot<M> {
     pub fn answer(&mut self, now_ns: u64, maps: &RiskMessages<'_>) -> DecisionMessage<M::Command> {
         let cycle = self.cycle;
         let chosen = self.choose(now_ns, maps);
-        let used = chosen.and_then(|(author, map)| Some((author, map.header, risk_input(map)?)));
+        let used = chosen.and_then(|(source, map)| Some((source, map.header, risk_input(map)?)));
         if let Some((_, header, _)) = used {
             self.note_map(header.valid_at_ns);
         }
@@ -194,7 +194,7 @@ impl<M: Driven> Pilot<M> {
             decided_at_ns: now_ns,
             odometry: self.ledger.take_count(),
             odometry_at_ns,
-            risk: used.map(|(author, header, _)| (author, header)),
+            risk: used.map(|(source, header, _)| (source, header)),
             held: [id_of(&maps.learned), id_of(&maps.physics)],
             tracks: self.tracks.map_or_else(Default::default, |tracks| tracks.id),
             mission: mission.map_or_else(Default::default, |mission| mission.id),
@@ -242,7 +242,7 @@ impl<M: Driven> Pilot<M> {
             self.decided_at_ns.map_or(0.0, |then_ns| now_ns.saturating_sub(then_ns) as f64 * 1e-9);
         let decision = match self.ready(now_ns, risk, instruction) {
             Ok((risk, odometry, target)) => {
-                self.lay_out_tracks(now_ns, &risk);
+                self.lay_out_tracks(now_ns, &risk, &odometry);
                 self.ask(&risk, &odometry, &target)
             }
             Err(decision) => {
@@ -325,13 +325,16 @@ impl<M: Driven> Pilot<M> {
     }
 
     /// Tells the controller where what moves will be, in the frame of the map that it plans on.
-    fn lay_out_tracks(&mut self, now_ns: u64, risk: &RiskInput<'_>) {
+    fn lay_out_tracks(&mut self, now_ns: u64, risk: &RiskInput<'_>, odometry: &Odometry) {
         let Some(((moving, _), tracks)) = self.moving.zip(self.tracks) else { return };
         let shift = self.ledger.moved_between(tracks.frame_at_ns, risk.odometry_at_ns);
         let step_s = self.controller.config().step_s;
         let age_s = now_ns.saturating_sub(tracks.valid_at_ns) as f64 * 1e-9;
         let begins_s = age_s + self.controller.config().delay_s;
-        let horizon = Horizon { begins_s, step_s, shift: shift.as_ref() };
+        let back = self.ledger.moved_since(risk.odometry_at_ns).map(|jump| jump.inverse());
+        let state = self.controller.model().measured_state(odometry);
+        let vehicle = in_map_frame(state, back.as_ref()).into();
+        let horizon = Horizon { vehicle, begins_s, step_s, shift: shift.as_ref() };
         lay_out(self.controller.step_cost_mut(), &tracks, &moving, &horizon);
     }
 

@@ -8,7 +8,7 @@ use bicycle::lanes::Instructions;
 use evidential::{BeliefMapError, Checkpoint, Learned, Unfamiliar};
 use physics_prior::Assumption;
 use rayon::prelude::*;
-use terrain::{CellRegion, GridGeometry, GridMap, SurfaceCell};
+use terrain::{GridGeometry, GridMap, SurfaceCell};
 use traversability::{CvarLevel, Risk, RiskMapView};
 
 use crate::Jump;
@@ -167,14 +167,9 @@ impl RiskLayer {
         &mut self,
         position_m: [f64; 2],
         surface: &GridMap<SurfaceCell>,
-        changed: &CellRegion,
     ) -> Result<(), BeliefMapError> {
         let is_moved = self.follow(position_m);
-        if self.is_filled {
-            self.estimator.update_dirty(surface, changed)?;
-        } else {
-            self.estimator.update_all(surface)?;
-        }
+        self.estimator.update(surface)?;
         if let Some((oracle, answer)) = self.oracle.as_mut().filter(|_| is_moved) {
             let known = self.estimator.risk_map().view();
             oracle(&known.geometry, known.n_yaws, answer);

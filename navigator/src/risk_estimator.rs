@@ -4,7 +4,7 @@ use bicycle::Geometry;
 use bicycle::lanes::Instructions;
 use evidential::{BeliefMap, BeliefMapError, Learned};
 use physics_prior::{Assumption, PriorMap};
-use terrain::{CellRegion, GridGeometry, GridMap, SurfaceCell};
+use terrain::{GridGeometry, GridMap, SurfaceCell};
 use traversability::RiskMap;
 
 /// Makes a risk map of a surface and keeps it up to date, whoever judges the ground.
@@ -75,18 +75,14 @@ impl RiskEstimator {
         }
     }
 
-    /// Takes over the cells of the surface that changed since the last update: the result is that of a full one.
+    /// Takes over a surface and judges anew what changed since the last update: the result is that of a full one.
     ///
     /// # Errors
     /// The surface has another resolution than the map was made for.
-    pub fn update_dirty(
-        &mut self,
-        surface: &GridMap<SurfaceCell>,
-        changed: &CellRegion,
-    ) -> Result<(), BeliefMapError> {
+    pub fn update(&mut self, surface: &GridMap<SurfaceCell>) -> Result<(), BeliefMapError> {
         match self {
-            Self::Prior(map) => Ok(map.update_dirty(surface, changed)?),
-            Self::Networks(map) => map.update_dirty(surface, changed).map(drop),
+            Self::Prior(map) => Ok(map.update(surface)?),
+            Self::Networks(map) => map.update(surface).map(drop),
         }
     }
 }

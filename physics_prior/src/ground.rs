@@ -7,7 +7,8 @@ use rayon::prelude::*;
 use terrain::{GridGeometry, GridMap, SurfaceCell};
 
 use crate::ball::Ball;
-use crate::lane_ground::LaneGround;
+use crate::ground_changes::CellRead;
+use crate::lane_ground::{LaneGround, counts};
 use crate::lattice::ResolutionRatio;
 use crate::lengths::Lengths;
 
@@ -73,9 +74,9 @@ pub(crate) struct ContactGround {
 
 /// Cells of the padded ground.
 #[derive(Clone)]
-struct Area {
-    rows: Range<usize>,
-    cols: Range<usize>,
+pub(crate) struct Area {
+    pub rows: Range<usize>,
+    pub cols: Range<usize>,
 }
 
 impl ContactGround {
@@ -120,8 +121,9 @@ impl ContactGround {
         row * self.window.n_cols + col
     }
 
-    /// Takes over what changed in the surface's lattice rectangle from `min` to `max`, both inclusive.
-    pub fn read(&mut self, surface: &GridMap<SurfaceCell>, min: [i64; 2], max: [i64; 2]) {
+    /// Takes over what changed in the surface's lattice rectangle from `min` to `max`, both inclusive. Returns the cells
+    /// that may be others than before.
+    pub fn read(&mut self, surface: &GridMap<SurfaceCell>, min: [i64; 2], max: [i64; 2]) -> Area {
         let [west, south] = self.window.origin;
         let reach = self.wheel.reach + self.baseline + 1;
         let area = Area {
@@ -134,7 +136,20 @@ impl ContactGround {
         self.read_contacts(surface, &area);
         self.fill_holes(&area);
         self.lanes.count(surface, area.rows.clone(), area.cols.start);
-        self.lanes.read(area.rows, &self.contacts, &self.bumps_m);
+        self.lanes.read(area.rows.clone(), &self.contacts, &self.bumps_m);
+        area
+    }
+
+    /// What poses read of a cell.
+    pub fn cell_read(&self, surface: &GridMap<SurfaceCell>, row: usize, col: usize) -> CellRead {
+        let [west, south] = self.window.origin;
+        let index = row * self.window.n_cols + col;
+        let values = &self.contacts[index].values;
+        CellRead {
+            contact: std::array::from_fn(|value| values[value].to_bits()),
+            bump: self.bumps_m[0][index].to_bits(),
+            counts: counts(cell_at(surface, [west + col as i64, south + row as i64])),
+        }
     }
 
     fn read_heights(&mut self, surface: &GridMap<SurfaceCell>, area: &Area) {

@@ -78,7 +78,7 @@ impl LaneGround {
             let mut sums = [self.vegetation[first], self.obstacles[first], self.unknown[first]];
             for col in first_col..n_cols {
                 let cell = surface.at_lattice(lattice(col)).unwrap_or(&SurfaceCell::UNKNOWN);
-                sums.iter_mut().zip(counts(cell)).for_each(|(sum, count)| *sum += count);
+                sums.iter_mut().zip(counts(cell)).for_each(|(sum, count)| *sum += f32::from(count));
                 let index = self.planes.index(lattice(col + 1));
                 [self.vegetation[index], self.obstacles[index], self.unknown[index]] = sums;
             }
@@ -87,11 +87,11 @@ impl LaneGround {
 }
 
 /// Shares of vegetation, obstacles and unknown cells that a cell counts for.
-fn counts(cell: &SurfaceCell) -> [f32; 3] {
+pub(crate) fn counts(cell: &SurfaceCell) -> [u8; 3] {
     let known = is_known(cell);
     let vegetation = cell.class_probability[TerrainClass::Vegetation as usize].clamp(0.0, 1.0);
     // Not a number counts as none.
-    let shares = if known { f32::from((vegetation * VEGETATION_SHARES).round() as u8) } else { 0.0 };
+    let shares = if known { (vegetation * VEGETATION_SHARES).round() as u8 } else { 0 };
     let is_obstacle = cell.class() == TerrainClass::Obstacle;
-    [shares, f32::from(u8::from(is_obstacle)), f32::from(u8::from(!known))]
+    [shares, u8::from(is_obstacle), u8::from(!known)]
 }

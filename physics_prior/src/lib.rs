@@ -42,8 +42,10 @@
 mod ball;
 mod belief;
 mod block_prior;
+mod cell_set;
 mod config;
 mod ground;
+mod ground_changes;
 mod lane_ground;
 mod lattice;
 mod lengths;
@@ -56,10 +58,12 @@ mod prior_map;
 mod skid_steer;
 mod stencil;
 mod tails;
+mod tally;
 mod triangle;
 
 pub use belief::PriorBelief;
 pub use block_prior::{BlockPrior, PoseLine};
+pub use cell_set::{ASKED, CellSet, CellSpan, stretches};
 pub use config::{PriorConfig, SlopeLaw};
 pub use lattice::ResolutionRatio;
 pub use planes::{Planes, span};

@@ -32,7 +32,12 @@ impl Planes {
 
     /// A layer of the same number everywhere, with as much beyond the last cell as may be read at a time.
     pub fn layer(&self, value: f32) -> Vec<f32> {
-        vec![value; self.window.n_rows * self.n_planes * self.n_plane_cols + SPAN]
+        vec![value; self.layer_len()]
+    }
+
+    /// Numbers in a layer.
+    pub fn layer_len(&self) -> usize {
+        self.window.n_rows * self.n_planes * self.n_plane_cols + SPAN
     }
 
     /// Position of a lattice cell in a layer; the cell that lies [`ResolutionRatio::stride`] further east follows it.

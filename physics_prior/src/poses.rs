@@ -1,18 +1,20 @@
 //! All poses of a risk map over the ground below.
 
 use bicycle::lanes::{Block, Instructions, Lanes, OnLanes, Real, SPAN, Scalar};
-use terrain::{GridGeometry, GridMap, SurfaceCell, TerrainClass};
-use traversability::{Bins, CvarLevel, Ground, GroundFlags, N_BINS};
+use terrain::{GridGeometry, GridMap, SurfaceCell};
+use traversability::{Bins, CvarLevel, Ground, N_BINS};
 
 use crate::PriorBelief;
 use crate::block_prior::{BlockPrior, PoseLine};
-use crate::ground::{Contact, ContactGround};
+use crate::ground::ContactGround;
+use crate::ground_changes::{Felt, GroundChanges};
 use crate::lattice::ResolutionRatio;
 use crate::lengths::Lengths;
 use crate::outcomes::Equations;
 use crate::pose::Placed;
 use crate::stencil::{Reach, Stencil};
 use crate::tails::{Tails, distribution};
+use crate::tally::Tally;
 
 /// How the ground under a pose becomes a risk.
 #[derive(Clone, Debug)]
@@ -42,6 +44,7 @@ pub(crate) struct Poses {
     stencils: Vec<Stencil>,
     reach: Reach,
     instructions: Instructions,
+    changes: GroundChanges,
 }
 
 impl Poses {
@@ -60,7 +63,9 @@ impl Poses {
         let reach = reach.grown(ContactGround::reach_of(&lengths, surface_resolution_m));
         let window = window(risk, ratio, reach, surface_resolution_m);
         let ground = ContactGround::unknown(window, ratio, &lengths);
-        let mut poses = Self { judgement, ground, lengths, ratio, n_yaws, stencils, reach, instructions };
+        let changes = GroundChanges::new(ground.lanes().planes(), &felt(&stencils));
+        let mut poses =
+            Self { judgement, ground, lengths, ratio, n_yaws, stencils, reach, instructions, changes };
         poses.lay_stencils(risk);
         poses
     }
@@ -69,7 +74,34 @@ impl Poses {
     pub fn move_to(&mut self, risk: &GridGeometry) {
         let window = window(risk, self.ratio, self.reach, self.ground.window().resolution_m);
         self.ground = ContactGround::unknown(window, self.ratio, &self.lengths);
+        self.changes.move_to(self.ground.lanes().planes(), &felt(&self.stencils));
         self.lay_stencils(risk);
+    }
+
+    /// Takes over the surface's lattice rectangle from `min` to `max`, both inclusive; outside of it nothing changed.
+    pub fn read_ground(&mut self, surface: &GridMap<SurfaceCell>, min: [i64; 2], max: [i64; 2]) {
+        let area = self.ground.read(surface, min, max);
+        self.changes.note(area.rows, area.cols, |row, col| self.ground.cell_read(surface, row, col));
+    }
+
+    /// Nothing changed.
+    pub fn keep_ground(&mut self) {
+        self.changes.note_none();
+    }
+
+    /// Of the poses of a line, one bit each, those that read a cell which the last reading changed. The bits after the last
+    /// pose mean nothing.
+    pub fn changed(&self, line: &PoseLine) -> u64 {
+        let (stencil, first) = self.stencil(line);
+        self.changes.felt_by(&stencil.felt, first)
+    }
+
+    /// How a line's poses read the ground, and the position of its first base cell in the layers.
+    fn stencil(&self, line: &PoseLine) -> (&Stencil, usize) {
+        let [col_phase, row_phase] = line.cell.map(|index| self.ratio.phase_index(index));
+        let stencil = (row_phase * self.ratio.n_phases() + col_phase) * self.n_yaws + line.yaw;
+        let base = line.cell.map(|index| self.ratio.base(index));
+        (&self.stencils[stencil], self.ground.lanes().planes().index(base))
     }
 
     fn lay_stencils(&mut self, risk: &GridGeometry) {
@@ -81,10 +113,9 @@ impl Poses {
         }
     }
 
-    /// Whether the pose in the centre of a risk cell depends on any surface cell from `min` to `max`, per axis.
-    pub fn reads(&self, axis: usize, risk_index: i64, min: i64, max: i64) -> bool {
-        let base = self.ratio.base(risk_index);
-        base + self.reach.min[axis] <= max && base + self.reach.max[axis] >= min
+    /// Bytes of the ground and of what was read of it.
+    pub fn n_bytes(&self) -> usize {
+        self.ground.n_bytes() + self.changes.n_bytes()
     }
 
     /// How the risk cells lie on those of the surface.
@@ -100,11 +131,7 @@ impl Poses {
     /// What the prior says of the poses of a line, from a lane of the block on. Whole spans are written: lines must
     /// come in the order of their lanes. The nominal judgement knows obstacles alone.
     pub fn read(&self, line: &PoseLine, first_lane: usize, block: &mut BlockPrior) {
-        let [col_phase, row_phase] = line.cell.map(|index| self.ratio.phase_index(index));
-        let stencil = (row_phase * self.ratio.n_phases() + col_phase) * self.n_yaws + line.yaw;
-        let base = line.cell.map(|index| self.ratio.base(index));
-        let first = self.ground.lanes().planes().index(base);
-        let stencil = &self.stencils[stencil];
+        let (stencil, first) = self.stencil(line);
         self.instructions.run_on_lanes(ReadLine { poses: self, stencil, first, line, first_lane, block });
     }
 
@@ -257,46 +284,8 @@ impl BlockCvar<'_> {
     }
 }
 
-/// Surface cells of one risk cell, added up.
-#[derive(Default)]
-struct Tally {
-    n_cells: u32,
-    n_known: u32,
-    gradient: [f32; 2],
-    class_probability: [f32; TerrainClass::COUNT],
-    obstacle: bool,
-}
-
-impl Tally {
-    fn add(&mut self, contact: &Contact, cell: Option<&SurfaceCell>) {
-        self.n_cells += 1;
-        if !contact.is_unknown() {
-            self.n_known += 1;
-            self.gradient[0] += contact.values[Contact::GRADIENT_EAST];
-            self.gradient[1] += contact.values[Contact::GRADIENT_NORTH];
-        }
-        if let Some(cell) = cell {
-            let sums = self.class_probability.iter_mut().zip(&cell.class_probability);
-            sums.for_each(|(sum, probability)| *sum += probability);
-            self.obstacle |= cell.class() == TerrainClass::Obstacle;
-        }
-    }
-
-    fn ground(&self) -> Ground {
-        let class = TerrainClass::ALL.into_iter().fold(TerrainClass::Open, |best, class| {
-            let likelier = self.class_probability[class as usize] > self.class_probability[best as usize];
-            if likelier { class } else { best }
-        });
-        let mut flags = GroundFlags::default();
-        if self.obstacle {
-            flags = flags.with(GroundFlags::OBSTACLE);
-        }
-        if 2 * self.n_known < self.n_cells {
-            flags = flags.with(GroundFlags::UNKNOWN);
-        }
-        let gradient = self.gradient.map(|sum| sum / self.n_known.max(1) as f32);
-        Ground { gradient, class: class as u8, flags }
-    }
+fn felt(stencils: &[Stencil]) -> Vec<&Felt> {
+    stencils.iter().map(|stencil| &stencil.felt).collect()
 }
 
 fn stencils(lengths: &Lengths, ratio: ResolutionRatio, resolution_m: f64, n_yaws: usize) -> Vec<Stencil> {
@@ -327,7 +316,7 @@ fn window(risk: &GridGeometry, ratio: ResolutionRatio, reach: Reach, resolution_
 #[cfg(test)]
 mod tests {
     use bicycle::{AxleDemand, Geometry};
-    use terrain::Cell;
+    use terrain::{Cell, TerrainClass};
 
     use super::*;
     use crate::{PriorConfig, SlopeLaw};

@@ -1,13 +1,12 @@
 //! The prior over every pose of a window, kept up to date with the surface. Whoever makes a risk map asks it.
 
-use std::ops::Range;
-
 use bicycle::Geometry;
 use bicycle::lanes::Instructions;
-use terrain::{CellRegion, GridGeometry, GridMap, SettingError, SurfaceCell};
+use terrain::{GridGeometry, GridMap, SettingError, SurfaceCell};
 use traversability::{CvarLevel, Ground, Risk};
 
 use crate::block_prior::{BlockPrior, PoseLine};
+use crate::cell_set::ASKED;
 use crate::lattice::ResolutionRatio;
 use crate::lengths::Lengths;
 use crate::outcomes::Equations;
@@ -24,8 +23,12 @@ const FOOTPRINT_CELLS_MAX: f64 = 500.0;
 pub struct PriorField {
     poses: Poses,
     window: GridGeometry,
-    /// The surface's window that was read; `None` while all of it must be read anew.
-    read_from: Option<GridGeometry>,
+    /// What was read last; `None` while all of it must be read anew.
+    surface: Option<GridMap<SurfaceCell>>,
+    /// The poses that were judged by what was read before.
+    judged: Rectangle,
+    /// Whether those that the last reading changed were judged too.
+    is_judged: bool,
 }
 
 impl PriorField {
@@ -57,7 +60,7 @@ impl PriorField {
         }
         let poses =
             Poses::new(judgement, lengths, (ratio, surface_resolution_m), &risk, n_yaws, instructions);
-        Ok(Self { poses, window: risk, read_from: None })
+        Ok(Self { poses, window: risk, surface: None, judged: Rectangle::NOTHING, is_judged: true })
     }
 
     /// Where the poses lie.
@@ -70,14 +73,15 @@ impl PriorField {
         self.poses.ratio()
     }
 
-    /// Moves the window to another origin on its lattice; returns whether that is another place. All of the
-    /// surface is read anew then.
+    /// Moves the window to another origin on its lattice; returns whether that is another place. What was judged stays
+    /// judged but for the border, whose risks are closed.
     pub fn place_at(&mut self, origin: [i64; 2]) -> bool {
         let moves = origin != self.window.origin;
         if moves {
+            self.judged = self.judged.within(&Rectangle::inside(&self.window));
             self.window.origin = origin;
             self.poses.move_to(&self.window);
-            self.read_from = None;
+            self.surface = None;
         }
         moves
     }
@@ -86,54 +90,52 @@ impl PriorField {
     pub fn set_level(&mut self, level: CvarLevel) {
         if let Judgement::Physics(physics) = &mut self.poses.judgement {
             physics.level = level;
-            self.read_from = None;
+            self.judged = Rectangle::NOTHING;
         }
     }
 
-    /// Whether the next reading is of the whole surface, whatever part of it changed.
-    pub fn is_outdated(&self, surface: &GridMap<SurfaceCell>) -> bool {
-        self.read_from != Some(*surface.geometry())
-    }
-
-    /// Takes over the whole surface; what lies beyond its window is unknown. Returns the cells to judge: all.
+    /// Reads the whole surface, and has every pose judged anew.
     ///
     /// # Errors
     /// The surface has another resolution than the field was made for.
-    pub fn read_all(&mut self, surface: &GridMap<SurfaceCell>) -> Result<CellRegion, PriorMapError> {
+    pub fn read_all(&mut self, surface: &GridMap<SurfaceCell>) -> Result<(), PriorMapError> {
+        (self.surface, self.judged) = (None, Rectangle::NOTHING);
+        self.read(surface)
+    }
+
+    /// Reads a surface; what lies beyond its window is unknown. Which poses it changes, [`PriorField::changed`] says.
+    ///
+    /// # Errors
+    /// The surface has another resolution than the field was made for.
+    pub fn read(&mut self, surface: &GridMap<SurfaceCell>) -> Result<(), PriorMapError> {
         self.check_resolution(surface)?;
-        let window = *self.poses.ground.window();
-        let last = [window.origin[0] + window.n_cols as i64 - 1, window.origin[1] + window.n_rows as i64 - 1];
-        self.poses.ground.read(surface, window.origin, last);
-        self.read_from = Some(*surface.geometry());
-        Ok(CellRegion::whole(&self.window))
+        if !std::mem::replace(&mut self.is_judged, false) {
+            self.judged = Rectangle::NOTHING;
+        }
+        let window = Rectangle::whole(self.poses.ground.window());
+        let changed = self.surface.as_ref().map_or(Some(window), |last| window.changed(last, surface));
+        match changed {
+            Some(Rectangle { min, max }) => self.poses.read_ground(surface, min, max),
+            None => self.poses.keep_ground(),
+        }
+        match &mut self.surface {
+            Some(last) => last.clone_from(surface),
+            last => *last = Some(surface.clone()),
+        }
+        Ok(())
     }
 
-    /// Takes over the cells of the surface that changed since it was last read. Returns the cells of the window
-    /// whose poses they reach: all when one of the windows or the level changed.
-    ///
-    /// # Errors
-    /// The surface has another resolution than the field was made for.
-    pub fn read_changed(
-        &mut self,
-        surface: &GridMap<SurfaceCell>,
-        changed: &CellRegion,
-    ) -> Result<CellRegion, PriorMapError> {
-        if self.is_outdated(surface) {
-            return self.read_all(surface);
-        }
-        if changed.n_cells() == 0 {
-            return Ok(CellRegion { rows: 0..0, cols: 0..0 });
-        }
-        let origin = surface.geometry().origin;
-        let bounds = |axis: usize, range: &Range<usize>| {
-            [origin[axis] + range.start as i64, origin[axis] + range.end as i64 - 1]
-        };
-        let ([west, east], [south, north]) = (bounds(0, &changed.cols), bounds(1, &changed.rows));
-        self.poses.ground.read(surface, [west, south], [east, north]);
-        Ok(CellRegion {
-            rows: self.readers(1, self.window.n_rows, south, north),
-            cols: self.readers(0, self.window.n_cols, west, east),
-        })
+    /// Of the first [`crate::ASKED`] poses of a line, the first one in the lowest bit: those that were not judged yet,
+    /// and those that read something which is not what it was before the last reading.
+    pub fn changed(&self, line: &PoseLine) -> u64 {
+        let n_lanes = line.n_lanes.min(ASKED);
+        let outside = !self.judged.holds(line.cell, self.ratio().n_phases() as i64);
+        (outside | self.poses.changed(line)) & lowest(n_lanes)
+    }
+
+    /// Every pose that [`PriorField::changed`] names was judged.
+    pub fn note_judged(&mut self) {
+        (self.judged, self.is_judged) = (Rectangle::whole(&self.window), true);
     }
 
     /// What the prior says of the poses of a line, from a lane of the block on. Whole spans of
@@ -175,7 +177,8 @@ impl PriorField {
 
     /// Bytes of the ground that it keeps.
     pub fn n_bytes(&self) -> usize {
-        self.poses.ground.n_bytes()
+        let surface = self.surface.as_ref().map_or(0, |surface| size_of_val(surface.values()));
+        self.poses.n_bytes() + surface
     }
 
     fn check_resolution(&self, surface: &GridMap<SurfaceCell>) -> Result<(), PriorMapError> {
@@ -186,14 +189,67 @@ impl PriorField {
         }
         Ok(())
     }
+}
 
-    /// Rows or columns of the window whose poses read surface cells from `min` to `max`.
-    fn readers(&self, axis: usize, n: usize, min: i64, max: i64) -> Range<usize> {
-        let origin = self.window.origin[axis];
-        let reads = |index: &usize| self.poses.reads(axis, origin + *index as i64, min, max);
-        let start = (0..n).find(reads).unwrap_or(n);
-        start..(start..n).rev().find(reads).map_or(start, |last| last + 1)
+/// Cells of the lattice from `min` to `max`, columns and rows, both inclusive; nothing where one of them is larger.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Rectangle {
+    min: [i64; 2],
+    max: [i64; 2],
+}
+
+impl Rectangle {
+    const NOTHING: Self = Self { min: [i64::MAX; 2], max: [i64::MIN; 2] };
+
+    fn whole(window: &GridGeometry) -> Self {
+        let GridGeometry { origin: [west, south], n_rows, n_cols, .. } = *window;
+        Self { min: window.origin, max: [west + n_cols as i64 - 1, south + n_rows as i64 - 1] }
     }
+
+    /// All but the border.
+    fn inside(window: &GridGeometry) -> Self {
+        let Self { min, max } = Self::whole(window);
+        Self { min: min.map(|index| index + 1), max: max.map(|index| index - 1) }
+    }
+
+    fn within(&self, other: &Self) -> Self {
+        Self {
+            min: [0, 1].map(|axis| self.min[axis].max(other.min[axis])),
+            max: [0, 1].map(|axis| self.max[axis].min(other.max[axis])),
+        }
+    }
+
+    /// Of cells of a row that lie so many columns apart, those within, the first one in the lowest bit.
+    fn holds(&self, [col, row]: [i64; 2], apart: i64) -> u64 {
+        if !(self.min[1]..=self.max[1]).contains(&row) || self.min[0] > self.max[0] {
+            return 0;
+        }
+        let n_before = |edge: i64| (edge - col).div_euclid(apart).clamp(0, ASKED as i64) as usize;
+        lowest(n_before(self.max[0] + apart)) & !lowest(n_before(self.min[0] + apart - 1))
+    }
+
+    /// The least rectangle of all its cells in which two surfaces differ.
+    fn changed(&self, last: &GridMap<SurfaceCell>, next: &GridMap<SurfaceCell>) -> Option<Self> {
+        let mut changed = Self::NOTHING;
+        for row in self.min[1]..=self.max[1] {
+            let differs = |col: &i64| {
+                let [last, next] = [last, next].map(|surface| surface.at_lattice([*col, row]));
+                let [last, next] = [last, next].map(|cell| cell.unwrap_or(&SurfaceCell::UNKNOWN));
+                !last.is_identical(next)
+            };
+            let mut cols = self.min[0]..=self.max[0];
+            let Some(west) = cols.find(differs) else { continue };
+            let east = cols.rev().find(differs).unwrap_or(west);
+            changed.min = [changed.min[0].min(west), changed.min[1].min(row)];
+            changed.max = [changed.max[0].max(east), row];
+        }
+        (changed.min[1] <= changed.max[1]).then_some(changed)
+    }
+}
+
+/// So many bits from the lowest on.
+fn lowest(n: usize) -> u64 {
+    if n < ASKED { (1 << n) - 1 } else { u64::MAX }
 }
 
 fn judged(geometry: &Geometry, assumption: &Assumption) -> Result<(Lengths, Judgement), SettingError> {

@@ -1,14 +1,12 @@
 //! From the known surface to a risk map, whole or where something changed.
 
-use std::ops::Range;
-
 use bicycle::Geometry;
 use bicycle::lanes::{BLOCK, Instructions};
 use rayon::prelude::*;
-use terrain::{CellRegion, GridGeometry, GridMap, SettingError, SurfaceCell};
+use terrain::{GridGeometry, GridMap, SettingError, SurfaceCell};
 use traversability::{CvarLevel, Risk, RiskMap};
 
-use crate::{BlockPrior, PoseLine, PriorBelief, PriorConfig, PriorField};
+use crate::{BlockPrior, PoseLine, PriorBelief, PriorConfig, PriorField, stretches};
 
 /// What a [`PriorMap`] takes the ground for.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -101,35 +99,30 @@ impl PriorMap {
         &self.map
     }
 
-    /// Moves the window to another origin on the lattice of risk cells; the next update is a full one.
+    /// Moves the window to another origin on the lattice of risk cells; the next update makes the map whole again.
     pub fn place_at(&mut self, origin: [i64; 2]) {
         if self.field.place_at(origin) {
-            self.map.place_at(origin);
+            self.map.roll_to(origin);
         }
     }
 
-    /// Judges at another level from the next update on, which is a full one. The nominal assumption has none.
+    /// Judges at another level from the next update on. The nominal assumption has none.
     pub fn set_level(&mut self, level: CvarLevel) {
         self.field.set_level(level);
     }
 
-    /// Takes over the whole surface. What lies beyond its window is unknown.
+    /// Takes over the whole surface and judges every pose. What lies beyond its window is unknown.
     pub fn update_all(&mut self, surface: &GridMap<SurfaceCell>) -> Result<(), PriorMapError> {
-        let all = self.field.read_all(surface)?;
-        self.fill(surface, &all);
+        self.field.read_all(surface)?;
+        self.fill(surface);
         Ok(())
     }
 
-    /// Takes over the cells of the surface that changed since the last update, and judges anew only the poses
-    /// that they reach; the result is that of [`PriorMap::update_all`], bit by bit. It is a full update when one
-    /// of the windows or the level changed.
-    pub fn update_dirty(
-        &mut self,
-        surface: &GridMap<SurfaceCell>,
-        changed: &CellRegion,
-    ) -> Result<(), PriorMapError> {
-        let dirty = self.field.read_changed(surface, changed)?;
-        self.fill(surface, &dirty);
+    /// Takes over a surface and judges anew only the poses that read something which changed since the last update; the
+    /// result is that of [`PriorMap::update_all`], bit by bit.
+    pub fn update(&mut self, surface: &GridMap<SurfaceCell>) -> Result<(), PriorMapError> {
+        self.field.read(surface)?;
+        self.fill(surface);
         Ok(())
     }
 
@@ -140,48 +133,49 @@ impl PriorMap {
         self.field.belief(x_m, y_m, yaw_rad)
     }
 
-    fn fill(&mut self, surface: &GridMap<SurfaceCell>, dirty: &CellRegion) {
-        if dirty.n_cells() == 0 {
-            return;
-        }
+    fn fill(&mut self, surface: &GridMap<SurfaceCell>) {
         let field = &self.field;
         let geometry = *self.map.geometry();
         let n_yaws = self.map.view().n_yaws;
         self.map.fill(|risks, ground| {
-            let cells = dirty.rows.start * geometry.n_cols..dirty.rows.end * geometry.n_cols;
-            let risk_rows =
-                risks[cells.start * n_yaws..cells.end * n_yaws].par_chunks_mut(geometry.n_cols * n_yaws);
-            let lines = risk_rows.zip(ground[cells].par_chunks_mut(geometry.n_cols));
-            lines.enumerate().for_each_init(BlockPrior::default, |block, (line, (risks, ground))| {
-                let row = geometry.origin[1] + (dirty.rows.start + line) as i64;
+            let rows = risks.par_chunks_mut(geometry.n_cols * n_yaws);
+            let rows = rows.zip(ground.par_chunks_mut(geometry.n_cols));
+            rows.enumerate().for_each_init(BlockPrior::default, |block, (row, (risks, ground))| {
+                let west = [geometry.origin[0], geometry.origin[1] + row as i64];
                 for yaw in 0..n_yaws {
-                    judge_row(field, [geometry.origin[0], row], &dirty.cols, (yaw, n_yaws), block, risks);
+                    judge_row(field, west, geometry.n_cols, (yaw, n_yaws), block, risks);
                 }
-                for col in dirty.cols.clone() {
-                    ground[col] = field.ground_in([geometry.origin[0] + col as i64, row], surface);
+                for (col, ground) in ground.iter_mut().enumerate() {
+                    *ground = field.ground_in([west[0] + col as i64, west[1]], surface);
                 }
             });
         });
+        self.field.note_judged();
     }
 }
 
-/// Judges the poses of one yaw in some columns of a row that begins in the lattice cell `west`.
+/// Judges the poses of one yaw that changed in a row that begins in the lattice cell `west`.
 fn judge_row(
     field: &PriorField,
     west: [i64; 2],
-    cols: &Range<usize>,
+    n_cols: usize,
     (yaw, n_yaws): (usize, usize),
     block: &mut BlockPrior,
     risks: &mut [Risk],
 ) {
     let n_phases = field.ratio().n_phases();
-    for first_col in cols.clone().take(n_phases) {
-        for col in (first_col..cols.end).step_by(n_phases * BLOCK) {
-            let n_lanes = (cols.end - col).div_ceil(n_phases).min(BLOCK);
-            let cell = [west[0] + col as i64, west[1]];
-            field.read_line(&PoseLine { cell, yaw, n_lanes }, 0, block);
-            for (step, risk) in field.risks(block, n_lanes).enumerate() {
-                risks[(col + step * n_phases) * n_yaws + yaw] = risk;
+    for first_col in 0..n_phases.min(n_cols) {
+        for col in (first_col..n_cols).step_by(n_phases * BLOCK) {
+            let line = |lanes: std::ops::Range<usize>| {
+                let cell = [west[0] + (col + lanes.start * n_phases) as i64, west[1]];
+                PoseLine { cell, yaw, n_lanes: lanes.len() }
+            };
+            let n_lanes = (n_cols - col).div_ceil(n_phases).min(BLOCK);
+            for lanes in stretches(field.changed(&line(0..n_lanes))) {
+                field.read_line(&line(lanes.clone()), 0, block);
+                for (lane, risk) in lanes.clone().zip(field.risks(block, lanes.len())) {
+                    risks[(col + lane * n_phases) * n_yaws + yaw] = risk;
+                }
             }
         }
     }

@@ -3,6 +3,8 @@
 
 use terrain::{Footprint, WheelLayout};
 
+use crate::cell_set::CellSpan;
+use crate::ground_changes::Felt;
 use crate::lengths::Lengths;
 use crate::planes::Planes;
 
@@ -57,6 +59,8 @@ pub(crate) struct Stencil {
     pub swept: Vec<Span>,
     /// Every cell whose centre lies under the belly.
     pub belly: Vec<BellySpan>,
+    /// All of these.
+    pub felt: Felt,
 }
 
 /// Smallest and largest offset, columns then rows.
@@ -105,22 +109,24 @@ impl Stencil {
         let footprint = touched_spans(&lengths.footprint, centre_m, yaw_rad, resolution_m);
         let n_footprint_cells = footprint.iter().map(|span| span.n_cells as u32).sum();
         let (sine, cosine) = libm::sincos(yaw_rad);
-        Self {
-            heading: [cosine as f32, sine as f32],
-            wheels: wheel_taps(&lengths.wheels, centre_m, yaw_rad, resolution_m),
-            footprint,
-            n_footprint_cells,
-            swept: union_of_rows(turned.flatten()),
-            belly: belly_spans(&lengths.belly, centre_m, yaw_rad, resolution_m),
-        }
+        let wheels = wheel_taps(&lengths.wheels, centre_m, yaw_rad, resolution_m);
+        let swept = union_of_rows(turned.flatten());
+        let belly = belly_spans(&lengths.belly, centre_m, yaw_rad, resolution_m);
+        let felt = Felt {
+            wheels: wheels.iter().flat_map(|wheel| CellSpan::of_rows(wheel.corners())).collect(),
+            belly: CellSpan::of_rows(belly.iter().flat_map(|belly| belly.span.ends())),
+            // The footprint in the middle of the bin is one of those that are swept.
+            footprint: CellSpan::of_rows(swept.iter().flat_map(Span::ends)),
+        };
+        let heading = [cosine as f32, sine as f32];
+        Self { heading, wheels, footprint, n_footprint_cells, swept, belly, felt }
     }
 
     /// Finds its cells in the layers of the ground, for base cells like the given one.
     pub fn lay_on(&mut self, planes: &Planes, base: [i64; 2]) {
+        self.felt.lay_on(planes, base);
         for wheel in &mut self.wheels {
-            let [east, north] = wheel.offset;
-            let corners = [[east, north], [east + 1, north], [east, north + 1], [east + 1, north + 1]];
-            wheel.deltas = corners.map(|corner| planes.delta(base, corner));
+            wheel.deltas = wheel.corners().map(|corner| planes.delta(base, corner));
         }
         for Span { start, n_cells, deltas } in self.footprint.iter_mut().chain(&mut self.swept) {
             let end = [start[0] + *n_cells as i64, start[1]];
@@ -147,6 +153,22 @@ impl Stencil {
             reach.include([span.start[0] + span.n_cells as i64 - 1, span.start[1]]);
         }
         reach
+    }
+}
+
+impl WheelTap {
+    /// The four cells as offsets from the base cell, in the order of the weights.
+    fn corners(&self) -> [[i64; 2]; 4] {
+        let [east, north] = self.offset;
+        [[east, north], [east + 1, north], [east, north + 1], [east + 1, north + 1]]
+    }
+}
+
+impl Span {
+    /// The first and the last cell.
+    fn ends(&self) -> [[i64; 2]; 2] {
+        let [west, row] = self.start;
+        [[west, row], [west + self.n_cells as i64 - 1, row]]
     }
 }
 

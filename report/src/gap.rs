@@ -3,6 +3,7 @@
 
 mod ground;
 mod heldout;
+mod in_simulator;
 mod page;
 mod places;
 mod ranking;

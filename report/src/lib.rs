@@ -14,7 +14,7 @@
 //! | a diagnosis | `surefoot gap diagnose` | [text](gap::text()), [pictures](gap::pictures), [page](gap::page()) |
 //! | the score of diagnoses | `surefoot gap score` | [text](gap_score::text()), [pictures](gap_score::pictures), [page](gap_score::page()) |
 //! | the catalogue of effects | `surefoot gap effects` | [text](effects::text()), [picture](effects::picture), [Markdown](effects::page()) |
-//! | benchmarks | `surefoot bench` | [`crossings`], [`gap_closed_loop`], [`kinodynamics`], [`learning`], [`navigation`], [`plant`], [`traction_map`] |
+//! | benchmarks | `surefoot bench` | [`crossings`], [`gap_closed_loop`], [`kinodynamics`], [`learning`], [`navigation`], [`plant`], [`scaling`], [`traction_map`] |
 
 mod axes;
 mod canvas;
@@ -33,6 +33,7 @@ pub mod learning;
 pub mod navigation;
 pub mod plant;
 pub mod route;
+pub mod scaling;
 mod table;
 pub mod traction_map;
 pub mod training;

@@ -245,7 +245,7 @@ pub fn decision_record(message: &DecisionMessage) -> DecisionRecord {
         odometry: source_of(odometry),
         n_odometry,
         risk: message.risk.map_or(Source::default(), |(_, header)| source_of(header.id)),
-        author: message.risk.map_or(0, |(author, _)| number_of(author)),
+        map_source: message.risk.map_or(0, |(source, _)| number_of(source)),
         mission: source_of(message.mission),
         learned,
         physics,
@@ -262,8 +262,8 @@ pub fn decision_record(message: &DecisionMessage) -> DecisionRecord {
     message.correction.as_ref().map_or(record, |correction| with_correction(record, correction))
 }
 
-fn number_of(author: RiskMapSource) -> u64 {
-    match author {
+fn number_of(source: RiskMapSource) -> u64 {
+    match source {
         RiskMapSource::Learned => LEARNED,
         RiskMapSource::Physics => PHYSICS,
     }

@@ -24,9 +24,9 @@ use bus::status::{Health, Meter, Role};
 pub const FUSED: u64 = 1;
 /// Number of [`SurfaceHeader::event`]: the localisation jumped.
 pub const JUMPED: u64 = 2;
-/// Number of [`RiskHeader::author`]: what was learned.
+/// Number of [`RiskHeader::map_source`]: what was learned.
 pub const LEARNED: u64 = 1;
-/// Number of [`RiskHeader::author`]: physics alone.
+/// Number of [`RiskHeader::map_source`]: physics alone.
 pub const PHYSICS: u64 = 2;
 
 /// Time between two looks at the channels [ns].

@@ -245,7 +245,7 @@ impl Life<'_> {
         }
         // The one that was used: which of the two it had to be is judged by the choice.
         let map = made.map(|made| risk_message(&made.header, &made.payload));
-        let maps = match record.author {
+        let maps = match record.map_source {
             PHYSICS => RiskMessages { learned: None, physics: map },
             _ => RiskMessages { learned: map, physics: None },
         };

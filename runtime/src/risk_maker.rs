@@ -11,14 +11,14 @@ use bus::payload::{self, RiskParts};
 /// An assessor whose risk maps are written where messages lie.
 pub struct RiskMaker {
     assessor: Assessor,
-    author: u64,
+    map_source: u64,
     checkpoint: u64,
 }
 
 impl RiskMaker {
-    /// A maker by this assessor; `author` and `checkpoint` are those of [`RiskHeader`].
-    pub fn new(assessor: Assessor, author: u64, checkpoint: u64) -> Self {
-        Self { assessor, author, checkpoint }
+    /// A maker by this assessor; `map_source` and `checkpoint` are those of [`RiskHeader`].
+    pub fn new(assessor: Assessor, map_source: u64, checkpoint: u64) -> Self {
+        Self { assessor, map_source, checkpoint }
     }
 
     /// Judges the ground by other networks from now on, the next time as a whole. What driving has proved stays, and so
@@ -88,7 +88,7 @@ impl RiskMaker {
         payload: &[[f32; 8]],
     ) -> Result<Result<(), Refusal>, NavigatorError> {
         let Some(next) = payload::surface_map(header, payload) else { return Ok(Err(Refusal::Malformed)) };
-        self.assessor.judge(&surface_header(header), next).map(Ok)
+        self.assessor.judge(&surface_header(header), &next).map(Ok)
     }
 
     /// Number of elements of the message; `None` before the first surface or without a goal.
@@ -120,7 +120,7 @@ impl RiskMaker {
             stamp: Stamp::default(),
             grid: Grid::from(&geometry),
             n_yaws: n_yaws as u64,
-            author: self.author,
+            map_source: self.map_source,
             surface: source_of(header.surface),
             odometry_at_ns: header.frame_at_ns,
             stuck: source_of(header.stuck),

@@ -1,5 +1,7 @@
 //! The answer of a diagnosis, as it stands in files.
 
+use crate::findings::QuantityError;
+use crate::in_simulator::InSimulator;
 use crate::steering::Steering;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -96,7 +98,7 @@ pub struct BeforeAfter {
 }
 
 /// How far the gap shrinks.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Shrink {
     /// What is measured.
     pub metric: String,
@@ -120,9 +122,15 @@ pub struct Shrink {
     pub position_error_2s_m: Option<BeforeAfter>,
 }
 
+/// Version of the answer's layout. It grows when a key goes, or means something else; a new key does not change it.
+pub const SCHEMA_VERSION: u32 = 1;
+
 /// The whole answer; the JSON file of a diagnosis.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Answer {
+    /// [`SCHEMA_VERSION`] of who wrote it; 0 in files from before there were versions.
+    #[serde(default)]
+    pub schema_version: u32,
     /// Name of the case.
     pub case: String,
     /// What turns the machine; left out of files where it is an angle.
@@ -141,6 +149,59 @@ pub struct Answer {
     pub places: Vec<Place>,
     /// How far the gap shrinks.
     pub shrink: Shrink,
+    /// Errors on the held-out drives in metres, radians and their rates; empty until they are opened.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub errors_by_quantity: Vec<QuantityError>,
+    /// What the user's own simulator says, where it was asked.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub in_simulator: Option<InSimulator>,
     /// What to do next, in sentences.
     pub advice: Vec<String>,
+}
+
+impl Answer {
+    /// How many times the error of its own drives the simulator misses the held-out ones by, as it is: the user's own
+    /// simulator where it was asked, else the model that was calibrated on it. `None` until they are opened.
+    pub fn gap_ratio(&self) -> Option<f64> {
+        let shrink = self.in_simulator.as_ref().map_or(&self.shrink, |own| &own.shrink);
+        shrink.before.map(|before| before / shrink.floor)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// 3.0 of 1.5; a simulator of the user's own comes first: 4.0 of 1.0.
+    #[test]
+    fn the_gap_is_told_in_errors_of_the_simulators_own_drives() {
+        let shrink = |before, floor| Shrink { before, floor, ..Shrink::default() };
+        let answer = Answer {
+            schema_version: SCHEMA_VERSION,
+            case: "c".to_owned(),
+            steering: Steering::Angle,
+            verdict: Verdict::None,
+            effects: Vec::new(),
+            ranking: Vec::new(),
+            credible_set: Vec::new(),
+            places: Vec::new(),
+            shrink: shrink(Some(3.0), 1.5),
+            errors_by_quantity: Vec::new(),
+            in_simulator: None,
+            advice: Vec::new(),
+        };
+        assert_eq!(answer.gap_ratio(), Some(2.0));
+        let unopened = Answer { shrink: shrink(None, 1.5), ..answer.clone() };
+        assert_eq!(unopened.gap_ratio(), None);
+        let own = InSimulator {
+            simulator: "s".to_owned(),
+            verdict: Verdict::None,
+            causes: Vec::new(),
+            not_told_apart: Vec::new(),
+            candidates: Vec::new(),
+            shrink: shrink(Some(4.0), 1.0),
+            own_drives_error: 1.0,
+        };
+        assert_eq!(Answer { in_simulator: Some(own), ..answer }.gap_ratio(), Some(4.0));
+    }
 }

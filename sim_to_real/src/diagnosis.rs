@@ -1,6 +1,6 @@
 //! The diagnosis: which effects separate the real drives from the calibrated nominal model.
 
-use crate::answer::{Answer, NamedEffect, Ranked, Shrink, Verdict};
+use crate::answer::{Answer, NamedEffect, Ranked, SCHEMA_VERSION, Shrink, Verdict};
 use crate::baseline::{Baseline, GapError, drives_of};
 use crate::causes::{Explanation, Trial};
 use crate::comparison::{Comparison, root_mean_square};
@@ -95,11 +95,15 @@ impl Baseline {
         Trial { comparison, baseline: &self.effects }
     }
 
-    /// (before - after) / (before - floor), where there is a gap.
+    /// [`closed`] with the null's error for a floor.
     pub(crate) fn closed(&self, before: f64, after: f64) -> Option<f64> {
-        let floor = self.null.error;
-        (before >= GAP_IN_FLOORS * floor).then(|| (before - after) / (before - floor))
+        closed(self.null.error, before, after)
     }
+}
+
+/// (before - after) / (before - floor), where there is a gap.
+pub(crate) fn closed(floor: f64, before: f64, after: f64) -> Option<f64> {
+    (before >= GAP_IN_FLOORS * floor).then(|| (before - after) / (before - floor))
 }
 
 fn judged(baseline: &Baseline, trial: &Trial<'_>, splits: &[Split<'_>]) -> Judgement {
@@ -133,6 +137,7 @@ impl Diagnosis {
     /// The answer before the held-out drives are opened.
     pub fn answer(&self, case: &str) -> Answer {
         Answer {
+            schema_version: SCHEMA_VERSION,
             case: case.to_owned(),
             steering: self.steering,
             verdict: self.verdict,
@@ -142,16 +147,12 @@ impl Diagnosis {
             places: places(&self.findings.conditions),
             shrink: Shrink {
                 metric: METRIC.to_owned(),
-                before: None,
-                after: None,
                 floor: self.floor,
-                closed: None,
-                closed_low: None,
-                closed_high: None,
                 predicted_closed: self.predicted_closed,
-                learned_bound_closed: None,
-                position_error_2s_m: None,
+                ..Shrink::default()
             },
+            errors_by_quantity: Vec::new(),
+            in_simulator: None,
             advice: self.notes.clone(),
         }
     }

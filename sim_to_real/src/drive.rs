@@ -170,13 +170,17 @@ impl Drive {
     /// Displacement along and across the heading at `start`, turn, speed and yaw rate, measured `steps` later; NaN what
     /// was not measured.
     pub(crate) fn outcome(&self, start: usize, steps: usize) -> [f64; 5] {
-        let [x, y, yaw, vx, wz] = &self.measured;
-        let [x0, y0, yaw0, ..] = self.smooth.each_ref().map(|values| values[start]);
-        let (sine, cosine) = yaw0.sin_cos();
-        let end = start + steps;
-        let (dx, dy) = (x[end] - x0, y[end] - y0);
-        [dx * cosine + dy * sine, dy * cosine - dx * sine, yaw[end] - yaw0, vx[end], wz[end]]
+        let [x, y, yaw, ..] = self.smooth.each_ref().map(|values| values[start]);
+        seen_from([x, y, yaw], self.measured.each_ref().map(|values| values[start + steps]))
     }
+}
+
+/// A state (east, north [m], yaw [rad], speed [m/s], yaw rate [rad/s]) from a pose: displacement along and across its
+/// heading, turn, speed and yaw rate.
+pub(crate) fn seen_from([x0, y0, yaw0]: [f64; 3], [x, y, yaw, vx, wz]: [f64; 5]) -> [f64; 5] {
+    let (sine, cosine) = yaw0.sin_cos();
+    let (dx, dy) = (x - x0, y - y0);
+    [dx * cosine + dy * sine, dy * cosine - dx * sine, yaw - yaw0, vx, wz]
 }
 
 /// The rows of a run from which rollouts may start.

@@ -74,6 +74,35 @@ pub struct ResidualCell {
     pub floor: f64,
 }
 
+/// Error of one predicted quantity on held-out drives, in the quantity's own unit.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct QuantityError {
+    /// Quantity.
+    pub quantity: ResidualState,
+    /// Its unit.
+    pub unit: String,
+    /// Time since the rollout's start [s].
+    pub horizon_s: f64,
+    /// Root mean square under the calibrated nominal model.
+    pub before: f64,
+    /// The same with the announced effects.
+    pub after: f64,
+    /// The same on nominal drives that the model was not calibrated on.
+    pub floor: f64,
+}
+
+impl ResidualState {
+    /// Unit of the quantity.
+    pub fn unit(self) -> &'static str {
+        match self {
+            Self::Along | Self::Across => "m",
+            Self::Yaw => "rad",
+            Self::ForwardSpeed => "m/s",
+            Self::YawRate => "rad/s",
+        }
+    }
+}
+
 /// The residual of one rollout, where it began.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct GroundResidual {

@@ -9,7 +9,7 @@ use bicycle::Effect;
 /// Logarithmic gain that an effect must bring beyond what it brings between nominal drives.
 const PRICE_OF_ONE: f64 = 0.05;
 /// The same for a second effect, which a wrong shape of the first one invites.
-const PRICE_OF_TWO: f64 = 0.12;
+pub(crate) const PRICE_OF_TWO: f64 = 0.12;
 /// The same on top where both are in one actuator: two of them are the usual shape of a third that has no name.
 const PRICE_OF_ONE_ACTUATOR: f64 = 0.18;
 /// Effects of one actuator.
@@ -21,19 +21,19 @@ const ACTUATORS: [&[&str]; 2] = [
 pub(crate) const TEMPERATURE: f64 = 0.035;
 /// An effect is announced only when it takes this share off the loss, or off the null's where that is larger, beyond what it
 /// takes off between nominal drives.
-const BEYOND_DOUBT: f64 = 0.085;
+pub(crate) const BEYOND_DOUBT: f64 = 0.085;
 /// Explanations this much less probable than the best are told apart from it.
 const TOLD_APART: f64 = 0.05;
 /// Where the data tell nothing apart, this many names are enough to say so.
 const MOST_NAMES: usize = 6;
 /// What is left is unknown when its loss exceeds this many losses of the null and
-const UNKNOWN_IN_NULLS: f64 = 1.7;
+pub(crate) const UNKNOWN_IN_NULLS: f64 = 1.7;
 /// this share of what there was above it.
-const UNKNOWN_SHARE: f64 = 0.45;
+pub(crate) const UNKNOWN_SHARE: f64 = 0.45;
 /// An unknown rest beside less than this part of the squared gap makes a name worthless.
-const WORTH_A_NAME: f64 = 0.45;
+pub(crate) const WORTH_A_NAME: f64 = 0.45;
 /// The loss that a drive may have at best, in losses of the null.
-const LEAST_LOSS: f64 = 0.65;
+pub(crate) const LEAST_LOSS: f64 = 0.65;
 
 /// All explanations that were tried, singles and pairs best first.
 pub(crate) struct Weighed {

@@ -7,7 +7,8 @@
 //! 3. [`diagnose`] weighs every effect of the catalogue, and pairs of them, against the robot's drives; where there is
 //!    no simulator, [`diagnose_without_simulator`].
 //! 4. [`verify`] opens the drives that were held out and says how far the gap shrinks; an [`Answer`] keeps it all.
-//! 5. [`design_manoeuvre`] asks for the drive that would tell apart what is left open.
+//! 5. [`judge_in_simulator`] lets the user's own simulator decide what was screened, and about its own parameters.
+//! 6. [`design_manoeuvre`] asks for the drive that would tell apart what is left open.
 //!
 //! Drives are `bicycle::DriveLog`s. The crate never sees the plant that made them. `examples/diagnose_a_delay.rs` goes
 //! through steps 2 to 4.
@@ -26,6 +27,7 @@ mod evidence;
 mod explanation;
 mod findings;
 mod ground;
+mod in_simulator;
 mod intervals;
 mod judgement;
 mod learned_bound;
@@ -48,14 +50,21 @@ mod without_simulator;
 #[cfg(test)]
 mod engine_tests;
 
-pub use answer::{Answer, BeforeAfter, Condition, Estimate, NamedEffect, Place, Ranked, Shrink, Verdict};
+pub use answer::{
+    Answer, BeforeAfter, Condition, Estimate, NamedEffect, Place, Ranked, SCHEMA_VERSION, Shrink, Verdict,
+};
 pub use baseline::{Baseline, GapError};
 pub use causes::composed;
 pub use diagnosis::{Diagnosis, diagnose};
 pub use drive::DriveError;
 pub use findings::{
-    ConditionBin, ConditionTable, Findings, GroundResidual, Prediction, PredictionModel, ResidualCell,
-    ResidualState,
+    ConditionBin, ConditionTable, Findings, GroundResidual, Prediction, PredictionModel, QuantityError,
+    ResidualCell, ResidualState,
+};
+pub use in_simulator::{
+    CauseKind, InSimulator, InSimulatorDiagnosis, InSimulatorError, Knob, KnobError, Motion, RunSimulator,
+    SimulatorCandidate, SimulatorCause, SimulatorDescription, SimulatorRun, StartState, judge_in_simulator,
+    own_runs,
 };
 pub use learned_bound::{LearnedBound, LearnedBoundError, learned_bound};
 pub use machine::{GroundMap, Machine, SensorNoise};

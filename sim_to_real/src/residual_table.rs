@@ -1,8 +1,8 @@
 //! Residuals by quantity and horizon.
 
-use crate::comparison::{n_measured, root_mean_square};
+use crate::comparison::{Yardstick, n_measured, root_mean_square};
 use crate::drive::{HORIZONS, STEP_S};
-use crate::findings::{ResidualCell, ResidualState};
+use crate::findings::{QuantityError, ResidualCell, ResidualState};
 use crate::rollout::{N_QUANTITIES, PER_START};
 
 const STATES: [ResidualState; N_QUANTITIES] = [
@@ -12,6 +12,22 @@ const STATES: [ResidualState; N_QUANTITIES] = [
     ResidualState::ForwardSpeed,
     ResidualState::YawRate,
 ];
+
+/// The cells in units of their quantities, of which the yardstick holds the standard deviations.
+pub(crate) fn in_units(cells: &[ResidualCell], yardstick: &Yardstick) -> Vec<QuantityError> {
+    let place = |cell: &ResidualCell| {
+        let horizon = HORIZONS.iter().position(|&steps| steps as f64 * STEP_S == cell.horizon_s)?;
+        let state = STATES.iter().position(|state| *state == cell.state)?;
+        Some(horizon * N_QUANTITIES + state)
+    };
+    let in_unit = |cell: &ResidualCell| {
+        let sigma = yardstick.0[place(cell)?];
+        let [before, after, floor] = [cell.before, cell.after, cell.floor].map(|size| size * sigma);
+        let (quantity, unit, horizon_s) = (cell.state, cell.state.unit().to_owned(), cell.horizon_s);
+        Some(QuantityError { quantity, unit, horizon_s, before, after, floor })
+    };
+    cells.iter().filter_map(in_unit).collect()
+}
 
 /// One cell per quantity and horizon that was measured; without a null, `before` stands for the floor.
 pub(crate) fn residual_cells(

@@ -135,7 +135,7 @@ struct Rows {
     held: Vec<Vec<f32>>,
 }
 
-const UNLIMITED: Limits = Limits {
+pub(crate) const UNLIMITED: Limits = Limits {
     speed_max_mps: f64::MAX,
     reverse_speed_max_mps: f64::MAX,
     steering_max_rad: bicycle::lanes::STEERING_DOMAIN_RAD,

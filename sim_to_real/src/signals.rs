@@ -193,7 +193,7 @@ fn path_speeds(smooth: &[Vec<f64>; 5]) -> Vec<f64> {
 }
 
 /// A missing angle leaves the count of turns as it was.
-fn unwrapped(angles: &[f64]) -> Vec<f64> {
+pub(crate) fn unwrapped(angles: &[f64]) -> Vec<f64> {
     let mut turns = 0.0;
     let mut before = angles.iter().copied().find(|angle| !angle.is_nan()).unwrap_or(0.0);
     let mut continuous = Vec::with_capacity(angles.len());

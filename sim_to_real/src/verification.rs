@@ -3,12 +3,12 @@
 use crate::answer::{Answer, BeforeAfter};
 use crate::baseline::{Baseline, GapError, drives_of};
 use crate::causes::composed;
-use crate::comparison::{n_measured, root_mean_square};
-use crate::diagnosis::Diagnosis;
+use crate::comparison::{Yardstick, n_measured, root_mean_square};
+use crate::diagnosis::{Diagnosis, closed};
 use crate::drive::{Drive, HORIZONS, STEP_S, X, Y, YAW};
-use crate::findings::{Prediction, PredictionModel, ResidualCell};
+use crate::findings::{Prediction, PredictionModel, QuantityError, ResidualCell};
 use crate::machine::Machine;
-use crate::residual_table::residual_cells;
+use crate::residual_table::{in_units, residual_cells};
 use crate::rollout::{N_QUANTITIES, PER_START, Simulator};
 use bicycle::{DriveLog, Effect};
 use rand::{RngExt, SeedableRng};
@@ -29,6 +29,8 @@ pub struct Verification {
     pub position_error_2s_m: Option<BeforeAfter>,
     /// Residuals by quantity and horizon.
     pub residuals: Vec<ResidualCell>,
+    /// The same in the quantities' own units.
+    pub errors_by_quantity: Vec<QuantityError>,
     /// Every rollout of both models.
     pub predictions: Vec<Prediction>,
 }
@@ -52,26 +54,27 @@ pub fn verify(
     let (before, after) = (trial.residuals(&[]), trial.residuals(diagnosis.effects()));
     let errors = [root_mean_square(&before), root_mean_square(&after)];
     let closed = baseline.closed(errors[0], errors[1]).map(|closed| {
-        let [low, high] = closed_interval(baseline, &before, &after);
+        let [low, high] = closed_interval(baseline.null.error, &before, &after);
         [closed, low.min(closed), high.max(closed)]
     });
+    let residuals = residual_cells(&before, &after, Some(&baseline.null.cells));
     Ok(Verification {
         errors,
         closed,
-        position_error_2s_m: position_error(baseline, &before)
-            .zip(position_error(baseline, &after))
+        position_error_2s_m: position_error(&baseline.yardstick, &before)
+            .zip(position_error(&baseline.yardstick, &after))
             .map(|(before, after)| BeforeAfter { before, after }),
-        residuals: residual_cells(&before, &after, Some(&baseline.null.cells)),
+        errors_by_quantity: in_units(&residuals, &baseline.yardstick),
+        residuals,
         predictions: predictions(baseline, &drives, diagnosis.effects()),
     })
 }
 
 /// Root mean square distance at the last horizon, over the rollouts that have a measured position there [m].
-fn position_error(baseline: &Baseline, residuals: &[f32]) -> Option<f64> {
+pub(crate) fn position_error(yardstick: &Yardstick, residuals: &[f32]) -> Option<f64> {
     let last = PER_START - N_QUANTITIES;
     let square = |start: &[f32]| {
-        let [along, across] =
-            [last, last + 1].map(|place| f64::from(start[place]) * baseline.yardstick.0[place]);
+        let [along, across] = [last, last + 1].map(|place| f64::from(start[place]) * yardstick.0[place]);
         let is_measured = start[last] != 0.0 || start[last + 1] != 0.0;
         is_measured.then_some(along * along + across * across)
     };
@@ -80,7 +83,7 @@ fn position_error(baseline: &Baseline, residuals: &[f32]) -> Option<f64> {
 }
 
 /// Ends of the 90 % interval of the closed part, over stretches of the drives drawn with replacement.
-fn closed_interval(baseline: &Baseline, before: &[f32], after: &[f32]) -> [f64; 2] {
+pub(crate) fn closed_interval(floor: f64, before: &[f32], after: &[f32]) -> [f64; 2] {
     let stretches: Vec<_> =
         before.chunks(STRETCH * PER_START).zip(after.chunks(STRETCH * PER_START)).collect();
     let sums = stretches.iter().map(|(before, after)| {
@@ -93,7 +96,7 @@ fn closed_interval(baseline: &Baseline, before: &[f32], after: &[f32]) -> [f64; 
         .filter_map(|_| {
             let drawn = (0..sums.len()).map(|_| sums[random.random_range(0..sums.len())]);
             let [before, after, n] = drawn.fold([0.0; 3], |a, b| std::array::from_fn(|i| a[i] + b[i]));
-            baseline.closed((before / n).sqrt(), (after / n).sqrt())
+            closed(floor, (before / n).sqrt(), (after / n).sqrt())
         })
         .collect();
     draws.sort_by(f64::total_cmp);
@@ -153,6 +156,7 @@ impl Verification {
         shrink.closed_low = self.closed.map(|closed| closed[1]);
         shrink.closed_high = self.closed.map(|closed| closed[2]);
         shrink.position_error_2s_m = self.position_error_2s_m;
+        answer.errors_by_quantity.clone_from(&self.errors_by_quantity);
         answer
     }
 }

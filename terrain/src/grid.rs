@@ -84,6 +84,29 @@ impl GridGeometry {
         })
     }
 
+    /// Moves values of shape [row, col, any number] from this window to that at another origin, so that they keep their
+    /// cells of the lattice; those of cells that enter are `entering`.
+    pub fn roll<T: Copy>(&self, values: &mut [T], origin: [i64; 2], entering: T) {
+        let (n_rows, n_cols) = (self.n_rows, self.n_cols);
+        let per_row = values.len() / n_rows.max(1);
+        let per_cell = per_row / n_cols.max(1);
+        let [east, north] = [0, 1].map(|axis| origin[axis] - self.origin[axis]);
+        let skipped = usize::try_from(east.unsigned_abs()).map_or(n_cols, |columns| columns.min(n_cols));
+        let [from, to] = if east >= 0 { [skipped, 0] } else { [0, skipped] }.map(|column| column * per_cell);
+        let n_stay = (n_cols - skipped) * per_cell;
+        for step in 0..n_rows {
+            // A row is read before it is written over.
+            let row = if north >= 0 { step } else { n_rows - 1 - step };
+            let source = usize::try_from(row as i64 + north).ok().filter(|&source| source < n_rows);
+            let n_stay = source.map_or(0, |_| n_stay);
+            let start = source.unwrap_or(row) * per_row + from;
+            values.copy_within(start..start + n_stay, row * per_row + to);
+            let row = &mut values[row * per_row..(row + 1) * per_row];
+            row[..to].fill(entering);
+            row[to + n_stay..].fill(entering);
+        }
+    }
+
     /// Position of a cell in a row-major array.
     pub fn index(&self, cell: Cell) -> usize {
         cell.row * self.n_cols + cell.col
@@ -96,10 +119,22 @@ impl GridGeometry {
 }
 
 /// One value per cell, row-major from the south-west corner.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Debug, PartialEq)]
 pub struct GridMap<T> {
     geometry: GridGeometry,
     values: Vec<T>,
+}
+
+impl<T: Clone> Clone for GridMap<T> {
+    fn clone(&self) -> Self {
+        Self { geometry: self.geometry, values: self.values.clone() }
+    }
+
+    /// Keeps the memory that it has.
+    fn clone_from(&mut self, source: &Self) {
+        self.geometry = source.geometry;
+        self.values.clone_from(&source.values);
+    }
 }
 
 impl<T: Clone> GridMap<T> {
@@ -129,6 +164,16 @@ impl<T: Clone> GridMap<T> {
                 values[..shift[0].unsigned_abs() as usize].fill(value.clone());
             }
         }
+    }
+}
+
+impl<T: Clone> GridMap<T> {
+    /// The cells of another window of the same lattice: those of this map keep their values, the others hold `value`.
+    pub fn seen_from(&self, window: &GridGeometry, value: &T) -> Self {
+        let [west, south] = window.origin;
+        let lattice = |Cell { row, col }| [west + col as i64, south + row as i64];
+        let at = |index| self.at_lattice(lattice(window.cell(index))).unwrap_or(value).clone();
+        Self { geometry: *window, values: (0..window.n_cells()).map(at).collect() }
     }
 }
 
@@ -260,6 +305,39 @@ mod tests {
                 let stayed = (1..5).contains(&place[0]) && (-2..1).contains(&place[1]);
                 assert_eq!(*value, if stayed { place } else { [99, 99] }, "shift {x}, {y}, cell {cell:?}");
             }
+        }
+    }
+
+    #[test]
+    fn rolled_values_keep_their_cells_for_every_shift() {
+        let old = tiny([1, -2], 3, 4);
+        for (x, y) in (-6..=6).flat_map(|x| (-5..=5).map(move |y| (x, y))) {
+            let new = tiny([1 + x, -2 + y], 3, 4);
+            let pairs = |map: &GridMap<[i64; 2]>| {
+                map.values().iter().flat_map(|&label| [(label, 0), (label, 1)]).collect::<Vec<_>>()
+            };
+            let mut values = pairs(&labelled(old));
+            old.roll(&mut values, new.origin, ([99, 99], 9));
+            for (index, value) in values.iter().enumerate() {
+                let [col, row] = labelled(new).values()[index / 2];
+                let is_shared = (1..5).contains(&col) && (-2..1).contains(&row);
+                let expected = if is_shared { ([col, row], index % 2) } else { ([99, 99], 9) };
+                assert_eq!(*value, expected, "{x} {y} {index}");
+            }
+        }
+    }
+
+    #[test]
+    fn another_window_sees_the_same_cells() {
+        let map = labelled(tiny([1, -2], 3, 4));
+        let window = tiny([3, -4], 4, 5);
+        let seen = map.seen_from(&window, &[99, 99]);
+        assert_eq!(seen.geometry(), &window);
+        for (index, value) in seen.values().iter().enumerate() {
+            let Cell { row, col } = window.cell(index);
+            let place = [3 + col as i64, -4 + row as i64];
+            let is_shared = place[0] < 5 && place[1] >= -2;
+            assert_eq!(*value, if is_shared { place } else { [99, 99] }, "{place:?}");
         }
     }
 

@@ -59,6 +59,15 @@ impl SurfaceCell {
         self.knowledge != Knowledge::Unknown
     }
 
+    /// Whether both are the same to the last bit; an unknown height, which is no number, is the same as another.
+    pub fn is_identical(&self, other: &Self) -> bool {
+        let bits = |cell: &Self| {
+            let heights = [cell.height_m, cell.height_variance_m2, cell.vegetation_height_m];
+            (heights.map(f32::to_bits), cell.class_probability.map(f32::to_bits))
+        };
+        bits(self) == bits(other) && self.knowledge == other.knowledge
+    }
+
     /// The likeliest class, `Open` where nothing was seen.
     pub fn class(&self) -> TerrainClass {
         let mut best = TerrainClass::Open;

@@ -33,10 +33,12 @@ pub struct TrackingConfig {
     pub speed_min_mps: f64,
     /// A thing must be this much farther than its radius from where it was first seen to count as moving [m], > 0.
     pub moved_min_m: f64,
-    /// What stands for so long again is the map's business [s], > 0.
+    /// What has moved and stands for so long is told of no longer until it sets off again [s], > 0.
     pub standing_max_s: f64,
-    /// A moving thing that was not seen for so long is given up [s], > 0.
+    /// A moving thing is given up that its place has not shown for so long [s], > 0.
     pub unseen_max_s: f64,
+    /// A thing beside the vehicle, where no ray comes back from, is taken to stand there for so long [s], > 0.
+    pub hidden_max_s: f64,
 }
 
 impl Default for TrackingConfig {
@@ -55,8 +57,9 @@ impl Default for TrackingConfig {
             scans_min: 3,
             speed_min_mps: 0.25,
             moved_min_m: 0.2,
-            standing_max_s: 3.0,
+            standing_max_s: 60.0,
             unseen_max_s: 1.5,
+            hidden_max_s: 600.0,
         }
     }
 }
@@ -89,6 +92,7 @@ impl TrackingConfig {
             ("moved_min_m", self.moved_min_m),
             ("standing_max_s", self.standing_max_s),
             ("unseen_max_s", self.unseen_max_s),
+            ("hidden_max_s", self.hidden_max_s),
         ];
         let positive = positive.into_iter().map(|(field, found)| (field, found, found > 0.0));
         let above = "a finite number above height_min_m";

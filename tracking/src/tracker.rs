@@ -13,6 +13,10 @@ pub const TRACKS_MAX: usize = 16;
 const FOLLOWED_MAX: usize = 64;
 /// Nearer to the vehicle's body than this a thing may be there unseen [m].
 const BESIDE_M: f64 = 0.8;
+/// Where a thing stood for so long is where it may later be seen to have left [s].
+const SETTLED_S: f64 = 3.0;
+/// A scan that shows a point within this distance of a place has looked at it, however slim what stood there [m].
+const LOOKED_AT_M: f64 = 0.3;
 /// Shares by which a radius follows a larger and a smaller one: a scan may see one side of a thing only, or take it
 /// together with what it passes.
 const GROW_GAIN: f64 = 0.5;
@@ -37,11 +41,15 @@ struct Followed {
     number: u64,
     estimate: Estimate,
     radius_m: f64,
-    /// Where it was when it was last known not to have moved [m].
+    /// Where it was first seen, or stood for a while [m].
     anchor_m: [f64; 2],
+    /// Whether it was ever seen to move. Who did may set off again at any moment.
     has_moved: bool,
     n_scans: u32,
+    /// Since a scan showed it.
     unseen_s: f64,
+    /// Of that, while its place could be looked at.
+    absent_s: f64,
     standing_s: f64,
 }
 
@@ -71,8 +79,9 @@ impl Tracker {
         };
         self.scanned_at_ns = Some(scan.valid_at_ns);
         let elapsed_s = elapsed_ns as f64 * 1e-9;
+        let is_beside = |followed: &Followed| is_beside(&self.own_body, pose, followed.estimate.position_m);
         for followed in &mut self.followed {
-            if followed.unseen_s > 0.0 && is_beside(&self.own_body, pose, followed.estimate.position_m) {
+            if followed.unseen_s > 0.0 && is_beside(followed) {
                 // Who vanishes there has not walked through the vehicle.
                 followed.estimate.velocity_mps = [0.0; 2];
             }
@@ -80,6 +89,7 @@ impl Tracker {
         }
         let seen = clusters(scan, pose, surface, &self.own_body, &self.config, FOLLOWED_MAX);
         let is_new = self.follow(&seen, elapsed_s);
+        self.look_for_unseen(scan, pose, elapsed_s);
         self.give_up();
         for cluster in seen.iter().zip(is_new).filter_map(|(cluster, is_new)| is_new.then_some(cluster)) {
             self.begin(cluster);
@@ -145,12 +155,25 @@ impl Tracker {
         is_new
     }
 
-    /// Gives up what was not seen for long: at once what is not known to move.
+    /// Counts how long things have been gone from where they were last seen. Beside the vehicle a place from which nothing
+    /// comes back was not looked at, and whoever stood there still does.
+    fn look_for_unseen(&mut self, scan: &Scan, pose: &Pose, elapsed_s: f64) {
+        for followed in self.followed.iter_mut().filter(|followed| followed.unseen_s > 0.0) {
+            let place_m = followed.estimate.position_m;
+            let is_hidden = is_beside(&self.own_body, pose, place_m)
+                && !is_looked_at(scan, pose, place_m, followed.radius_m.max(LOOKED_AT_M), &self.own_body);
+            followed.absent_s += if is_hidden { 0.0 } else { elapsed_s };
+        }
+    }
+
+    /// Gives up what is gone for long: sooner what is not known to move.
     fn give_up(&mut self) {
-        let TrackingConfig { unseen_max_s, radius_max_m, .. } = self.config;
+        let TrackingConfig { unseen_max_s, hidden_max_s, radius_max_m, .. } = self.config;
         self.followed.retain(|followed| {
             let most_s = if followed.has_moved { unseen_max_s } else { 0.5 * unseen_max_s };
-            followed.unseen_s <= most_s && followed.radius_m <= radius_max_m
+            followed.absent_s <= most_s
+                && followed.unseen_s <= hidden_max_s
+                && followed.radius_m <= radius_max_m
         });
     }
 
@@ -169,14 +192,16 @@ impl Tracker {
             has_moved: false,
             n_scans: 1,
             unseen_s: 0.0,
+            absent_s: 0.0,
             standing_s: 0.0,
         });
     }
 
     fn tell(&mut self, from_m: [f64; 2]) {
         self.moving.clear();
-        let mut moving: Vec<Track> =
-            self.followed.iter().filter(|followed| followed.has_moved).map(Followed::track).collect();
+        let standing_max_s = self.config.standing_max_s;
+        let is_told = |followed: &&Followed| followed.has_moved && followed.standing_s <= standing_max_s;
+        let mut moving: Vec<Track> = self.followed.iter().filter(is_told).map(Followed::track).collect();
         let distance_m =
             |track: &Track| libm::hypot(track.position_m[0] - from_m[0], track.position_m[1] - from_m[1]);
         moving.sort_by(|a, b| distance_m(a).total_cmp(&distance_m(b)));
@@ -202,7 +227,7 @@ impl Followed {
         let growth_m = cluster.radius_m - self.radius_m;
         self.radius_m += growth_m * if growth_m > 0.0 { GROW_GAIN } else { SHRINK_GAIN };
         self.n_scans += 1;
-        self.unseen_s = 0.0;
+        (self.unseen_s, self.absent_s) = (0.0, 0.0);
         self.judge_motion(elapsed_s, config);
     }
 
@@ -215,8 +240,9 @@ impl Followed {
         let has_left = away_m > self.radius_m + config.moved_min_m;
         self.has_moved |= is_fast && has_left && self.n_scans >= config.scans_min;
         self.standing_s = if is_fast { 0.0 } else { self.standing_s + elapsed_s };
-        if self.standing_s > config.standing_max_s {
-            (self.has_moved, self.anchor_m) = (false, position_m);
+        if !self.has_moved && self.standing_s > SETTLED_S {
+            // Its centre wanders slowly as other sides of it come into view.
+            self.anchor_m = position_m;
         }
     }
 
@@ -233,6 +259,17 @@ fn is_beside(own_body: &BodyBox, pose: &Pose, [x_m, y_m]: [f64; 2]) -> bool {
     let place_m = [cos * east_m + sin * north_m, cos * north_m - sin * east_m];
     (0..2).all(|axis| {
         (own_body.min_m[axis] - BESIDE_M..=own_body.max_m[axis] + BESIDE_M).contains(&place_m[axis])
+    })
+}
+
+/// Whether anything within a distance of a place, but the vehicle itself, sent a ray back.
+fn is_looked_at(scan: &Scan, pose: &Pose, [x_m, y_m]: [f64; 2], within_m: f64, own_body: &BodyBox) -> bool {
+    let motion = pose.isometry();
+    scan.points.iter().any(|point| {
+        let body_m = point.position_m.map(f64::from);
+        let place = motion * nalgebra::Point3::from(body_m);
+        // No comparison with what is no number holds.
+        libm::hypot(place.x - x_m, place.y - y_m) <= within_m && !own_body.contains(body_m)
     })
 }
 

@@ -110,13 +110,30 @@ fn what_stands_does_not_move_because_the_vehicle_does() {
 }
 
 #[test]
-fn who_stops_is_told_of_for_a_while_and_then_is_the_maps_business() {
-    let at = |time_s: f64| vec![person([4.0, -3.0 + 1.2 * time_s.min(3.0)])];
-    let told = told(60, |_| Pose::default(), at);
-    let slow = told[20].first().unwrap();
-    assert!(slow.velocity_mps[1] < 0.5, "0.8 s after he stopped: {slow:?}");
-    assert_eq!(told[24].len(), 1, "1.8 s after he stopped");
-    assert!(told[50].is_empty(), "7 s after he stopped");
+fn who_stops_is_told_of_while_he_stands_and_at_once_when_he_sets_off_again() {
+    // He stands from 3 to 9 s, then goes on.
+    let way_m = |time_s: f64| 1.2 * (time_s.min(3.0) + (time_s - 9.0).max(0.0));
+    let told = told(60, |_| Pose::default(), |time_s| vec![person([4.0, -3.0 + way_m(time_s)])]);
+    assert!(told[15..].iter().all(|tracks| tracks.len() == 1), "{told:?}");
+    let speed_mps = |number: usize| told[number][0].velocity_mps[1];
+    assert!((24..46).all(|number| speed_mps(number).abs() < 0.3), "1.8 to 6 s after he stopped");
+    // Scan 46 is the first that shows him 0.24 m farther on: the second says so beyond doubt.
+    assert!(speed_mps(47) > 0.6, "{}", speed_mps(47));
+}
+
+#[test]
+fn who_stands_for_as_long_as_is_set_is_told_of_when_he_sets_off() {
+    let config = TrackingConfig { standing_max_s: 2.0, ..TrackingConfig::default() };
+    let (mut tracker, ground) = (Tracker::new(config, BodyBox::EMPTY).unwrap(), ground());
+    let way_m = |time_s: f64| 1.2 * (time_s.min(3.0) + (time_s - 9.0).max(0.0));
+    let told: Vec<usize> = (0..50)
+        .map(|number| {
+            let things = [person([4.0, -3.0 + way_m(0.2 * number as f64)])];
+            tracker.observe(&sweep(&Pose::default(), number, &things), &Pose::default(), &ground);
+            tracker.moving().len()
+        })
+        .collect();
+    assert_eq!((told[20], told[40], told[48]), (1, 0, 1), "{told:?}");
 }
 
 #[test]
@@ -162,6 +179,28 @@ fn who_vanishes_beside_the_vehicle_is_expected_to_stand_there() {
             assert!((0.8..2.0).contains(&north_m), "{time_s} s: {north_m} m");
         }
     }
+}
+
+/// Beside the vehicle, where its own body hides him: no ray comes back from there for seconds. Then some do, from the ground
+/// where he stood.
+#[test]
+fn who_is_hidden_beside_the_vehicle_stands_there_until_his_place_is_seen_empty() {
+    let body = BodyBox { min_m: [-1.0, -0.9, -1.0], max_m: [2.5, 0.9, 2.0] };
+    let mut tracker = Tracker::new(TrackingConfig::default(), body).unwrap();
+    let ground = ground();
+    let mut told = Vec::new();
+    for number in 0..60 {
+        let time_s = 0.2 * number as f64;
+        let things = if time_s < 2.0 { vec![person([0.5, 4.2 - 1.5 * time_s])] } else { Vec::new() };
+        let mut scan = sweep(&Pose::default(), number, &things);
+        if time_s > 9.0 {
+            scan.points.push(RangePoint { position_m: [0.5, 1.3, 0.0], class: TerrainClass::Open });
+        }
+        tracker.observe(&scan, &Pose::default(), &ground);
+        told.push(tracker.moving().len());
+    }
+    assert_eq!(told[10..46], [1; 36], "7 s after he was seen last");
+    assert_eq!(told[46 + 8..], [0; 6], "1.5 s after his place was seen");
 }
 
 #[test]

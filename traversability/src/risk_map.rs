@@ -197,6 +197,15 @@ impl RiskMap {
         self.geometry.origin = origin;
     }
 
+    /// Moves the window; the values stay where they lie, and cells that enter are [`Risk::OUTSIDE`] on flat open ground.
+    /// The border closes where it comes to lie: what it held before is lost.
+    pub fn roll_to(&mut self, origin: [i64; 2]) {
+        self.geometry.roll(&mut self.ground, origin, Ground::default());
+        self.geometry.roll(&mut self.risks, origin, Risk::OUTSIDE);
+        self.geometry.origin = origin;
+        self.close_border();
+    }
+
     /// The map as the controller reads it.
     pub fn view(&self) -> RiskMapView<'_> {
         let Self { geometry, n_yaws, risks, ground } = self;
@@ -360,6 +369,32 @@ mod tests {
         // 100 cells of 0.5 m east.
         assert_eq!(map.view().risk_at(49.75, 2.25, 0.75 * PI), marked(2, 3, 1));
         assert_eq!(map.view().risk_at(-0.25, 2.25, 0.75 * PI), Risk::OUTSIDE);
+    }
+
+    #[test]
+    fn rolling_keeps_what_stays_inside_for_every_shift() {
+        let GridGeometry { origin: [x, y], n_rows, n_cols, .. } = geometry();
+        for (east, north) in (-9..=9).flat_map(|east| (-6..=6).map(move |north| (east, north))) {
+            let mut map = marked_map(2);
+            map.fill(|_, ground| ground.iter_mut().enumerate().for_each(|(i, cell)| cell.class = i as u8));
+            map.roll_to([x + east, y + north]);
+            assert_eq!(map.geometry().origin, [x + east, y + north]);
+            for index in 0..n_rows * n_cols {
+                let cell = geometry().cell(index);
+                let [old_row, old_col] = [cell.row as i64 + north, cell.col as i64 + east];
+                let within = |value: i64, n: usize, edge: i64| (edge..n as i64 - edge).contains(&value);
+                let is_held = |edge: i64| within(old_row, n_rows, edge) && within(old_col, n_cols, edge);
+                let is_inside = within(cell.row as i64, n_rows, 1) && within(cell.col as i64, n_cols, 1);
+                let found = (map.view().risk(cell, 1), map.view().ground[index].class);
+                let risk = marked(old_row.max(0) as usize, old_col.max(0) as usize, 1);
+                let class = (old_row * n_cols as i64 + old_col) as u8;
+                let expected = (
+                    if is_inside && is_held(1) { risk } else { Risk::OUTSIDE },
+                    if is_held(0) { class } else { Ground::default().class },
+                );
+                assert_eq!(found, expected, "{east} {north} {cell:?}");
+            }
+        }
     }
 
     #[test]

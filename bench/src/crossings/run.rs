@@ -11,8 +11,9 @@ use serde::Serialize;
 use terrain::GridGeometry;
 use traversability::CvarLevel;
 
-use super::{BrokenRun, Handling, Settings};
+use super::{Handling, Settings};
 use crate::closed_loop::{ClosedLoop, Drive, MapSource, Method};
+use crate::sweep::BrokenDrive;
 
 /// From start to goal [m].
 const DISTANCE_M: f64 = 18.0;
@@ -88,7 +89,7 @@ impl fmt::Display for Job {
 }
 
 impl Job {
-    pub(super) fn drive(&self, settings: &Settings) -> Result<Crossing, BrokenRun> {
+    pub(super) fn drive(&self, settings: &Settings) -> Result<Crossing, BrokenDrive> {
         let mut closed = self.begin(settings)?;
         let (mut n_stops, mut least_m, mut trail) = (0, f64::INFINITY, Vec::new());
         let outcome = loop {
@@ -119,7 +120,7 @@ impl Job {
         })
     }
 
-    fn begin(&self, settings: &Settings) -> Result<ClosedLoop, BrokenRun> {
+    fn begin(&self, settings: &Settings) -> Result<ClosedLoop, BrokenDrive> {
         let Settings { vehicle, config, episode, n_walkers, .. } = settings;
         let seed = seed_of(settings.seed, &[self.number]);
         let task = task(seed)?;

@@ -21,6 +21,7 @@ fn label(kind: GapKind, effects: &[&str], injection: serde_json::Value) -> GapLa
 fn answer(verdict: Verdict, announced: &[&str], ranking: &[(&str, f64)]) -> Answer {
     let named = |id: &&str| NamedEffect { id: (*id).to_owned(), form: None, parameters: BTreeMap::new() };
     Answer {
+        schema_version: sim_to_real::SCHEMA_VERSION,
         case: "c".to_owned(),
         steering: Steering::Angle,
         verdict,
@@ -40,6 +41,8 @@ fn answer(verdict: Verdict, announced: &[&str], ranking: &[(&str, f64)]) -> Answ
             learned_bound_closed: None,
             position_error_2s_m: None,
         },
+        errors_by_quantity: Vec::new(),
+        in_simulator: None,
         advice: Vec::new(),
     }
 }

@@ -6,9 +6,7 @@ use bicycle::Vehicle;
 use bicycle::lanes::{Instructions, Isa};
 use evidential::{BeliefMap, Learned, Unfamiliar};
 use serde::Serialize;
-use terrain::{
-    CellRegion, ElevationConfig, ElevationMap, GridGeometry, Pose, RangePoint, Scan, TerrainClass,
-};
+use terrain::{ElevationConfig, ElevationMap, GridGeometry, Pose, RangePoint, Scan, TerrainClass};
 use traversability::CvarLevel;
 
 use super::{Sizes, untrained};
@@ -93,20 +91,19 @@ fn along_the_way(drive: &ScanDrive, vehicle: &Vehicle) -> Result<ScanDriveReport
         let (fused_ms, fused) = timed_ms(|| elevation.fuse(&scan, &pose));
         fused?;
         follow(&mut map, &pose);
-        let changed = elevation.take_changed().unwrap_or(CellRegion { rows: 0..0, cols: 0..0 });
-        let (update_ms, judged) = timed_ms(|| map.update_dirty(elevation.surface(), &changed));
+        let (update_ms, judged) = timed_ms(|| map.update(elevation.surface()));
         let judged = judged?;
         if step >= N_WARM_UP {
             fuse_ms.push(fused_ms);
             update_all_ms.push(update_ms);
-            n_judged += judged.n_cells();
+            n_judged += judged;
         }
     }
     Ok(ScanDriveReport {
         points: drive.points_m.len(),
         scans: drive.n_scans,
         publish_step_m,
-        judged_share: n_judged as f64 / (drive.n_scans * WINDOW.n_cells()) as f64,
+        judged_share: n_judged as f64 / (drive.n_scans * WINDOW.n_cells() * N_YAWS) as f64,
         fuse_ms: Spread::of(fuse_ms),
         update_ms: Spread::of(update_all_ms),
     })

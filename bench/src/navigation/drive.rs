@@ -9,8 +9,9 @@ use scenarios::{Outcome, Task};
 use serde::Serialize;
 use traversability::CvarLevel;
 
-use super::{BrokenDrive, Settings};
+use super::Settings;
 use crate::closed_loop::{ClosedLoop, Drive, MapSource, Method};
+use crate::sweep::BrokenDrive;
 
 /// One drive in numbers. Positions are those of the rear axle's centre in the map frame.
 #[derive(Clone, Debug, PartialEq, Serialize)]

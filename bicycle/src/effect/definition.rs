@@ -105,6 +105,12 @@ impl<L: Lanes> Driving<L> {
         self.acceleration = (self.acceleration + more).clamp(-limit, limit);
     }
 
+    /// Takes so much from the acceleration [m/s2].
+    #[inline(always)]
+    pub fn resist(&mut self, less: Real<L>) {
+        self.acceleration = self.acceleration - less;
+    }
+
     /// 1 on ground of this class, 0 on other ground, in between on the border.
     #[inline(always)]
     pub fn on_class(&self, class: Constant) -> Real<L> {
@@ -167,7 +173,7 @@ pub(crate) trait Values {
     fn values(&self) -> [f64; 4];
 }
 
-/// How an effect is written; implemented once per file.
+/// How an effect is written.
 pub(crate) trait Definition: Values {
     const ID: &'static str;
     const MEANING: &'static str;
@@ -249,3 +255,47 @@ macro_rules! parameters {
     };
 }
 pub(crate) use parameters;
+
+/// Constants that are the parameters themselves.
+pub(crate) fn as_they_are(values: [f64; 4], _step_s: f64) -> [f64; 4] {
+    values
+}
+
+/// Effects of one stage that remember nothing: of each what it is, its parameters, and what it does with their constants.
+/// `by` names the function from parameters and step length to constants.
+macro_rules! effects {
+    (@cause $cause:literal) => { const CAUSE: &'static str = $cause; };
+    (@role $role:ident) => {
+        const ROLE: $crate::effect::definition::Role = $crate::effect::definition::Role::$role;
+    };
+    (@ground read) => { const USES_GROUND: bool = true; };
+    ($stage:ident $method:ident($State:ty, $lanes:ident) by $constants:ident; $(
+        $(#[$doc:meta])* $name:ident $id:literal: $meaning:literal $($key:ident $value:tt)* {$($parameters:tt)*}
+        |$($constant:ident),+; $state:ident| $act:expr;
+    )*) => {$(
+        parameters! { $(#[$doc])* $name {$($parameters)*} }
+
+        impl $crate::effect::definition::Definition for $name {
+            const ID: &'static str = $id;
+            const MEANING: &'static str = $meaning;
+            const STAGES: &'static [$crate::effect::definition::Stage] =
+                &[$crate::effect::definition::Stage::$stage];
+            $($crate::effect::definition::effects!(@$key $value);)*
+
+            fn constants(&self, step_s: f64) -> [f64; 4] {
+                $constants($crate::effect::definition::Values::values(self), step_s)
+            }
+
+            #[inline(always)]
+            fn $method<L: $crate::lanes::Lanes>(
+                constants: &$crate::effect::definition::Constants,
+                $state: &mut $State,
+            ) {
+                let lanes = $state.$lanes.0;
+                let [$($constant,)+ ..] = constants.map(|value| $crate::lanes::Real::constant(lanes, value));
+                $act;
+            }
+        }
+    )*};
+}
+pub(crate) use effects;

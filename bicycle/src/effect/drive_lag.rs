@@ -1,7 +1,7 @@
 //! A motor that is slow to give the force that its controller wants.
 
+use super::actuator::lag;
 use super::definition::{Constants, Definition, Driving, Stage, parameters};
-use super::lag;
 use crate::lanes::{Lanes, Real};
 
 parameters! {
@@ -15,7 +15,8 @@ parameters! {
 impl Definition for DriveLag {
     const ID: &'static str = "drive_lag";
     const CAUSE: &'static str = "speed_lag";
-    const MEANING: &'static str = "first-order motor inside the speed loop: T da/dt = wanted - a, dv/dt = a + forces";
+    const MEANING: &'static str =
+        "first-order motor inside the speed loop: T da/dt = wanted - a, dv/dt = a + forces";
     const STAGES: &'static [Stage] = &[Stage::Drive];
 
     fn constants(&self, step_s: f64) -> [f64; 4] {

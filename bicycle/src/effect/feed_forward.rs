@@ -13,7 +13,8 @@ parameters! {
 
 impl Definition for FeedForward {
     const ID: &'static str = "feed_forward";
-    const MEANING: &'static str = "feed-forward to the speed loop: dv/dt = (command - v) / T + F d command/dt";
+    const MEANING: &'static str =
+        "feed-forward to the speed loop: dv/dt = (command - v) / T + F d command/dt";
     const ROLE: Role = Role::Calibration;
     const STAGES: &'static [Stage] = &[Stage::Command];
 

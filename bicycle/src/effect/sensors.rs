@@ -1,6 +1,7 @@
 //! What the sensors say of a motion, and the motion that a measurement stands for.
 
 use super::Effect;
+use super::definition::{Definition, Stage, Values, parameters};
 use crate::Odometry;
 
 /// How sensors misstate the motion; the neutral one states it as it is.
@@ -47,4 +48,53 @@ impl SensorModel {
             ..*measured
         }
     }
+}
+
+/// Effects by what their first parameter changes.
+macro_rules! misstatements {
+    ($($(#[$doc:meta])* $name:ident $id:literal: $meaning:literal $parameters:tt
+        |$value:ident, $sensors:ident| $act:expr;)*) => {$(
+        parameters! { $(#[$doc])* $name $parameters }
+
+        impl Definition for $name {
+            const ID: &'static str = $id;
+            const MEANING: &'static str = $meaning;
+            const STAGES: &'static [Stage] = &[Stage::Sensors];
+
+            fn on_sensors(&self, $sensors: &mut SensorModel) {
+                let [$value, ..] = self.values();
+                $act;
+            }
+        }
+    )*};
+}
+
+misstatements! {
+    /// Poses that are older than their stamp.
+    PoseLatency "pose_latency": "pose latency: measured pose(t) = pose(t - D)"
+    {
+        /// Age D [s].
+        age_s in "s": 0.0 to 1.0, neutral 0.0, tried [0.05, 0.12, 0.25];
+    } |age_s, sensors| sensors.pose_latency_s += age_s;
+
+    /// Velocities out of proportion.
+    OdomScale "odom_scale": "odometry scale: measured velocity = S velocity"
+    {
+        /// Measured over true velocity S [-].
+        ratio in "-": 0.3 to 3.0, neutral 1.0, tried [0.85, 0.95, 1.05, 1.15];
+    } |ratio, sensors| sensors.velocity_ratio *= ratio;
+
+    /// Yaw rates with an offset.
+    GyroBias "gyro_bias": "gyro bias: measured yaw rate = yaw rate + B"
+    {
+        /// Measured less true yaw rate B [rad/s].
+        bias_radps in "rad/s": -0.5 to 0.5, neutral 0.0, tried [-0.05, 0.05];
+    } |bias_radps, sensors| sensors.yaw_rate_bias_radps += bias_radps;
+
+    /// Yaws with an offset.
+    YawMisalign "yaw_misalign": "yaw misalignment: measured yaw = yaw + B"
+    {
+        /// Measured less true yaw B [rad].
+        angle_rad in "rad": -0.5 to 0.5, neutral 0.0, tried [-0.04, 0.04];
+    } |angle_rad, sensors| sensors.yaw_offset_rad += angle_rad;
 }

@@ -16,7 +16,8 @@ const OBSERVER_S: f64 = 0.5;
 
 impl Definition for SpeedIntegral {
     const ID: &'static str = "speed_integral";
-    const MEANING: &'static str = "integral of the speed: dv/dt = ... + I with dI/dt = J (command - v), so that no offset is left";
+    const MEANING: &'static str =
+        "integral of the speed: dv/dt = ... + I with dI/dt = J (command - v), so that no offset is left";
     const ROLE: Role = Role::Calibration;
     const STAGES: &'static [Stage] = &[Stage::Drive];
 

@@ -1,7 +1,7 @@
 //! A speed controller that closes the distance to the command in proportion.
 
+use super::actuator::lag;
 use super::definition::{Constants, Definition, Driving, Role, Stage, parameters};
-use super::lag;
 use crate::lanes::{Lanes, Real};
 
 parameters! {

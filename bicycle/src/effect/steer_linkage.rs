@@ -14,7 +14,8 @@ parameters! {
 impl Definition for SteerLinkage {
     const ID: &'static str = "steer_linkage";
     const CAUSE: &'static str = "steer_gain";
-    const MEANING: &'static str = "steering gain behind the servo: yaw_rate = v tan(G angle) / L, at the servo's own rate";
+    const MEANING: &'static str =
+        "steering gain behind the servo: yaw_rate = v tan(G angle) / L, at the servo's own rate";
     const STAGES: &'static [Stage] = &[Stage::Motion];
 
     fn constants(&self, _step_s: f64) -> [f64; 4] {

@@ -96,7 +96,7 @@ pub(crate) fn check_tracks(_: &TracksHeader, payload: &[TrackRecord]) -> Result<
 
 pub(crate) fn check_risk(header: &RiskHeader, payload: &[[f32; 4]]) -> Result<(), Refusal> {
     let (map, seconds_to_goal) = risk_views(header, payload).ok_or(Refusal::Malformed)?;
-    require(matches!(header.author, 1 | 2), Refusal::Malformed)?;
+    require(matches!(header.map_source, 1 | 2), Refusal::Malformed)?;
     // A finite number times zero is zero; of anything else the sum is no number. One pass, without a branch.
     let of_risks = map.risks.iter().fold(0.0, |sum: f32, risk| {
         sum + 0.0 * (risk.linear_traction + risk.angular_traction + risk.roll_rad + risk.pitch_rad)

@@ -18,6 +18,9 @@ pub enum BenchCommand {
     /// The risk map of what was learned, whole and after a part of the ground has changed
     #[command(long_about = super::learned_map::LONG_ABOUT)]
     LearnedMap(super::BenchLearnedMapArguments),
+    /// How the cost of an update and of a map grows: rollouts, steps, threads, cells, yaws, changed share
+    #[command(long_about = super::scaling::LONG_ABOUT)]
+    Scaling(super::BenchScalingArguments),
     /// Drives over the default rock field, with every method and risk tolerance
     #[command(long_about = NAVIGATION_ABOUT)]
     Navigation(BenchNavigationArguments),

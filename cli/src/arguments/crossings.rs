@@ -13,6 +13,10 @@ pub struct BenchCrossingsArguments {
     #[arg(long, value_name = "N", value_parser = run_count, default_value = "200", allow_hyphen_values = true)]
     pub runs: u64,
 
+    /// Number of the first run, to look at one again: --first-run 29 --runs 1
+    #[arg(long, value_name = "NUMBER", value_parser = values::seed, default_value = "0", allow_hyphen_values = true)]
+    pub first_run: u64,
+
     /// Number that decides everything random: ground, people, the sensors' noise, the samples
     #[arg(long, value_name = "NUMBER", value_parser = values::seed, default_value = "1", allow_hyphen_values = true)]
     pub seed: u64,

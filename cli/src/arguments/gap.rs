@@ -4,6 +4,8 @@ use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
 
+use super::values;
+
 /// What can be asked about the gap between simulator and robot.
 #[derive(Clone, Debug, Subcommand)]
 pub enum GapCommand {
@@ -68,6 +70,18 @@ pub struct GapDiagnoseArguments {
           help_heading = "Drives without a case file")]
     pub heldout: Vec<PathBuf>,
 
+    /// Columns of CSV drives that have names of their own, separated by commas: ours=theirs
+    ///
+    /// Ours are t, run, x, y, z, roll, pitch, yaw, vx, vy, wz, cmd_speed, cmd_steer and the others of a drive log. A file
+    /// without the named column is read as it is.
+    #[arg(
+        long,
+        value_name = "OURS=THEIRS,..",
+        value_delimiter = ',',
+        help_heading = "Drives without a case file"
+    )]
+    pub map: Vec<String>,
+
     /// Where the answer goes, besides the folder.
     #[command(flatten)]
     pub copy: super::JsonArguments,
@@ -91,10 +105,44 @@ pub struct GapDiagnoseArguments {
     #[arg(long)]
     pub learned_bound: bool,
 
+    /// End with exit code 3 if the simulator misses the held-out drives by more than ERROR times what it misses its own by
+    ///
+    /// 1 is what one nominal drive shows against the others; below 1.2 there is no gap. With --simulator, it is your
+    /// simulator itself that is measured, else the model that was calibrated on its drives. Everything is written all the
+    /// same.
+    #[arg(long, value_name = "ERROR", value_parser = values::limit, allow_hyphen_values = true)]
+    pub fail_above: Option<f64>,
+
+    /// Who decides besides the calibrated model.
+    #[command(flatten)]
+    pub simulator: GapSimulatorArguments,
+
     /// Folder that keeps what was calibrated on nominal drives, for the next case of the same vehicle
     /// [default: surefoot/baselines in the user's cache folder]
     #[arg(long, value_name = "DIR")]
     pub baseline_cache: Option<PathBuf>,
+}
+
+/// The user's own simulator.
+#[derive(Args, Clone, Debug)]
+pub struct GapSimulatorArguments {
+    /// Let this simulator decide: a command that speaks JSON lines on standard input and output
+    ///
+    /// The likeliest effects on commands and sensors are wrapped around it, its own knobs are turned, and what brings it
+    /// nearest to the robot is told and verified in it. The protocol is in docs/simulator_protocol.md, a simulator that
+    /// speaks it in examples/python/double_track_simulator.py.
+    #[arg(long, value_name = "COMMAND", value_parser = values::command, help_heading = "Your own simulator")]
+    pub simulator: Option<String>,
+
+    /// Instances of the simulator that run side by side
+    #[arg(long, value_name = "N", default_value = "1", value_parser = values::simulator_count,
+          allow_hyphen_values = true, requires = "simulator", help_heading = "Your own simulator")]
+    pub simulators: usize,
+
+    /// Longest time that it may take for one drive [s]
+    #[arg(long, value_name = "SECONDS", default_value = "60", value_parser = values::timeout_s,
+          allow_hyphen_values = true, requires = "simulator", help_heading = "Your own simulator")]
+    pub simulator_timeout: f64,
 }
 
 impl GapDiagnoseArguments {
@@ -119,6 +167,13 @@ pub struct GapApplyArguments {
     /// Where the repaired model goes
     #[arg(long, value_name = "OUT.toml")]
     pub out: PathBuf,
+
+    /// Apply the effects of a diagnosis that leaves a part of the gap unknown as well
+    ///
+    /// What stands for something that the catalogue does not know foretells the drives that it was fitted to, and may be
+    /// wrong on others.
+    #[arg(long)]
+    pub force: bool,
 }
 
 const DIAGNOSE_ABOUT: &str = "\
@@ -141,6 +196,13 @@ Examples:
       --real monday.csv tuesday.mcap --heldout friday.csv --out report
       Drives without a case file. At least three nominal and two real drives of 40 s, with
       turns and changes of speed in them, tell the most.
+  surefoot gap diagnose cases/steering --simulator \"python3 my_sim.py\" --simulators 4
+      Your own simulator decides: what it lacks, which of its parameters are off, and how
+      far the gap shrinks in it.
+  surefoot gap diagnose cases/own --map t=stamp,vx=wheel_speed
+      Logs whose columns have names of their own.
+  surefoot gap diagnose cases/nightly --fail-above 1.5 --json answer.json
+      A gate for a build: exit code 3 once simulator and robot have come apart.
   surefoot gap apply report/answer.json --model model.toml --out repaired.toml
   surefoot drive --model repaired.toml
       The controller plans with what was found.
@@ -174,7 +236,8 @@ Files in --out:
 Exit codes:
   0  the diagnosis stands, whatever it says
   1  it failed; one line on standard error says why
-  2  bad usage or input; one line says what was expected and what was found";
+  2  bad usage or input; one line says what was expected and what was found
+  3  the diagnosis stands and the gap is larger than --fail-above; one line says by how much";
 
 const APPLY_ABOUT: &str = "\
 Puts the effects that a diagnosis announced into the controller's model and never into the plant.
@@ -190,4 +253,5 @@ Examples:
 Exit codes:
   0  the model was written; 'none' writes the model as it was
   1  it was not; one line on standard error says why
-  2  bad usage or input, or a diagnosis that names no effect ('unknown')";
+  2  bad usage or input, a diagnosis that names no effect ('unknown'), or one that leaves
+     a part unknown ('effects_and_unknown') without --force";

@@ -99,6 +99,22 @@ pub(super) fn duration_s(word: &str) -> Result<f64, String> {
     number_where(word, "a finite number of seconds above 0", |value| value > 0.0 && value.is_finite())
 }
 
+/// How long one answer may take [s].
+pub(super) fn timeout_s(word: &str) -> Result<f64, String> {
+    number_where(word, "a number of seconds above 0 and up to 86400", |value| value > 0.0 && value <= 86400.0)
+}
+
+/// What may at most be.
+pub(super) fn limit(word: &str) -> Result<f64, String> {
+    number_where(word, "a finite number above 0", |value| value > 0.0 && value.is_finite())
+}
+
+/// A command with its arguments.
+pub(super) fn command(word: &str) -> Result<String, String> {
+    let is_empty = word.trim().is_empty();
+    if is_empty { Err("expected a command, found none".to_owned()) } else { Ok(word.to_owned()) }
+}
+
 /// A distance that counts as there [m].
 pub(super) fn tolerance_m(word: &str) -> Result<f64, String> {
     number_where(word, "a distance above 0 and up to 100 metres", |value| value > 0.0 && value <= 100.0)
@@ -125,6 +141,11 @@ pub(super) fn number_where(word: &str, expected: &str, allowed: impl Fn(f64) -> 
 /// A number of threads.
 pub(super) fn thread_count(word: &str) -> Result<usize, String> {
     count(word, 256, "threads")
+}
+
+/// A number of simulators side by side.
+pub(super) fn simulator_count(word: &str) -> Result<usize, String> {
+    count(word, 256, "simulators")
 }
 
 /// A number of repetitions.

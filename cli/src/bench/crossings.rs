@@ -1,12 +1,11 @@
 //! `surefoot bench crossings`: the runs, a bar meanwhile, and what they add up to as text, JSON and picture.
 
-use ::bench::closed_loop::DriveError;
-use ::bench::crossings::{BrokenRun, CrossingsError, Report, Request, measure};
-use navigator::NavigatorError;
+use ::bench::crossings::{Report, Request, measure};
 
+use super::sweep::told;
 use crate::arguments::BenchCrossingsArguments;
 use crate::output::WithRevision;
-use crate::{UsageError, WorkFailed, progress};
+use crate::{WorkFailed, progress};
 
 pub(crate) fn run_crossings(arguments: &BenchCrossingsArguments) -> anyhow::Result<()> {
     let request = request(arguments);
@@ -32,23 +31,13 @@ fn request(arguments: &BenchCrossingsArguments) -> Request {
     Request {
         handlings: arguments.handling.iter().map(|&handling| handling.into()).collect(),
         n_runs: arguments.runs,
+        first_run: arguments.first_run,
         seed: arguments.seed,
         n_walkers: arguments.walkers,
         time_limit_s: arguments.time_limit,
         n_threads: arguments.kernels.threads.count(),
         isa: arguments.kernels.isa.into(),
     }
-}
-
-/// An instruction set that the machine lacks is the user's choice; all else is not.
-fn told(error: CrossingsError) -> anyhow::Error {
-    if let CrossingsError::Run { source, .. } = &error
-        && let BrokenRun::Loop(DriveError::Navigator(NavigatorError::Controller(refused))) = source.as_ref()
-        && matches!(refused, mppi::ConfigError::Isa(_))
-    {
-        return UsageError(refused.to_string()).into();
-    }
-    error.into()
 }
 
 fn write(report: &Report, arguments: &BenchCrossingsArguments) -> anyhow::Result<()> {

@@ -1,10 +1,9 @@
 //! `surefoot bench navigation`: the drives, a bar meanwhile, and the table as text, JSON and picture.
 
-use ::bench::closed_loop::DriveError;
-use ::bench::navigation::{BrokenDrive, NavigationError, Report, Request, measure};
-use navigator::NavigatorError;
+use ::bench::navigation::{Report, Request, measure};
 use traversability::CvarLevel;
 
+use super::sweep::told;
 use crate::arguments::BenchNavigationArguments;
 use crate::output::WithRevision;
 use crate::{UsageError, progress};
@@ -35,38 +34,9 @@ fn request(arguments: &BenchNavigationArguments) -> Result<Request, UsageError> 
     })
 }
 
-/// An instruction set that the machine lacks is the user's choice; all else is not.
-fn told(error: NavigationError) -> anyhow::Error {
-    if let NavigationError::Drive { source, .. } = &error
-        && let BrokenDrive::Loop(DriveError::Navigator(NavigatorError::Controller(refused))) = source.as_ref()
-        && matches!(refused, mppi::ConfigError::Isa(_))
-    {
-        return UsageError(refused.to_string()).into();
-    }
-    error.into()
-}
-
 fn write(report: &Report, arguments: &BenchNavigationArguments) -> anyhow::Result<()> {
     arguments.results.write_json("navigation.json", &WithRevision::of(report))?;
     arguments.results.write("navigation.png", &report::navigation::picture(report)?)?;
     println!("\n  navigation.json and navigation.png in {}", arguments.results.out.display());
     Ok(())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn instruction_set_that_is_absent_is_the_users_choice() {
-        let absent = || mppi::ConfigError::Isa(bicycle::lanes::IsaAbsent { isa: mppi::Isa::Avx512 });
-        let broken = NavigationError::Drive {
-            drive: "truth, seed 1".to_owned(),
-            source: Box::new(DriveError::from(NavigatorError::from(absent())).into()),
-        };
-        let error = told(broken);
-        assert!(error.is::<UsageError>());
-        assert_eq!(error.to_string(), absent().to_string());
-        assert!(!told(NavigationError::NoDrives).is::<UsageError>());
-    }
 }

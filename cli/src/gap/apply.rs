@@ -5,7 +5,7 @@ use std::path::Path;
 use bicycle::effect::{CATALOGUE, DriveLag, EffectError, SpeedLag};
 use bicycle::{Effect, Model};
 use formats::ConfigText;
-use sim_to_real::{Answer, NamedEffect, Steering, Verdict};
+use sim_to_real::{Answer, NamedEffect, SCHEMA_VERSION, Steering, Verdict};
 
 use crate::UsageError;
 use crate::arguments::GapApplyArguments;
@@ -13,6 +13,9 @@ use crate::arguments::GapApplyArguments;
 pub(super) fn run(arguments: &GapApplyArguments) -> anyhow::Result<()> {
     let answer = read_answer(&arguments.diagnosis)?;
     let told = |message: String| UsageError(format!("{}: {message}", arguments.diagnosis.display()));
+    if answer.verdict == Verdict::EffectsAndUnknown && !arguments.force {
+        return Err(told(FORCED.to_owned()).into());
+    }
     let effects = effects(&answer).map_err(told)?;
     let mut model = read_model(&arguments.model)?;
     let effects: Vec<Effect> = effects.into_iter().map(|effect| fitting(effect, &model)).collect();
@@ -25,12 +28,23 @@ pub(super) fn run(arguments: &GapApplyArguments) -> anyhow::Result<()> {
     Ok(())
 }
 
+/// What is said of a diagnosis that leaves a part unknown.
+const FORCED: &str = "verdict: expected 'effects', or --force, found 'effects_and_unknown': a part of the gap is none of \
+    the catalogue, and what is named may stand for it";
+
 fn read_answer(path: &Path) -> Result<Answer, UsageError> {
     let file = path.display();
     let text = std::fs::read_to_string(path)
         .map_err(|error| UsageError(format!("{file}: expected a readable file, found: {error}")))?;
-    serde_json::from_str(&text)
-        .map_err(|error| UsageError(format!("{file}: expected the answer of gap diagnose, found: {error}")))
+    let answer: Answer = serde_json::from_str(&text).map_err(|error| {
+        UsageError(format!("{file}: expected the answer of gap diagnose, found: {error}"))
+    })?;
+    if answer.schema_version > SCHEMA_VERSION {
+        let found = answer.schema_version;
+        let told = format!("{file}: schema_version: expected at most {SCHEMA_VERSION}, found {found}");
+        return Err(UsageError(told));
+    }
+    Ok(answer)
 }
 
 /// The announced effects as pieces of a model.

@@ -11,12 +11,13 @@ use sim_to_real::{
 };
 
 use super::follow_up::Diagnosed;
+use super::in_simulator::Decider;
 use super::outputs::Outputs;
 use super::progress::Progress;
 use super::request::Request;
 use super::{baseline, drives, machine, predictions};
 use crate::arguments::GapDiagnoseArguments;
-use crate::{UsageError, summary};
+use crate::{LimitExceeded, UsageError, summary};
 
 /// What a diagnosis is made from.
 struct Inputs {
@@ -33,9 +34,15 @@ struct Verified {
 
 pub(super) fn run(arguments: &GapDiagnoseArguments) -> anyhow::Result<()> {
     let request = Request::of(arguments)?;
+    if arguments.fail_above.is_some() && request.heldout.is_empty() {
+        return Err(
+            UsageError("--fail-above: expected held-out drives to measure, found none".to_owned()).into()
+        );
+    }
     let outputs = Outputs::prepare(arguments)?;
     let mut doubts = request.doubtful_names()?;
     let inputs = read(&request, &mut doubts)?;
+    let mut decider = Decider::start(&arguments.simulator, &inputs.machine, &inputs.sim)?;
     let folder = arguments.baseline_cache.clone().or_else(baseline::default_folder);
     let (baseline, diagnosis) = diagnosed_against(&inputs, folder.as_deref(), &mut doubts)?;
     let mut predicted = diagnosis.answer(request.name.as_deref().unwrap_or(&inputs.machine.name));
@@ -47,12 +54,15 @@ pub(super) fn run(arguments: &GapDiagnoseArguments) -> anyhow::Result<()> {
         real: &inputs.real,
     };
     diagnosed.advise(&mut predicted, (arguments, &outputs))?;
+    decider.decide(&mut predicted, &inputs.machine, (&inputs.sim, &inputs.real))?;
     outputs.write_json("prediction.json", &predicted)?;
 
     // From here on the prediction cannot change any more.
     let verified = open_heldout(&request, &inputs, &baseline, &diagnosis, &mut doubts)?;
     let complete = |verification: &Verification| verification.complete(predicted.clone());
     let mut answer = verified.verification.as_ref().map_or_else(|| predicted.clone(), complete);
+    decider.verify(&mut answer, &inputs.machine, &verified.heldout)?;
+    let n_runs = decider.finish();
     diagnosed.bound(&mut answer, (arguments, &outputs), &verified.heldout)?;
     answer.advice.extend(doubts.iter().map(|doubt| format!("check {doubt}")));
     let report = Report {
@@ -61,10 +71,24 @@ pub(super) fn run(arguments: &GapDiagnoseArguments) -> anyhow::Result<()> {
         answer: &answer,
         diagnosis: &diagnosis,
         doubts: &doubts,
+        n_runs,
     };
     report.write(&outputs, &verified)?;
     report.say(&outputs);
-    Ok(())
+    arguments.fail_above.map_or(Ok(()), |limit| held_to(limit, &answer))
+}
+
+/// Errors: the gap is larger than what is allowed.
+fn held_to(limit: f64, answer: &Answer) -> anyhow::Result<()> {
+    match answer.gap_ratio() {
+        Some(ratio) if ratio <= limit => Ok(()),
+        found => {
+            let found = found.map_or("none".to_owned(), |ratio| format!("{ratio:.2}"));
+            let whose = "times the simulator's error on its own drives";
+            Err(LimitExceeded(format!("--fail-above: expected at most {limit} {whose}, found {found}"))
+                .into())
+        }
+    }
 }
 
 /// Against the calibrated simulator; without nominal drives against the bare kinematic bicycle.
@@ -90,7 +114,9 @@ fn diagnosed_against(
 }
 
 fn read(request: &Request, doubts: &mut Vec<String>) -> Result<Inputs, UsageError> {
-    let (sim, real) = (drives::read(&request.sim, doubts)?, drives::read(&request.real, doubts)?);
+    let names = &request.names;
+    let (sim, real) =
+        (drives::read(&request.sim, names, doubts)?, drives::read(&request.real, names, doubts)?);
     let machine = machine::read(&request.vehicle, &[&sim[..], &real[..]].concat())?;
     let sim = drives::screened(&machine, &request.sim, sim, doubts)?;
     let real = drives::screened(&machine, &request.real, real, doubts)?;
@@ -107,7 +133,7 @@ fn open_heldout(
     diagnosis: &Diagnosis,
     doubts: &mut Vec<String>,
 ) -> Result<Verified, UsageError> {
-    let heldout = drives::read(&request.heldout, doubts)?;
+    let heldout = drives::read(&request.heldout, &request.names, doubts)?;
     let heldout = drives::screened(&inputs.machine, &request.heldout, heldout, doubts)?;
     let of_both = [(&inputs.real[..], &request.real[..]), (&heldout[..], &request.heldout[..])];
     drives::refuse_mixed_steering(&inputs.machine, &of_both)?;
@@ -127,6 +153,8 @@ struct Report<'a> {
     answer: &'a Answer,
     diagnosis: &'a Diagnosis,
     doubts: &'a [String],
+    /// Drives that the user's own simulator was sent through, if there is one.
+    n_runs: Option<usize>,
 }
 
 impl Report<'_> {
@@ -177,6 +205,9 @@ impl Report<'_> {
             eprintln!("surefoot: {doubt}");
         }
         print!("{}", report::gap::text(self.answer, &self.told_drives()));
+        if let Some(n_runs) = self.n_runs {
+            println!("  {n_runs} drives in the simulator");
+        }
         let report = outputs.in_folder("report.html");
         for path in
             [report.as_ref(), outputs.json.as_ref(), outputs.predictions.as_ref()].into_iter().flatten()

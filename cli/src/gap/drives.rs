@@ -3,14 +3,19 @@
 use std::path::{Path, PathBuf};
 
 use bicycle::DriveLog;
+use formats::ColumnNames;
 use sim_to_real::{Gravity, Machine, Steering, Suspicion, screen, screen_sets, split_at_breaks};
 
 use crate::UsageError;
 
 /// Reads drives; what their files leave out is told in `doubts`.
-pub(super) fn read(paths: &[PathBuf], doubts: &mut Vec<String>) -> Result<Vec<DriveLog>, UsageError> {
+pub(super) fn read(
+    paths: &[PathBuf],
+    names: &ColumnNames,
+    doubts: &mut Vec<String>,
+) -> Result<Vec<DriveLog>, UsageError> {
     let mut read_one = |path: &PathBuf| {
-        let drive = formats::read_drive(path).map_err(UsageError::from_input)?;
+        let drive = formats::read_drive_named(path, names).map_err(UsageError::from_input)?;
         if let Some(problem) = drive.ended_early {
             doubts.push(format!("{}: the recording ends early, {problem}", path.display()));
         }

@@ -25,6 +25,11 @@ impl Progress {
         Self::new("looking for the cause")
     }
 
+    /// Of the user's own simulator, whose number of runs is not known.
+    pub(super) fn simulator() -> Self {
+        Self::new("starting the simulator")
+    }
+
     fn new(message: &'static str) -> Self {
         let bar = progress::bar(FULL, "{spinner} {msg}");
         bar.set_message(message);
@@ -35,6 +40,11 @@ impl Progress {
     /// Shows a share from 0 to 1.
     pub(super) fn reached(&self, share: f64) {
         self.bar.set_position((share.clamp(0.0, 1.0) * FULL as f64) as u64);
+    }
+
+    /// Says what is being done.
+    pub(super) fn told(&self, message: String) {
+        self.bar.set_message(message);
     }
 
     /// Takes the bar away.

@@ -2,6 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
+use formats::ColumnNames;
+
 use crate::UsageError;
 use crate::arguments::GapDiagnoseArguments;
 
@@ -14,18 +16,23 @@ pub(super) struct Request {
     pub sim: Vec<PathBuf>,
     pub real: Vec<PathBuf>,
     pub heldout: Vec<PathBuf>,
+    /// What columns of CSV drives are called.
+    pub names: ColumnNames,
 }
 
 impl Request {
     pub(super) fn of(arguments: &GapDiagnoseArguments) -> Result<Self, UsageError> {
+        let names = ColumnNames::parse(arguments.map.iter().map(String::as_str))
+            .map_err(|error| UsageError(format!("--map: {error}")))?;
         let request = match (&arguments.case, &arguments.vehicle) {
-            (Some(case), _) => Self::of_case(case)?,
+            (Some(case), _) => Self { names, ..Self::of_case(case)? },
             (None, vehicle) => Self {
                 name: None,
                 vehicle: vehicle.clone().unwrap_or_default(),
                 sim: arguments.sim.clone(),
                 real: arguments.real.clone(),
                 heldout: arguments.heldout.clone(),
+                names,
             },
         };
         request.check()?;
@@ -40,6 +47,7 @@ impl Request {
             sim: case.sim,
             real: case.real,
             heldout: case.heldout,
+            names: ColumnNames::default(),
         })
     }
 
@@ -92,6 +100,7 @@ mod tests {
             sim: vec!["a/real_1.csv".into(), "surreal.csv".into()],
             real: vec!["sim_real/drive.csv".into(), "SIM-2.csv".into()],
             heldout: Vec::new(),
+            names: ColumnNames::default(),
         };
         let told = request.doubtful_names().unwrap();
         let expected = [
@@ -109,6 +118,7 @@ mod tests {
             sim: sim.iter().map(PathBuf::from).collect(),
             real: real.iter().map(PathBuf::from).collect(),
             heldout: Vec::new(),
+            names: ColumnNames::default(),
         };
         let told = with(&["real_1.csv", "real_2.csv"], &["sim_1.csv"]).doubtful_names().unwrap_err().0;
         assert!(told.contains("found them swapped? real_1.csv: given as a nominal drive"), "{told}");
@@ -127,6 +137,7 @@ mod tests {
             sim: vec![sim.to_owned()],
             real: vec![real.to_owned()],
             heldout: Vec::new(),
+            names: ColumnNames::default(),
         };
         let told = with(&file, &file).check().unwrap_err().0;
         assert!(told.ends_with("d.csv: expected each drive once, found it twice"), "{told}");

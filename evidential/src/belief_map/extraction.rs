@@ -431,9 +431,9 @@ mod tests {
         let (surface, ratio) =
             (GridMap::from_values(WINDOW, values).unwrap(), ResolutionRatio::new(0.1, 0.1).unwrap());
         let layout = FeatureLayout::for_vehicle(&CAR);
-        let mut ground = PatchGround::unknown(WINDOW, ratio, layout.height_scale_m);
-        ground.read(&surface, [0, 0], [69, 19]);
         let mut stencil = stencil(&layout);
+        let mut ground = PatchGround::unknown(WINDOW, ratio, layout.height_scale_m, stencil.felt.iter());
+        ground.read(&surface);
         stencil.lay_on(ground.planes(), BASE);
         let mut features = vec![Block::ZERO; layout.n_features()];
         let mut grounding = Grounding::default();

@@ -1,6 +1,6 @@
 //! Where a footprint's features lie relative to the cell under its rear axle.
 
-use physics_prior::Planes;
+use physics_prior::{CellSpan, Planes};
 use terrain::PatchShape;
 
 use crate::FeatureLayout;
@@ -46,6 +46,8 @@ pub(super) struct PatchStencil {
     /// The same points, for what is not interpolated.
     pub nearest: Vec<Nearest>,
     pub n_heights: usize,
+    /// Every cell that any of these reads.
+    pub felt: Vec<CellSpan>,
 }
 
 impl PatchStencil {
@@ -64,22 +66,22 @@ impl PatchStencil {
         let cover = points(&layout.cover_patch);
         let nearest =
             |point: &[f64; 2]| Nearest { offset: point.map(|v| (v + EDGE).floor() as i64), delta: 0 };
-        Self {
-            wheels: quads(&layout.wheels.body_points_m().map(place)),
-            heights: quads(&points(&layout.height_patch)),
-            nearest: cover.iter().map(nearest).collect(),
-            cover: quads(&cover),
-            n_heights: layout.height_patch.n_samples(),
-        }
+        let wheels = quads(&layout.wheels.body_points_m().map(place));
+        let heights = quads(&points(&layout.height_patch));
+        let nearest = cover.iter().map(nearest).collect();
+        let cover = quads(&cover);
+        // The cell that holds a point of the cover is one of the four around it.
+        let felt =
+            CellSpan::of_rows(wheels.iter().chain(&heights).chain(&cover).flat_map(|quad| quad.corners()));
+        Self { wheels, heights, cover, nearest, n_heights: layout.height_patch.n_samples(), felt }
     }
 
     /// Finds its cells in the layers of the ground, for base cells like the given one.
     pub fn lay_on(&mut self, planes: &Planes, base: [i64; 2]) {
         for quad in self.wheels.iter_mut().chain(&mut self.heights).chain(&mut self.cover) {
-            let [east, north] = quad.offset;
-            let corners = [[east, north], [east + 1, north], [east, north + 1], [east + 1, north + 1]];
-            quad.deltas = corners.map(|corner| planes.delta(base, corner));
+            quad.deltas = quad.corners().map(|corner| planes.delta(base, corner));
         }
+        self.felt.iter_mut().for_each(|span| span.lay_on(planes, base));
         for nearest in &mut self.nearest {
             nearest.delta = planes.delta(base, nearest.offset);
         }
@@ -94,6 +96,14 @@ impl PatchStencil {
         }
         // The cell that holds a point of the cover is one of the four around it.
         [least, most]
+    }
+}
+
+impl Quad {
+    /// Its cells as offsets from the base cell, in the order of the weights.
+    fn corners(&self) -> [[i64; 2]; 4] {
+        let [east, north] = self.offset;
+        [[east, north], [east + 1, north], [east, north + 1], [east + 1, north + 1]]
     }
 }
 

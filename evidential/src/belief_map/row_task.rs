@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use bicycle::lanes::{BLOCK, Block};
-use physics_prior::{BlockPrior, PoseLine};
+use physics_prior::{ASKED, BlockPrior, PoseLine, stretches};
 use terrain::{GridMap, SurfaceCell};
 use traversability::{Ground, GroundFlags, Risk};
 
@@ -13,17 +13,17 @@ use super::{BeliefLayers, Fusion};
 use crate::Prior;
 use crate::predictor::{BlockPrediction, Workspace};
 
-/// Cells to judge, and where their results go.
+/// Whole rows of cells, and where what is judged of them goes.
 pub(super) struct RowTask<'a> {
     /// Lattice rows, from south to north.
     pub rows: Range<i64>,
     /// Lattice columns.
     pub cols: Range<i64>,
-    /// Lattice index of the first column in the slices.
-    pub west: i64,
-    /// Whole rows, shape [row, col, yaw].
+    /// Shape [row, col, yaw].
     pub risks: &'a mut [Risk],
-    /// Whole rows, shape [row, col].
+    /// Whether a pose is unlike the training data, shape [row, col, yaw].
+    pub is_unfamiliar: &'a mut [bool],
+    /// Shape [row, col].
     pub ground: &'a mut [Ground],
 }
 
@@ -33,8 +33,6 @@ pub(super) struct Scratch {
     block: BlockScratch,
     /// Poses of the block, whole lines and parts of lines.
     parts: Vec<Part>,
-    /// Poses unlike the training data of each cell of the task.
-    n_out_of_distribution: Vec<usize>,
 }
 
 /// What is known of the poses of a block.
@@ -44,7 +42,7 @@ struct BlockScratch {
     prior: BlockPrior,
     grounding: Grounding,
     risks: [Risk; BLOCK],
-    out_of_distribution: [bool; BLOCK],
+    is_unfamiliar: [bool; BLOCK],
 }
 
 /// Neighbouring poses in a block.
@@ -61,68 +59,85 @@ impl Scratch {
             prior: BlockPrior::default(),
             grounding: Grounding::default(),
             risks: [Risk::NONE; BLOCK],
-            out_of_distribution: [false; BLOCK],
+            is_unfamiliar: [false; BLOCK],
         };
-        Self { block, parts: Vec::new(), n_out_of_distribution: Vec::new() }
+        Self { block, parts: Vec::new() }
     }
 
     /// Bytes of the buffers.
     pub fn n_bytes(&self) -> usize {
-        let per_cell = size_of_val(&*self.n_out_of_distribution) + size_of_val(&*self.parts);
-        size_of_val(&self.block) + self.block.workspace.n_bytes() + per_cell
+        size_of_val(&self.block) + self.block.workspace.n_bytes() + size_of_val(&*self.parts)
     }
 }
 
 impl RowTask<'_> {
-    /// Judges every footprint.
-    pub fn run(mut self, layers: &BeliefLayers, surface: &GridMap<SurfaceCell>, scratch: &mut Scratch) {
-        scratch.n_out_of_distribution.clear();
-        scratch.n_out_of_distribution.resize(self.ground.len(), 0);
+    /// Judges every footprint that changed; returns how many.
+    pub fn run(
+        mut self,
+        layers: &BeliefLayers,
+        surface: &GridMap<SurfaceCell>,
+        scratch: &mut Scratch,
+    ) -> usize {
         let n_phases = layers.field.ratio().n_phases();
+        let mut n_judged = 0;
         for row in self.rows.clone() {
             for first_col in self.cols.clone().take(n_phases) {
                 for yaw in 0..layers.n_yaws {
-                    self.judge_line([first_col, row], yaw, layers, scratch);
+                    n_judged += self.judge_line([first_col, row], yaw, layers, scratch);
                 }
             }
         }
         self.judge_block(layers, scratch);
-        for cell in self.cells() {
-            let index = self.index(cell);
-            let mut ground = layers.field.ground_in(cell, surface);
-            if 2 * scratch.n_out_of_distribution[index] > layers.n_yaws {
+        for (row, col) in self.rows.clone().flat_map(|row| self.cols.clone().map(move |col| (row, col))) {
+            let index = self.index([col, row]);
+            let mut ground = layers.field.ground_in([col, row], surface);
+            let yaws = &self.is_unfamiliar[index * layers.n_yaws..][..layers.n_yaws];
+            if 2 * yaws.iter().map(|&is_unfamiliar| usize::from(is_unfamiliar)).sum::<usize>() > layers.n_yaws
+            {
                 ground.flags = ground.flags.with(GroundFlags::OUT_OF_DISTRIBUTION);
             }
             self.ground[index] = ground;
         }
-    }
-
-    fn cells(&self) -> impl Iterator<Item = [i64; 2]> + use<> {
-        let cols = self.cols.clone();
-        self.rows.clone().flat_map(move |row| cols.clone().map(move |col| [col, row]))
+        n_judged
     }
 
     /// Position of a cell in the slices.
     fn index(&self, [col, row]: [i64; 2]) -> usize {
-        let n_cols = self.ground.len() / (self.rows.end - self.rows.start) as usize;
-        (row - self.rows.start) as usize * n_cols + (col - self.west) as usize
+        let n_cols = (self.cols.end - self.cols.start) as usize;
+        (row - self.rows.start) as usize * n_cols + (col - self.cols.start) as usize
     }
 
-    /// Puts the poses of a row into blocks, from a cell on every so many as there are phases, and judges those that
-    /// are full.
-    fn judge_line(&mut self, first: [i64; 2], yaw: usize, layers: &BeliefLayers, scratch: &mut Scratch) {
+    /// Puts the poses of a row that changed into blocks, from a cell on every so many as there are phases, and judges
+    /// blocks that are full. Returns how many poses that are.
+    fn judge_line(
+        &mut self,
+        [first_col, row]: [i64; 2],
+        yaw: usize,
+        layers: &BeliefLayers,
+        scratch: &mut Scratch,
+    ) -> usize {
         let n_phases = layers.field.ratio().n_phases() as i64;
-        let [mut col, row] = first;
-        while col < self.cols.end {
-            let n_left = (self.cols.end - col + n_phases - 1) / n_phases;
-            let first_lane = scratch.n_lanes();
-            let n_lanes = (BLOCK - first_lane).min(n_left as usize);
-            scratch.parts.push(Part { line: PoseLine { cell: [col, row], yaw, n_lanes }, first_lane });
-            col += n_lanes as i64 * n_phases;
-            if first_lane + n_lanes == BLOCK {
-                self.judge_block(layers, scratch);
+        let n_in_row = (self.cols.end - first_col + n_phases - 1) / n_phases;
+        let mut n_judged = 0;
+        for start in (0..n_in_row).step_by(ASKED) {
+            let line = |lanes: Range<usize>| {
+                let col = first_col + (start + lanes.start as i64) * n_phases;
+                PoseLine { cell: [col, row], yaw, n_lanes: lanes.len() }
+            };
+            let n_lanes = (n_in_row - start).min(ASKED as i64) as usize;
+            for mut lanes in stretches(layers.changed(&line(0..n_lanes))) {
+                n_judged += lanes.len();
+                while !lanes.is_empty() {
+                    let end = lanes.end.min(lanes.start + BLOCK - scratch.n_lanes());
+                    scratch.push(line(lanes.start..end));
+                    lanes.start = end;
+                    if scratch.n_lanes() == BLOCK {
+                        self.judge_block(layers, scratch);
+                    }
+                }
             }
         }
+        n_judged
     }
 
     /// Judges the poses of the block and empties it.
@@ -132,10 +147,9 @@ impl RowTask<'_> {
         for Part { line, first_lane } in scratch.parts.drain(..) {
             let first = self.index(line.cell);
             for step in 0..line.n_lanes {
-                let (cell, lane) = (first + step * n_phases, first_lane + step);
-                self.risks[cell * layers.n_yaws + line.yaw] = scratch.block.risks[lane];
-                let is_out = scratch.block.out_of_distribution[lane];
-                scratch.n_out_of_distribution[cell] += usize::from(is_out);
+                let pose = (first + step * n_phases) * layers.n_yaws + line.yaw;
+                self.risks[pose] = scratch.block.risks[first_lane + step];
+                self.is_unfamiliar[pose] = scratch.block.is_unfamiliar[first_lane + step];
             }
         }
     }
@@ -145,6 +159,10 @@ impl Scratch {
     /// Poses that are in the block so far.
     fn n_lanes(&self) -> usize {
         self.parts.last().map_or(0, |part| part.first_lane + part.line.n_lanes)
+    }
+
+    fn push(&mut self, line: PoseLine) {
+        self.parts.push(Part { line, first_lane: self.n_lanes() });
     }
 }
 
@@ -254,11 +272,11 @@ impl Fusion {
 impl Fuse<'_> {
     #[inline(always)]
     fn keep(self, cvars: &[Block; 4], missing: &Block) {
-        let BlockScratch { workspace, prior, risks, out_of_distribution, .. } = self.block;
+        let BlockScratch { workspace, prior, risks, is_unfamiliar, .. } = self.block;
         let BlockPrediction { log_density, .. } = &workspace.prediction;
         for lane in 0..self.n_lanes {
             let is_out = log_density.0[lane] < self.fusion.log_density_min && missing.0[lane] == 0.0;
-            out_of_distribution[lane] = is_out;
+            is_unfamiliar[lane] = is_out;
             let free = Risk {
                 linear_traction: cvars[0].0[lane],
                 angular_traction: cvars[1].0[lane],

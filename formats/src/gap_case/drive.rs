@@ -4,7 +4,7 @@ use std::path::Path;
 
 use bicycle::DriveLog;
 
-use crate::{DriveLogFileError, McapReadError, read_drive_log_csv, read_drive_log_mcap};
+use crate::{ColumnNames, DriveLogFileError, McapReadError, read_drive_log_csv_named, read_drive_log_mcap};
 
 /// A drive and what is to be said of its file.
 #[derive(Clone, Debug, PartialEq)]
@@ -34,11 +34,18 @@ pub enum DriveFileError {
 
 /// Reads a drive from a CSV file or from a recording, whichever the file's ending says.
 ///
-/// Errors: another ending; as [`read_drive_log_csv`] and [`read_drive_log_mcap`].
+/// Errors: another ending; as [`crate::read_drive_log_csv`] and [`read_drive_log_mcap`].
 pub fn read_drive(path: &Path) -> Result<ReadDrive, DriveFileError> {
+    read_drive_named(path, &ColumnNames::default())
+}
+
+/// The same where the columns of CSV files have names of their own; those of recordings are ours.
+///
+/// Errors: another ending; as [`read_drive_log_csv_named`] and [`read_drive_log_mcap`].
+pub fn read_drive_named(path: &Path, names: &ColumnNames) -> Result<ReadDrive, DriveFileError> {
     let ending = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
     match ending.as_str() {
-        "csv" => Ok(ReadDrive { log: read_drive_log_csv(path)?.log, ended_early: None }),
+        "csv" => Ok(ReadDrive { log: read_drive_log_csv_named(path, names)?.log, ended_early: None }),
         "mcap" => {
             let read = read_drive_log_mcap(path)?;
             Ok(ReadDrive { log: read.log, ended_early: read.ended_early })

@@ -1,12 +1,18 @@
 use bicycle::ImuSample;
 use bicycle::lanes::Instructions;
 
+use super::data::Half;
+use super::network::Network;
 use super::*;
 use crate::architecture::Answer;
 use crate::architecture::Sensing;
 use crate::history::PERIOD_NS;
+use crate::model::Desired;
 use crate::model::InverseModel;
 use crate::recording::{RecordedRun, Tick, VehicleSummary};
+use candle_core::{Device, Var};
+use rand::SeedableRng;
+use rand_xoshiro::Xoshiro256PlusPlus;
 
 /// A vehicle that does 0.95 of what it is told on ground that does not shake it, and 0.8 on ground that does; the driver
 /// changes the command every half second, the ground every four.

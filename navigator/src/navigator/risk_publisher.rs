@@ -38,7 +38,7 @@ impl RiskPublisher {
         if !self.assessor.has_goal() {
             return Ok(false);
         }
-        self.assessor.judge(header, surface.clone())?;
+        self.assessor.judge(header, surface)?;
         self.publish()
     }
 

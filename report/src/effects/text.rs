@@ -36,7 +36,7 @@ pub fn page() -> String {
     format!(
         "# The catalogue of effects\n\n\
          What a real machine does and the kinematic bicycle does not: v speed, L wheelbase, g gravity. \
-         Each is one file in `bicycle/src/effect`; the same code runs in the diagnosis and in the controller's rollouts. \
+         They are written in `bicycle/src/effect`, those of one shape as a family; the same code runs in the diagnosis and in the controller's rollouts. \
          This page and its picture are written by `surefoot gap effects --out docs`.\n\n\
          | id | what it is | parameters: from, to, where it is no effect |\n|---|---|---|\n{rows}\n\
          A form is another way in which a cause can act; a diagnosis announces the cause and tells the form. \

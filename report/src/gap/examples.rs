@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use sim_to_real::{
     BeforeAfter, Condition, ConditionBin, ConditionTable, Estimate, GroundResidual, NamedEffect, Place,
-    Ranked, ResidualState, Shrink, Steering, Verdict,
+    QuantityError, Ranked, ResidualState, Shrink, Steering, Verdict,
 };
 
 use super::{HeldOutSample, HeldOutStrip};
@@ -16,6 +16,7 @@ pub(crate) fn answer() -> Answer {
     let ranked = |(id, score): (&str, f64)| Ranked { id: id.to_owned(), score };
     let ranking = [("steer_lag", 0.93), ("steer_delay", 0.05), ("backlash", 0.01), ("understeer", 0.001)];
     Answer {
+        schema_version: sim_to_real::SCHEMA_VERSION,
         case: "steering <late>".to_owned(),
         steering: Steering::Angle,
         verdict: Verdict::Effects,
@@ -35,6 +36,17 @@ pub(crate) fn answer() -> Answer {
             learned_bound_closed: None,
             position_error_2s_m: Some(BeforeAfter { before: 0.289, after: 0.101 }),
         },
+        errors_by_quantity: [(ResidualState::Yaw, 0.021, 0.004), (ResidualState::Along, 0.2, 0.05)]
+            .map(|(quantity, before, after)| QuantityError {
+                quantity,
+                unit: quantity.unit().to_owned(),
+                horizon_s: 2.0,
+                before,
+                after,
+                floor: 0.003,
+            })
+            .to_vec(),
+        in_simulator: None,
         advice: vec!["drive steps of the steering & sines".to_owned()],
     }
 }

@@ -1,8 +1,8 @@
 //! The report as one page that needs nothing else: the pictures are in it.
 
-use sim_to_real::{Answer, NamedEffect, Verdict};
+use sim_to_real::{Answer, NamedEffect, ResidualState, Verdict};
 
-use super::{Reference, text};
+use super::{Reference, in_simulator, text, words};
 use crate::Picture;
 use crate::html::{self, escaped, figure, paragraph, section};
 
@@ -35,7 +35,11 @@ pub fn page(page: &Page<'_>) -> String {
         doubts(page.doubts),
         section("Which", &(effects(answer) + &figures(&["ranking.png"]))),
         section("Where", &(places(answer) + &figures(&["places.png", "ground.png"]))),
-        section("How far", &(shrink(answer) + &figures(&["residuals.png", "heldout.png"]))),
+        section(
+            "How far",
+            &(shrink(answer) + &in_units(answer) + &figures(&["residuals.png", "heldout.png"])),
+        ),
+        answer.in_simulator.as_ref().map_or(String::new(), in_simulator::section),
         section("What next", &next(answer)),
         section("How to read this", reading(page.reference)),
         html::soft(page.program),
@@ -105,6 +109,36 @@ fn places(answer: &Answer) -> String {
 
 fn shrink(answer: &Answer) -> String {
     text::shrink(&answer.shrink).iter().map(|line| paragraph(line)).collect()
+}
+
+/// Errors by quantity and horizon in their own units: before, after and the floor.
+fn in_units(answer: &Answer) -> String {
+    let errors = &answer.errors_by_quantity;
+    if errors.is_empty() {
+        return String::new();
+    }
+    let mut horizons_s: Vec<f64> = errors.iter().map(|error| error.horizon_s).collect();
+    horizons_s.sort_by(f64::total_cmp);
+    horizons_s.dedup();
+    let mut quantities: Vec<ResidualState> = errors.iter().map(|error| error.quantity).collect();
+    quantities.sort();
+    quantities.dedup();
+    let cell = |quantity: ResidualState, horizon_s: f64| {
+        let own = errors.iter().find(|own| own.quantity == quantity && own.horizon_s == horizon_s);
+        own.map_or(String::new(), |own| {
+            let [before, after, floor] = [own.before, own.after, own.floor].map(text::rounded);
+            format!("{before} to {after} (floor {floor})")
+        })
+    };
+    let row = |quantity: &ResidualState| {
+        let name = format!("{} [{}]", words::state(*quantity), quantity.unit());
+        let cells = horizons_s.iter().map(|&horizon_s| cell(*quantity, horizon_s));
+        html::row(&[name].into_iter().chain(cells).collect::<Vec<_>>())
+    };
+    let heads = horizons_s.iter().map(|horizon_s| format!("after {horizon_s} s"));
+    let header: Vec<String> =
+        ["held-out error, before to after".to_owned()].into_iter().chain(heads).collect();
+    html::table(&header, &quantities.iter().map(row).collect::<String>())
 }
 
 fn next(answer: &Answer) -> String {

@@ -1,5 +1,7 @@
 //! A diagnosis in plain words.
 
+use super::in_simulator::in_simulator;
+use super::words;
 use bicycle::effect::{CATALOGUE, Parameter};
 use sim_to_real::{Answer, Condition, Estimate, NamedEffect, Shrink, Verdict};
 
@@ -20,7 +22,7 @@ pub(crate) fn verdict(answer: &Answer) -> String {
 }
 
 /// `a`, `a and b`, `a, b and c`.
-fn listed(names: &[&str]) -> String {
+pub(super) fn listed(names: &[&str]) -> String {
     match names {
         [all @ .., last] if !all.is_empty() => format!("{} and {last}", all.join(", ")),
         _ => names.concat(),
@@ -56,7 +58,7 @@ fn plain_name(name: &str) -> String {
 }
 
 /// Three significant digits.
-fn rounded(value: f64) -> String {
+pub(super) fn rounded(value: f64) -> String {
     if value == 0.0 || !value.is_finite() {
         return format!("{value}");
     }
@@ -118,6 +120,19 @@ pub(crate) fn shrink(shrink: &Shrink) -> Vec<String> {
     lines
 }
 
+/// Errors of all quantities after the last horizon, in their own units.
+fn in_units(answer: &Answer) -> Option<String> {
+    let last_s = answer.errors_by_quantity.iter().map(|error| error.horizon_s).fold(0.0, f64::max);
+    let last = answer.errors_by_quantity.iter().filter(|error| error.horizon_s == last_s);
+    let told: Vec<String> = last
+        .map(|error| {
+            let [before, after] = [error.before, error.after].map(rounded);
+            format!("{} {before} to {after} {}", words::state(error.quantity), error.unit)
+        })
+        .collect();
+    (!told.is_empty()).then(|| format!("error after {last_s} s: {}", told.join(", ")))
+}
+
 /// What a learned correction on top of the announced effects adds.
 fn learned(bound: f64, closed: Option<f64>) -> String {
     let percent = 100.0 * bound;
@@ -132,7 +147,7 @@ fn learned(bound: f64, closed: Option<f64>) -> String {
 /// Closed part by which a learned correction has to surpass the announced effects to have found anything [-].
 const MORE: f64 = 0.01;
 
-fn closed(shrink: &Shrink) -> Option<String> {
+pub(super) fn closed(shrink: &Shrink) -> Option<String> {
     let before = shrink.before?;
     let Some(closed) = shrink.closed else {
         return (before < 1.2 * shrink.floor)
@@ -159,7 +174,9 @@ pub fn text(answer: &Answer, drives: &str) -> String {
     if answer.verdict != Verdict::None {
         lines.push(format!("  where    {}", places(answer)));
     }
-    lines.extend(named("how far", &shrink(&answer.shrink)));
+    let how_far = shrink(&answer.shrink).into_iter().chain(in_units(answer)).collect::<Vec<_>>();
+    lines.extend(named("how far", &how_far));
+    lines.extend(answer.in_simulator.iter().flat_map(|own| named("yours", &in_simulator(own))));
     lines.extend(named("next", &answer.advice));
     lines.join("\n") + "\n"
 }
@@ -205,6 +222,7 @@ mod tests {
             "           held-out rollout error 2.10 before, 0.40 after, 0.35 is the floor",
             "           97 % (90 to 100 %) of the gap closes on the held-out drives",
             "           position error after 2 s 0.289 m before, 0.101 m after",
+            "           error after 2 s: yaw 0.0210 to 0.00400 rad, displacement along 0.200 to 0.0500 m",
             "  next     drive steps of the steering & sines",
         ];
         assert_eq!(lines[6..], rest);

@@ -11,7 +11,7 @@ use navigator::is_learned;
 
 /// How long a map may be on its way: its sender may be interrupted between stamping and handing it over [ns].
 const ON_THE_WAY_NS: u64 = SECOND_NS / 4;
-const AUTHORS: [(u64, &str); 2] = [(LEARNED, "learned"), (PHYSICS, "physics'")];
+const SOURCES: [(u64, &str); 2] = [(LEARNED, "learned"), (PHYSICS, "physics'")];
 
 /// Follows what one life of control says that it had, decision by decision.
 pub(super) struct Choice<'a> {
@@ -37,13 +37,13 @@ impl<'a> Choice<'a> {
         Self { risks, tracks, learned_max_ns, began_ns, held: [None; 2], held_tracks: None }
     }
 
-    /// Says how a decision contradicts the rule: it had the newest map of each author and the newest of what moves, and was
+    /// Says how a decision contradicts the rule: it had the newest map of each source and the newest of what moves, and was
     /// made on the one of the two maps that is to be driven on.
     pub fn check(&mut self, decision: &DecisionRecord) -> Result<(), String> {
         self.check_tracks(decision)?;
         let held = [decision.learned, decision.physics].map(key_of);
         let before = std::mem::replace(&mut self.held, held);
-        for (place, (_, name)) in AUTHORS.into_iter().enumerate() {
+        for (place, (_, name)) in SOURCES.into_iter().enumerate() {
             if held[place] < before[place] {
                 let [before, held] = [before[place], held[place]].map(told);
                 return Err(format!(
@@ -92,21 +92,21 @@ impl<'a> Choice<'a> {
         let is_learned =
             is_learned(learned_at_ns, physics_at_ns, decision.decided_at_ns, self.learned_max_ns);
         let place = usize::from(!is_learned);
-        let (author, name) = AUTHORS[place];
+        let (map_source, name) = SOURCES[place];
         let expected = held[place];
         // Without a place to go to no map is asked for.
         let is_idle = decision.tolerance_m == 0.0 && decision.risk == Source::default();
         if is_idle {
             return Ok(());
         }
-        let author = if expected.is_some() { author } else { 0 };
-        if key_of(decision.risk) == expected && decision.author == author {
+        let map_source = if expected.is_some() { map_source } else { 0 };
+        if key_of(decision.risk) == expected && decision.map_source == map_source {
             return Ok(());
         }
         let (expected, found) = (told(expected), told(key_of(decision.risk)));
         Err(format!(
-            "expected to be made on {name} risk map {expected}, found {found} of author {}",
-            decision.author
+            "expected to be made on {name} risk map {expected}, found {found} of source {}",
+            decision.map_source
         ))
     }
 
@@ -146,7 +146,7 @@ mod tests {
     const BEGAN_NS: u64 = 10 * SECOND_NS;
     static NOTHING: Tracks = BTreeMap::new();
 
-    /// A map every 200 ms of each author, of a scan 100 ms before; learned ones end after a second.
+    /// A map every 200 ms of each map_source, of a scan 100 ms before; learned ones end after a second.
     fn risks() -> [BTreeMap<Key, RiskHeader>; 2] {
         [5, 25].map(|n| {
             let header = |sequence: u64| {
@@ -172,7 +172,7 @@ mod tests {
         DecisionRecord {
             decided_at_ns: BEGAN_NS + after_ms * MILLISECOND_NS,
             risk: if is_learned { learned } else { physics },
-            author: if newest == 0 { 0 } else { 2 - u64::from(is_learned) },
+            map_source: if newest == 0 { 0 } else { 2 - u64::from(is_learned) },
             learned,
             physics,
             tolerance_m: 1.0,
@@ -201,12 +201,12 @@ mod tests {
     #[test]
     fn decisions_on_another_map_than_that_of_the_rule_are_told() {
         let told = |at_ms, change: &dyn Fn(&mut DecisionRecord)| verdict(at_ms, change).unwrap_err();
-        let other = told(800, &|decision| (decision.risk, decision.author) = (decision.physics, 2));
-        assert_eq!(other, "expected to be made on learned risk map 4, found 4 of author 2");
-        let aged = told(1600, &|decision| (decision.risk, decision.author) = (decision.learned, 1));
-        assert_eq!(aged, "expected to be made on physics' risk map 8, found 5 of author 1");
-        let none = told(800, &|decision| (decision.risk, decision.author) = (Source::default(), 0));
-        assert_eq!(none, "expected to be made on learned risk map 4, found none of author 0");
+        let other = told(800, &|decision| (decision.risk, decision.map_source) = (decision.physics, 2));
+        assert_eq!(other, "expected to be made on learned risk map 4, found 4 of source 2");
+        let aged = told(1600, &|decision| (decision.risk, decision.map_source) = (decision.learned, 1));
+        assert_eq!(aged, "expected to be made on physics' risk map 8, found 5 of source 1");
+        let none = told(800, &|decision| (decision.risk, decision.map_source) = (Source::default(), 0));
+        assert_eq!(none, "expected to be made on learned risk map 4, found none of source 0");
     }
 
     #[test]

@@ -16,7 +16,7 @@ use crate::setup::MachineSetup;
 use bus::message::{DecisionRecord, RiskHeader, SurfaceHeader};
 use bus::payload::{cell_numbers, content_hash};
 
-/// Risk maps of an author that are kept: control uses the newest, or the one before.
+/// Risk maps of a source that are kept: control uses the newest, or the one before.
 const KEPT: usize = 4;
 
 /// A risk map that could not be made again.
@@ -44,7 +44,7 @@ pub(super) struct Maps<'a> {
     n_surfaces: u64,
 }
 
-/// One author of risk maps.
+/// One source of risk maps.
 struct RemadeRiskMaps<'a> {
     headers: &'a BTreeMap<Key, RiskHeader>,
     knowledge: Knowledge,
@@ -63,7 +63,7 @@ impl<'a> Maps<'a> {
         knowledge: &Knowledge,
         level: CvarLevel,
     ) -> Result<Self, ReplayError> {
-        let author = |place: usize, belief: &Belief, checkpoint: u64, number: u64| RemadeRiskMaps {
+        let remade = |place: usize, belief: &Belief, checkpoint: u64, number: u64| RemadeRiskMaps {
             headers: &records.risks[place],
             knowledge: Knowledge { belief: belief.clone(), checkpoint, corrector: None },
             number,
@@ -80,8 +80,8 @@ impl<'a> Maps<'a> {
             localisation: Localisation::default(),
             surface_at: None,
             remade: [
-                author(0, &knowledge.belief, knowledge.checkpoint, LEARNED),
-                author(1, &Belief::Physics, 0, PHYSICS),
+                remade(0, &knowledge.belief, knowledge.checkpoint, LEARNED),
+                remade(1, &Belief::Physics, 0, PHYSICS),
             ],
             missing: Vec::new(),
             n_surfaces: 0,
@@ -104,7 +104,7 @@ impl<'a> Maps<'a> {
         &mut self,
         decision: &DecisionRecord,
     ) -> Result<Result<Arc<Result<Made, Unmade>>, Unmade>, ReplayError> {
-        let place = usize::from(decision.author == PHYSICS);
+        let place = usize::from(decision.map_source == PHYSICS);
         let key = Key::from(decision.risk);
         loop {
             if let Some(made) = self.remade[place].made.get(&key) {

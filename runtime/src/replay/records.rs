@@ -244,8 +244,8 @@ impl Records {
             }
             topic::RISK | topic::RISK_PHYSICS => {
                 let (header, _): (RiskHeader, Vec<u8>) = split(bytes)?;
-                let author = usize::from(name == topic::RISK_PHYSICS);
-                self.risks[author].insert(header.stamp.source().into(), header);
+                let place = usize::from(name == topic::RISK_PHYSICS);
+                self.risks[place].insert(header.stamp.source().into(), header);
             }
             _ => {}
         }

@@ -57,6 +57,12 @@ pub struct ElevationConfig {
     /// A change of a height below this is not published [m], nor are changes of a variance by less than a fifth
     /// or of a probability by less than a twentieth; 0 = every change is.
     pub publish_step_m: f32,
+    /// What tells little is published when the turn of its row comes, at the latest after so many scans, > 0; 1 = at once.
+    /// Little is a height that stays within two of the standard deviations that were told with it and within
+    /// `visibility_margin_m` (a tenth of it where the ground was filled in), a variance, and a probability that moves by
+    /// less than a fifth and leaves the likeliest class as it is. Whatever else changes, and what is known for the first
+    /// time or no more, is published at once.
+    pub publish_turns: u8,
     /// The box that the vehicle takes up, with a margin: points inside are the vehicle itself. Empty = the sensor sees
     /// nothing of it.
     pub own_body: BodyBox,
@@ -85,6 +91,7 @@ impl Default for ElevationConfig {
             visibility_margin_m: 0.1,
             ghost_scans: 2,
             publish_step_m: 0.003,
+            publish_turns: 1,
         }
     }
 }
@@ -124,6 +131,7 @@ impl ElevationConfig {
             ("hidden_ground_std_m", f64::from(self.hidden_ground_std_m)),
             ("visibility_margin_m", f64::from(self.visibility_margin_m)),
             ("ghost_scans", f64::from(self.ghost_scans)),
+            ("publish_turns", f64::from(self.publish_turns)),
         ];
         let not_negative = [
             ("noise_per_range", self.noise_per_range),

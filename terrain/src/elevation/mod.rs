@@ -18,6 +18,7 @@ use crate::{
 use cell::{CellState, Ground};
 use nalgebra::{Point3, Vector3};
 use sorting::SortedPoints;
+use surfacing::Turns;
 
 /// What became of one scan.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -106,6 +107,8 @@ pub struct ElevationMap {
     changed: LatticeBounds,
     is_placed: bool,
     fused_at_ns: Option<u64>,
+    /// Scans fused so far.
+    n_fused: u64,
     points: SortedPoints,
     rays: visibility::RayFloor,
     surfacing: surfacing::Scratch,
@@ -123,6 +126,7 @@ impl ElevationMap {
             changed: LatticeBounds::EMPTY,
             is_placed: false,
             fused_at_ns: None,
+            n_fused: 0,
             points: SortedPoints::default(),
             rays: visibility::RayFloor::default(),
             surfacing: surfacing::Scratch::default(),
@@ -157,7 +161,8 @@ impl ElevationMap {
         self.fade(scan.valid_at_ns);
         self.points.sort(scan, pose, self.states.geometry(), &self.config);
         self.fuse_points();
-        self.publish();
+        self.publish(Turns::of_scan(self.n_fused, &self.config));
+        self.n_fused += 1;
         let report = FuseReport {
             n_points: scan.points.len(),
             n_rejected_non_finite: self.points.n_rejected_non_finite,
@@ -198,7 +203,7 @@ impl ElevationMap {
                 state.variance_m2 = (assumed.height_std_m * assumed.height_std_m) as f32;
             }
         }
-        self.publish();
+        self.publish(Turns::All);
         Ok(())
     }
 
@@ -217,7 +222,7 @@ impl ElevationMap {
         self.changed.include_window(&geometry);
         self.states = moved_states(&self.states, geometry, before, after);
         self.surface = GridMap::filled(geometry, SurfaceCell::UNKNOWN);
-        self.publish();
+        self.publish(Turns::All);
         Ok(())
     }
 

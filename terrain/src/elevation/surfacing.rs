@@ -17,6 +17,12 @@ pub(super) struct Scratch {
 const VARIANCE_SHARE: f32 = 0.2;
 /// A class probability is published anew when it changed by more than this.
 const PROBABILITY_STEP: f32 = 0.05;
+/// A height is published at once when it moved by more than so many of the standard deviations that were told.
+const URGENT_DEVIATIONS: f32 = 2.0;
+/// Share of the visibility margin that filled-in ground may move by before it is published at once.
+const FILLED_MARGIN_SHARE: f32 = 0.1;
+/// A class probability is published at once when it changed by more than this.
+const URGENT_PROBABILITY_STEP: f32 = 0.2;
 /// Plants less likely than this have no height: a camera errs.
 const PLANT_SHARE: f32 = 0.1;
 /// Share of the visibility margin by which rays may pass below a filled gap: a ditch is worth more care than a
@@ -24,19 +30,55 @@ const PLANT_SHARE: f32 = 0.1;
 const GAP_MARGIN_SHARE: f32 = 0.25;
 
 impl ElevationMap {
-    /// Brings the published surface up to date and notes what changed.
-    pub(super) fn publish(&mut self) {
+    /// Brings the published surface up to date and notes what changed: in the rows whose turn it is all that is worth
+    /// telling, elsewhere what is urgent. Neighbouring rows have their turn together, so that whoever judges footprints
+    /// finds what changed in one place.
+    pub(super) fn publish(&mut self, turns: Turns) {
         let geometry = *self.surface.geometry();
         self.surfacing.draw(&self.states, &self.config);
         let [x, y] = geometry.origin;
         let next = &self.surfacing.next;
         for (index, (published, next)) in self.surface.values_mut().iter_mut().zip(next).enumerate() {
-            if differs(published, next, &self.config) {
+            let cell = geometry.cell(index);
+            let is_due = turns.have(y + cell.row as i64) || is_urgent(published, next, &self.config);
+            if is_due && differs(published, next, &self.config) {
                 *published = *next;
-                let cell = geometry.cell(index);
                 let place = [x + cell.col as i64, y + cell.row as i64];
                 self.changed.include(place, place);
             }
+        }
+    }
+}
+
+/// Whose turn it is to be published.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Turns {
+    /// Every row's.
+    All,
+    /// That of some rows of the lattice.
+    Of {
+        /// Which one.
+        turn: i64,
+        /// Of how many.
+        n_turns: i64,
+        /// Neighbouring rows that have it together.
+        n_rows: i64,
+    },
+}
+
+impl Turns {
+    /// The turn of a scan, counted from the first one.
+    pub fn of_scan(n_before: u64, config: &ElevationConfig) -> Self {
+        let n_turns = i64::from(config.publish_turns);
+        let turn = (n_before % u64::from(config.publish_turns)) as i64;
+        Self::Of { turn, n_turns, n_rows: (config.n_rows as i64 + n_turns - 1) / n_turns }
+    }
+
+    /// Whether a row of the lattice has its turn.
+    fn have(self, row: i64) -> bool {
+        match self {
+            Self::All => true,
+            Self::Of { turn, n_turns, n_rows } => row.div_euclid(n_rows).rem_euclid(n_turns) == turn,
         }
     }
 }
@@ -150,6 +192,20 @@ fn lowest_plant(
 ) -> Option<(f32, f32)> {
     let height_m = around.cells().fold(f32::INFINITY, |low_m, cell| low_m.min(states[cell].lowest_m));
     height_m.is_finite().then_some((height_m, config.hidden_ground_std_m * config.hidden_ground_std_m))
+}
+
+/// Whether a cell tells so much that it cannot wait for its turn.
+fn is_urgent(published: &SurfaceCell, next: &SurfaceCell, config: &ElevationConfig) -> bool {
+    let told_m = URGENT_DEVIATIONS * published.height_variance_m2.sqrt();
+    // What was filled in may turn out to be a ditch.
+    let share = if next.knowledge == Knowledge::Interpolated { FILLED_MARGIN_SHARE } else { 1.0 };
+    let step_m = told_m.min(share * config.visibility_margin_m).max(config.publish_step_m);
+    let pairs = published.class_probability.iter().zip(&next.class_probability);
+    published.is_known() != next.is_known()
+        || (published.height_m - next.height_m).abs() > step_m
+        || (published.vegetation_height_m - next.vegetation_height_m).abs() > step_m
+        || published.class() != next.class()
+        || pairs.into_iter().any(|(a, b)| (a - b).abs() > URGENT_PROBABILITY_STEP)
 }
 
 fn differs(published: &SurfaceCell, next: &SurfaceCell, config: &ElevationConfig) -> bool {

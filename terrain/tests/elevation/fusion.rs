@@ -346,6 +346,38 @@ fn uncertainty_grows_with_time_and_never_shrinks_for_an_old_scan() {
     assert!((at_spot(&map).height_variance_m2 - 7.5e-4).abs() < 1e-8);
 }
 
+/// Heights that move by less than two standard deviations are told of row by row, others at once.
+#[test]
+fn what_tells_little_waits_for_its_turn() {
+    const N_TURNS: u8 = 4;
+    // The same rows have the same turn wherever the window is.
+    for north_m in [0.0, 7.5, -3.0] {
+        let here = Pose { y_m: north_m, ..HERE };
+        let mut map = plain_map(|config| (config.publish_turns, config.publish_step_m) = (N_TURNS, 0.001));
+        let scan = |height_m: f64| scan_of(all_centres().map(|[x_m, y_m]| ([x_m, y_m, height_m], Open)));
+        let heights_m = |map: &ElevationMap| -> Vec<f32> {
+            map.surface().values().iter().map(|cell| cell.height_m).collect()
+        };
+        map.fuse(&scan(0.1), &here).unwrap();
+        let first_m = heights_m(&map);
+        assert!(first_m.iter().all(|height_m| (height_m - 0.1).abs() < 1e-6), "seen for the first time");
+        // Two points of 2 cm of noise each: their mean is good to 1.4 cm, and 1 cm more tells little.
+        let mut waits = vec![0; first_m.len()];
+        for _ in 0..N_TURNS {
+            map.fuse(&scan(0.12), &here).unwrap();
+            let now_m = heights_m(&map);
+            let pairs = waits.iter_mut().zip(now_m.iter().zip(&first_m));
+            pairs.filter(|(_, (now, first))| now == first).for_each(|(waits, _)| *waits += 1);
+        }
+        let longest = waits.iter().max().copied();
+        assert_eq!(longest, Some(i32::from(N_TURNS) - 1), "each row has its turn within four scans");
+        let n_in_turn = |turn: i32| waits.iter().filter(|waits| **waits == turn).count();
+        assert!((0..4).all(|turn| (300..=500).contains(&n_in_turn(turn))), "{waits:?}");
+        map.fuse(&scan(0.5), &here).unwrap();
+        assert!(heights_m(&map).iter().all(|height_m| *height_m > 0.13), "a step is told of at once");
+    }
+}
+
 #[test]
 fn settings_that_cannot_be_are_refused_with_field_and_number() {
     let refused = |change: fn(&mut ElevationConfig)| {
@@ -358,6 +390,7 @@ fn settings_that_cannot_be_are_refused_with_field_and_number() {
     assert_eq!(field, "resolution_m");
     assert!(message.contains("-0.5") && message.contains("> 0"), "{message}");
     assert_eq!(refused(|c| c.n_rows = 0).0, "n_rows");
+    assert_eq!(refused(|c| c.publish_turns = 0).0, "publish_turns");
     assert_eq!(refused(|c| c.noise_per_range = f64::NAN).0, "noise_per_range");
     assert_eq!(refused(|c| c.recentre_m = 0.0).0, "recentre_m");
     assert_eq!(refused(|c| c.gap_radius_m = f64::INFINITY).0, "gap_radius_m");

@@ -30,7 +30,7 @@ fn a_risk_map_is_written_once_and_read_where_it_was_written() {
         .unwrap();
     assert!(n_written.iter().all(|n| *n == 1), "every element is written once");
     *loan.header_mut() =
-        RiskHeader { grid: Grid::from(&geometry), n_yaws: 16, author: 1, ..RiskHeader::default() };
+        RiskHeader { grid: Grid::from(&geometry), n_yaws: 16, map_source: 1, ..RiskHeader::default() };
     // The reader maps the same memory at another address: a change after the last write shows in both.
     let marked = parts.risks_mut(loan.payload_mut());
     marked[777].pitch_rad = 0.25;

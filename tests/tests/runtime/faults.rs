@@ -75,10 +75,10 @@ fn every_process_may_fail_and_the_vehicle_is_safe() {
 /// of one that is young enough.
 fn drive_on_when_learning_is_killed(run: &mut Run, witness: &mut Witness) -> [(&'static str, f64); 2] {
     run.kill(Role::Learning);
-    let over_ms = witness.until("physics takes over", |witness| witness.is_author(2));
+    let over_ms = witness.until("physics takes over", |witness| witness.drives_on(2));
     witness.until_driving("on physics alone");
     run.start(Role::Learning);
-    let back_ms = witness.until("learning is back", |witness| witness.is_author(1));
+    let back_ms = witness.until("learning is back", |witness| witness.drives_on(1));
     witness.until_driving("on what was learned");
     [("learning killed: physics judges", over_ms), ("learning restarted: it judges", back_ms)]
 }
@@ -92,12 +92,12 @@ fn maps_that_come_late_are_replaced_by_physics_and_then_by_a_stop() {
     witness.until_driving("all processes up");
     // Learning works for 30 ms of every second: its maps are older than physics' whenever they come.
     let by_physics = witness.in_turns(&run, Role::Learning, [970, 30], |witness| {
-        let on_physics = |record: &&DecisionRecord| record.author == 2;
+        let on_physics = |record: &&DecisionRecord| record.map_source == 2;
         let drives = |record: &DecisionRecord| matches!(record.command.decision(), Some(Decision::Drive(_)));
         witness.decided.iter().filter(on_physics).any(drives)
     });
     println!("learning late: drives on physics      {by_physics:7.0} ms");
-    witness.until("learning is in time again", |witness| witness.is_author(1));
+    witness.until("learning is in time again", |witness| witness.drives_on(1));
     // Mapping works for 30 ms of every 1.5 s: what anybody knows of the ground is too old most of the time.
     let stopped = witness.in_turns(&run, Role::Mapping, [1470, 30], |witness| {
         witness.decision_now() == Some(Decision::Stop(StopReason::StaleScan))

@@ -166,7 +166,7 @@ fn maps_with_huge_counts_and_wrong_lengths_never_come_through() {
         stamp: stamp(1),
         grid,
         n_yaws,
-        author: 1,
+        map_source: 1,
         ..RiskHeader::default()
     };
     let huge = Grid { n_rows: u64::MAX, n_cols: u64::MAX, ..grid };

@@ -54,8 +54,8 @@ fn the_schedule_holds_what_there_are_rules_for() {
         bus::message::HOLD_REASONS.iter().position(|known| *known == reason).unwrap() as u32 + 1
     };
     assert!(decisions.len() > 120, "{}", decisions.len());
-    assert!(n(&|shown| shown.decision == 1 && shown.author == 1) > 50, "on learned maps: {decisions:?}");
-    assert!(n(&|shown| shown.decision == 1 && shown.author == 2) > 5, "on physics' maps: {decisions:?}");
+    assert!(n(&|shown| shown.decision == 1 && shown.map_source == 1) > 50, "on learned maps: {decisions:?}");
+    assert!(n(&|shown| shown.decision == 1 && shown.map_source == 2) > 5, "on physics' maps: {decisions:?}");
     for (decision, reason) in [
         (3, stop(StopReason::NonFiniteInput)),
         (3, stop(StopReason::StaleMission)),

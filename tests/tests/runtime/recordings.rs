@@ -242,7 +242,8 @@ fn a_decision_that_names_another_map_than_it_had_is_noticed() {
     run.end();
     assert_eq!(contradictions_after(&run, |_| ()), "");
     // A later one that was made on a map, and what it says of that map.
-    let last = |records: &Records| *records.decisions.iter().rfind(|(_, made)| made.author != 0).unwrap().0;
+    let last =
+        |records: &Records| *records.decisions.iter().rfind(|(_, made)| made.map_source != 0).unwrap().0;
     let told = contradictions_after(&run, |records| {
         let record = records.decisions.get_mut(&last(records)).unwrap();
         (record.risk.sequence, record.learned.sequence) =
@@ -256,7 +257,7 @@ fn a_decision_that_names_another_map_than_it_had_is_noticed() {
     assert!(told.contains("expected to be made on learned risk map"), "{told}");
     let told = contradictions_after(&run, |records| {
         let record = records.decisions.get_mut(&last(records)).unwrap();
-        (record.risk, record.author) = (Source::default(), 0);
+        (record.risk, record.map_source) = (Source::default(), 0);
     });
-    assert!(told.contains("found none of author 0"), "{told}");
+    assert!(told.contains("found none of source 0"), "{told}");
 }

@@ -34,7 +34,7 @@ fn header() -> RiskHeader {
     RiskHeader {
         grid: Grid::from(&GEOMETRY),
         n_yaws: N_YAWS as u64,
-        author: 1,
+        map_source: 1,
         odometry_at_ns: now_ns(),
         content_hash: MARK,
         ..RiskHeader::default()

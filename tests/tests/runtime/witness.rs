@@ -216,7 +216,7 @@ impl Witness {
     }
 
     /// Whether the last decision was made on a map of what was learned (1) or of physics alone (2).
-    pub fn is_author(&self, author: u64) -> bool {
-        self.decision.is_some_and(|(_, record)| record.author == author)
+    pub fn drives_on(&self, map_source: u64) -> bool {
+        self.decision.is_some_and(|(_, record)| record.map_source == map_source)
     }
 }

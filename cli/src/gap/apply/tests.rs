@@ -1,4 +1,5 @@
 use std::collections::BTreeMap;
+use std::path::PathBuf;
 
 use sim_to_real::{Estimate, Shrink, Steering};
 
@@ -12,6 +13,7 @@ fn named(id: &str, parameters: &[(&str, f64)]) -> NamedEffect {
 
 fn answer(verdict: Verdict, effects: Vec<NamedEffect>) -> Answer {
     Answer {
+        schema_version: sim_to_real::SCHEMA_VERSION,
         case: "c".to_owned(),
         steering: Steering::Angle,
         verdict,
@@ -31,6 +33,8 @@ fn answer(verdict: Verdict, effects: Vec<NamedEffect>) -> Answer {
             learned_bound_closed: None,
             position_error_2s_m: None,
         },
+        errors_by_quantity: Vec::new(),
+        in_simulator: None,
         advice: Vec::new(),
     }
 }
@@ -44,9 +48,13 @@ fn announced_effects_follow_those_of_the_model_with_their_values() {
     let mut model = Model::of(&formats::read_vehicle("rc_car").unwrap());
     model.effects = vec![Effect::from_values("steer_lag", [0.5, 0.0, 0.0, 0.0]).unwrap()];
     std::fs::write(file("in.toml"), formats::model_text(&model).unwrap()).unwrap();
-    let arguments =
-        GapApplyArguments { diagnosis: file("a.json"), model: file("in.toml"), out: file("out.toml") };
-    run(&arguments).unwrap();
+    let arguments = |force| GapApplyArguments {
+        diagnosis: file("a.json"),
+        model: file("in.toml"),
+        out: file("out.toml"),
+        force,
+    };
+    run(&arguments(false)).unwrap();
     let repaired = formats::read_model(&file("out.toml")).unwrap();
     assert_eq!(repaired.effects.len(), 2);
     assert_eq!(repaired.effects[0].values()[0], 0.5);
@@ -57,6 +65,26 @@ fn announced_effects_follow_those_of_the_model_with_their_values() {
         text.starts_with("# ") && text.contains("in.toml with steer_lag added, as diagnosed in case c\n"),
         "{text}"
     );
+}
+
+/// What is left unknown may be what is named, so that somebody has to take it on himself.
+#[test]
+fn a_part_that_is_unknown_is_applied_only_when_forced() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = |name: &str| folder.path().join(name);
+    let lag = named("steer_lag", &[("time_constant_s", 0.25)]);
+    formats::write_json_atomic(&file("a.json"), &answer(Verdict::EffectsAndUnknown, vec![lag])).unwrap();
+    let arguments = |force| GapApplyArguments {
+        diagnosis: file("a.json"),
+        model: PathBuf::from("rc_car"),
+        out: file("out.toml"),
+        force,
+    };
+    let told = run(&arguments(false)).unwrap_err().to_string();
+    assert!(told.contains("a.json: verdict: expected 'effects', or --force"), "{told}");
+    assert!(!file("out.toml").exists());
+    run(&arguments(true)).unwrap();
+    assert_eq!(formats::read_model(&file("out.toml")).unwrap().effects.len(), 1);
 }
 
 #[test]

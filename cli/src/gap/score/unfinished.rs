@@ -109,6 +109,7 @@ mod tests {
             position_error_2s_m: None,
         };
         Answer {
+            schema_version: sim_to_real::SCHEMA_VERSION,
             case: "case".to_owned(),
             steering: sim_to_real::Steering::Angle,
             verdict: Verdict::None,
@@ -117,6 +118,8 @@ mod tests {
             credible_set: Vec::new(),
             places: Vec::new(),
             shrink,
+            errors_by_quantity: Vec::new(),
+            in_simulator: None,
             advice: Vec::new(),
         }
     }

@@ -25,6 +25,7 @@ fn the_page_holds_the_answer_and_nothing_from_elsewhere() {
         "97 % (90 to 100 %) of the gap closes on the held-out drives",
         "predicted from the real drives alone: 95 % of the gap closes",
         "position error after 2 s 0.289 m before, 0.101 m after",
+        "yaw [rad]</td><td>0.0210 to 0.00400 (floor 0.00300)",
         "d.csv: gap of 1 s",
         // Base64 of the bytes 1, 2, 3.
         "data:image/png;base64,AQID\"",

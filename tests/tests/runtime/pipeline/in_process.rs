@@ -19,7 +19,7 @@ use crate::fixture::{ALPHA, SEED, ages, machine, task};
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Made {
     Surface { content: u64 },
-    Risk { author: u64, content: u64, surface: u64, stuck: u64, times_ns: [u64; 2], goal: [u64; 2] },
+    Risk { map_source: u64, content: u64, surface: u64, stuck: u64, times_ns: [u64; 2], goal: [u64; 2] },
     Decision { bits: u64, record: Shown },
 }
 
@@ -29,7 +29,7 @@ pub struct Shown {
     pub cycle: u64,
     pub decision: u32,
     pub reason: u32,
-    pub author: u64,
+    pub map_source: u64,
     pub risk: u64,
     pub correction: u32,
 }
@@ -121,7 +121,7 @@ impl InProcess {
 }
 
 /// A risk map that has not been told of before.
-pub fn risk(told: &mut u64, author: u64, message: &RiskMessage<'_>) -> Option<Made> {
+pub fn risk(told: &mut u64, map_source: u64, message: &RiskMessage<'_>) -> Option<Made> {
     let header = message.header;
     if std::mem::replace(told, header.id.sequence) == header.id.sequence {
         return None;
@@ -132,7 +132,7 @@ pub fn risk(told: &mut u64, author: u64, message: &RiskMessage<'_>) -> Option<Ma
         (0..parts.n_elements()).map(|place| parts.element(&map, place)).collect();
     parts.seconds_mut(&mut payload).copy_from_slice(times.seconds);
     Some(Made::Risk {
-        author,
+        map_source,
         content: content_hash(&payload),
         surface: header.surface.sequence,
         stuck: header.stuck.sequence,
@@ -155,8 +155,8 @@ pub fn decision(record: &DecisionRecord) -> Made {
         imu: nameless(record.imu),
         ..*record
     };
-    let DecisionRecord { cycle, author, correction, .. } = bare;
+    let DecisionRecord { cycle, map_source, correction, .. } = bare;
     let (decision, reason) = (bare.command.decision, bare.command.reason);
-    let record = Shown { cycle, decision, reason, author, risk: bare.risk.sequence, correction };
+    let record = Shown { cycle, decision, reason, map_source, risk: bare.risk.sequence, correction };
     Made::Decision { bits: content_hash(std::slice::from_ref(&bare)), record }
 }

@@ -133,12 +133,12 @@ impl Processes {
         made
     }
 
-    fn told(&mut self, author: usize) -> Option<Made> {
-        let message = self.risks[author].newest()?;
+    fn told(&mut self, map_source: usize) -> Option<Made> {
+        let message = self.risks[map_source].newest()?;
         let header = message.header();
         assert_eq!(header.content_hash, content_hash(message.payload()));
         Some(Made::Risk {
-            author: header.author,
+            map_source: header.map_source,
             content: header.content_hash,
             surface: header.surface.sequence,
             stuck: header.stuck.sequence,

@@ -1,0 +1,96 @@
+//! What is learned from and chosen by, as tensors.
+
+use candle_core::{Device, Tensor};
+use rand::SeedableRng;
+use rand::seq::SliceRandom;
+use rand_xoshiro::Xoshiro256PlusPlus;
+
+use super::{History, Settings};
+use crate::architecture::{AXES, WINDOW};
+use crate::checkpoint::Standardisation;
+use crate::label::Example;
+use crate::model::{Desired, inputs};
+use crate::split::Split;
+
+/// Half of the examples as tensors.
+pub(super) struct Half {
+    /// [examples, 600], standardised; [examples, 0] of a blind model.
+    pub(super) windows: Tensor,
+    /// [examples, 2].
+    pub(super) desired: Tensor,
+    /// [examples, answers], over their scales.
+    pub(super) targets: Tensor,
+    pub(super) n: usize,
+}
+
+/// Both halves.
+pub(super) struct Data {
+    pub(super) training: Half,
+    pub(super) validation: Half,
+}
+
+impl Data {
+    pub(super) fn new(
+        examples: &[Example],
+        split: &Split,
+        standardisation: &Standardisation,
+        settings: &Settings,
+    ) -> candle_core::Result<Self> {
+        let half = |places: &[usize], key: u64| Half::new(examples, places, standardisation, settings, key);
+        Ok(Self { training: half(&split.training, 1)?, validation: half(&split.validation, 2)? })
+    }
+}
+
+impl Half {
+    pub(super) fn new(
+        examples: &[Example],
+        places: &[usize],
+        standardisation: &Standardisation,
+        settings: &Settings,
+        key: u64,
+    ) -> candle_core::Result<Self> {
+        let n = places.len();
+        let architecture = &settings.architecture;
+        let mut sources = places.to_vec();
+        if settings.history == History::Shuffled {
+            sources.shuffle(&mut Xoshiro256PlusPlus::seed_from_u64(settings.seed ^ (key << 32)));
+        }
+        let n_window = if architecture.senses() { WINDOW * AXES } else { 0 };
+        let mut windows = Vec::with_capacity(n * n_window);
+        for place in &sources {
+            for k in 0..n_window {
+                let value = examples[*place].window[k];
+                windows.push(match settings.history {
+                    History::Constant => 0.0,
+                    _ => (value - standardisation.mean[k / WINDOW]) / standardisation.deviation[k / WINDOW],
+                });
+            }
+        }
+        let example = |place: &usize| &examples[*place];
+        let desired = |place: &usize| {
+            let [speed_mps, curvature_per_m] = example(place).driven;
+            inputs(Desired { speed_mps, curvature_per_m })
+        };
+        let scales = architecture.answer_scales();
+        let target =
+            |place: &usize| scales.iter().zip(example(place).commanded).map(|(scale, value)| value / scale);
+        Ok(Self {
+            windows: Tensor::from_vec(windows, (n, n_window), &Device::Cpu)?,
+            desired: Tensor::from_vec(places.iter().flat_map(desired).collect(), (n, 2), &Device::Cpu)?,
+            targets: Tensor::from_vec(
+                places.iter().flat_map(target).collect(),
+                (n, architecture.n_answers()),
+                &Device::Cpu,
+            )?,
+            n,
+        })
+    }
+
+    pub(super) fn rows(&self, rows: &Tensor) -> candle_core::Result<[Tensor; 3]> {
+        Ok([
+            self.windows.index_select(rows, 0)?,
+            self.desired.index_select(rows, 0)?,
+            self.targets.index_select(rows, 0)?,
+        ])
+    }
+}
