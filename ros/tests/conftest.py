@@ -135,7 +135,8 @@ def node():
     thread = threading.Thread(target=executor.spin, daemon=True)
     thread.start()
     yield node
-    executor.shutdown()
+    # Whoever still waits for a callback is not waited for.
+    executor.shutdown(timeout_sec=5)
     thread.join(5)
     node.destroy_node()
     rclpy.shutdown()

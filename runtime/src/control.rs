@@ -186,9 +186,9 @@ impl Control {
         let record = DecisionRecord { duration_ns: self.clock.now_ns() - began_ns, lateness_ns, ..record };
         self.decisions.send_one(Stamp::default(), record, began_ns)?;
         if matches!(answer.decision, Decision::Drive(_))
-            && let Some((author, _)) = answer.risk
+            && let Some((source, _)) = answer.risk
         {
-            self.tell_plan(author, began_ns)?;
+            self.tell_plan(source, began_ns)?;
         }
         if let Some((at_ns, pose)) = answer.stuck {
             let record = StuckRecord { position_m: pose.position_m, yaw_rad: pose.yaw_rad };
@@ -198,9 +198,9 @@ impl Control {
     }
 
     /// Where the plan leads over the map that it was made on.
-    fn tell_plan(&mut self, author: RiskMapSource, at_ns: u64) -> Result<(), RuntimeError> {
+    fn tell_plan(&mut self, source: RiskMapSource, at_ns: u64) -> Result<(), RuntimeError> {
         let Inputs { learned, physics, .. } = &self.inputs;
-        let map = match author {
+        let map = match source {
             RiskMapSource::Learned => learned,
             RiskMapSource::Physics => physics,
         };
