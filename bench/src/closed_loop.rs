@@ -7,11 +7,14 @@ use std::time::Instant;
 
 use bicycle::{Decision, Model, Vehicle};
 use evidential::{Checkpoint, ShippedError, Unfamiliar, shipped};
+use formats::ElevationFile;
 use navigator::{
     Belief, Config, Destination, Navigator, NavigatorError, Order, RiskOracle, Route, Setup, Surface,
 };
 use rayon::prelude::*;
-use scenarios::{Episode, EpisodeConfig, EpisodeError, Task, Traversability, Truth, TruthField, World};
+use scenarios::{
+    Episode, EpisodeConfig, EpisodeError, Task, Traversability, Truth, TruthField, World, WorldLayers,
+};
 use serde::{Deserialize, Serialize};
 use terrain::{Cell, GridGeometry, GridMap, SurfaceCell};
 use traversability::{CvarLevel, Risk};
@@ -302,4 +305,15 @@ pub fn true_surface(world: &World, resolution_m: f64) -> GridMap<SurfaceCell> {
         *cell = SurfaceCell::certain(world.height_m(x_m, y_m) as f32, patch.class, patch.vegetation_height_m);
     }
     surface
+}
+
+/// An elevation file's layers as a world takes them.
+pub fn layers_of(file: ElevationFile) -> WorldLayers {
+    WorldLayers {
+        elevation_m: file.elevation,
+        canopy_height_m: file.layers.canopy_height_m,
+        low_vegetation_fraction: file.layers.low_vegetation_fraction,
+        water: file.layers.water,
+        ground_gap_m: file.layers.ground_gap_m,
+    }
 }

@@ -26,8 +26,9 @@ use terrain::{GridMap, SurfaceCell};
 use crate::closed_loop::{MapSource, true_surface};
 pub use height_scale::{HeightScale, ScaleRound, find_height_scale};
 pub use place::{Place, PlaceError};
-pub use recorded::collect_recorded;
+pub use recorded::{collect_recorded, recorded_surface};
 use trial::{Driven, Field, drive};
+pub(crate) use trial::{measured_row, untilted};
 
 /// What to drive.
 #[derive(Clone, Debug)]

@@ -84,7 +84,7 @@ pub fn score(diagnosed: &[DiagnosedCase]) -> Score {
         parameter_error_by_effect: parameters::by_effect(&cases),
         naming_s: Quantiles::of(diagnosed.iter().filter_map(|case| case.naming_s)),
         calibration: Calibration::of(diagnosed),
-        confusion: Confusion::of(diagnosed),
+        confusion: Confusion::of_diagnosed(diagnosed),
         cases,
     }
 }

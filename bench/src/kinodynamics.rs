@@ -9,9 +9,11 @@ mod data_curve;
 mod ground;
 mod lap;
 mod machine;
+mod models;
 mod probe;
 mod recorded;
 mod report;
+mod row;
 mod surfaces;
 mod teleoperation;
 mod timing;
@@ -19,28 +21,27 @@ mod track;
 mod verdict;
 mod walls;
 
-use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use bicycle::Vehicle;
 use bicycle::lanes::Instructions;
-use kinodynamics::{
-    Answer, Architecture, Checkpoint, Epoch, Example, History, LabelCounts, Latency, Outcome, Recording,
-    Sensing, Settings, TrainError, label, train,
-};
+use kinodynamics::{LabelConfig, Latency, TrainError, label};
 use rayon::prelude::*;
-use scenarios::{CommandError, PlantError, World, WorldError, seed_of, stream};
+use scenarios::{CommandError, PlantError, World, WorldError, seed_of};
 use serde::Serialize;
 
 use crate::Spread;
 pub use data_curve::{DataPoint, data_curve};
 pub use ground::GroundReport;
 pub use lap::{DrivenLap, Failure};
-use lap::{Driver, Lap, Told, drive_lap};
+use lap::{Driver, Lap, drive_lap};
 pub use machine::{DEVIATIONS, TICK_S, VEHICLE};
+use models::Lessons;
+pub use models::TrainingReport;
 pub use probe::Probe;
 pub use recorded::{LogReport, LogRow, OverRuns, judge_log};
 pub use report::{Quartiles, RowReport, TrackReport};
+pub use row::Row;
 pub use surfaces::{Layout, SURFACES};
 pub use teleoperation::{Teleoperation, teleoperate};
 pub use track::Track;
@@ -48,94 +49,13 @@ pub use verdict::{Ratio, Verdict};
 
 /// From the middle line to the walls [m]: tuned once, with the nominal model alone, to the paper's 52 % of turns (seed 1: see
 /// docs/kinodynamics.md), then frozen.
-pub const HALF_WIDTH_M: f64 = 0.24;
+pub const HALF_WIDTH_M: f64 = 0.29;
 /// Target speeds on the outdoor track [m/s].
 pub const OUTDOOR_MPS: [f64; 10] = [1.6, 1.7, 1.8, 1.9, 2.0, 2.1, 2.2, 2.3, 2.4, 2.5];
 /// Target speeds on the indoor track [m/s].
 pub const INDOOR_MPS: [f64; 5] = [2.4, 2.5, 2.6, 2.7, 2.8];
 /// Ground beyond the path's corners [m].
 const MARGIN_M: f64 = 2.0;
-/// Windows that a shuffled history is drawn from.
-const POOL: usize = 2000;
-
-/// A model, or none.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Row {
-    /// The nominal model.
-    Baseline,
-    /// Learned without the unit.
-    Ablation,
-    /// Learned with it: the paper's model.
-    Learned,
-    /// Learned and driven with the histories of other moments.
-    Shuffled,
-    /// Learned and driven with one history for all moments.
-    Constant,
-    /// Learned with an embedding of 16 numbers, as the paper's successor (VI-IKD).
-    Wide,
-    /// Learned to answer speeds too, as the paper's text has it.
-    WithSpeed,
-    /// Learned without the unit from all that was driven, oversteer and large differences too.
-    UnfilteredAblation,
-    /// Learned with the unit from all that was driven.
-    Unfiltered,
-}
-
-impl Row {
-    /// All, in the order of the tables.
-    pub const ALL: [Self; 9] = [
-        Self::Baseline,
-        Self::Ablation,
-        Self::Learned,
-        Self::Shuffled,
-        Self::Constant,
-        Self::Wide,
-        Self::WithSpeed,
-        Self::UnfilteredAblation,
-        Self::Unfiltered,
-    ];
-    /// Those of the paper.
-    pub const PAPER: [Self; 3] = [Self::Baseline, Self::Ablation, Self::Learned];
-
-    /// Name, for reports.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Baseline => "baseline",
-            Self::Ablation => "ablation",
-            Self::Learned => "learned",
-            Self::Shuffled => "shuffled IMU",
-            Self::Constant => "constant IMU",
-            Self::Wide => "embedding of 16",
-            Self::WithSpeed => "answers speed too",
-            Self::UnfilteredAblation => "ablation, unfiltered",
-            Self::Unfiltered => "learned, unfiltered",
-        }
-    }
-
-    /// How its model is trained; none of the baseline.
-    pub fn settings(self, seed: u64) -> Option<Settings> {
-        let paper = Settings::paper(Architecture::PAPER, seed);
-        let labels = kinodynamics::LabelConfig::unfiltered(0.0);
-        Some(match self {
-            Self::Baseline => return None,
-            Self::Ablation => Settings::paper(Architecture::ABLATION, seed),
-            Self::Learned => paper,
-            Self::Shuffled => Settings { history: History::Shuffled, ..paper },
-            Self::Constant => Settings { history: History::Constant, ..paper },
-            Self::Wide => {
-                let sensing = Sensing::Imu { embedding: 16 };
-                Settings { architecture: Architecture { sensing, ..Architecture::PAPER }, ..paper }
-            }
-            Self::WithSpeed => {
-                let answer = Answer::SpeedAndCurvature;
-                Settings { architecture: Architecture { answer, ..Architecture::PAPER }, ..paper }
-            }
-            Self::UnfilteredAblation => Settings { labels, ..Settings::paper(Architecture::ABLATION, seed) },
-            Self::Unfiltered => Settings { labels, ..paper },
-        })
-    }
-}
 
 /// What to drive and train.
 #[derive(Clone, Debug)]
@@ -154,23 +74,6 @@ pub struct Request {
     pub rows: Vec<Row>,
     /// From the middle line to the walls [m].
     pub half_width_m: f64,
-}
-
-/// A training as it went.
-#[derive(Clone, Debug, Serialize)]
-pub struct TrainingReport {
-    /// Which model.
-    pub row: Row,
-    /// Root mean square of what the curvature is off by on validation blocks, of the best pass [1/m].
-    pub validation_rmse_per_m: f64,
-    /// The same of the wish itself [1/m].
-    pub identity_rmse_per_m: f64,
-    /// Examples to learn from and to choose by.
-    pub n_examples: [usize; 2],
-    /// What the filters took.
-    pub counts: LabelCounts,
-    /// All passes.
-    pub curves: Vec<Epoch>,
 }
 
 /// Everything.
@@ -198,6 +101,9 @@ pub struct Report {
     pub outdoor: TrackReport,
     /// The indoor track on a floor that nobody learned on.
     pub indoor: TrackReport,
+    /// Outdoor failures of the oracle over those of the ablation, where both drove: what knowledge of the ground under the
+    /// wheels can bring at most.
+    pub oracle_over_ablation: Option<Ratio>,
     /// The rules, and whether they hold.
     pub verdicts: Vec<Verdict>,
 }
@@ -270,15 +176,16 @@ pub trait Watch: Sync {
 pub fn measure(request: &Request, revision: &str, watch: &dyn Watch) -> Result<Report, KinodynamicsError> {
     watch.stage(Stage::Driving(u64::from(request.minutes)));
     let asked = Teleoperation { minutes: request.minutes, only: None, seed: request.seed };
-    let recording = teleoperate(&request.vehicle, &asked, &|| watch.step())?;
+    let (recording, coefficients) =
+        teleoperation::teleoperate_knowing(&request.vehicle, &asked, &|| watch.step())?;
     let latency = kinodynamics::estimate_latency(&recording)?;
-    let labels = kinodynamics::LabelConfig::unfiltered(latency.seconds);
-    let (examples, _) = label(&recording, &labels);
+    let (examples, _) = label(&recording, &LabelConfig::unfiltered(latency.seconds));
     let probe = probe::probe(&examples, SURFACES.len(), request.seed)?;
     let grounds = ground::grounds(&recording, &examples);
+    let lessons = Lessons { recording, coefficients, latency, examples };
     let (mut drivers, mut trainings) = (Vec::new(), Vec::new());
     for &row in &request.rows {
-        let (driver, training) = prepare(request, row, &recording, &examples, (revision, watch))?;
+        let (driver, training) = models::prepare(request, row, &lessons, (revision, watch))?;
         drivers.push((row, driver));
         trainings.extend(training);
     }
@@ -286,20 +193,24 @@ pub fn measure(request: &Request, revision: &str, watch: &dyn Watch) -> Result<R
     let outdoor = laps(request, &Track::outdoor(), &OUTDOOR_MPS, &drivers, (instructions, watch))?;
     let indoor = laps(request, &Track::indoor(), &INDOOR_MPS, &drivers, (instructions, watch))?;
     let verdicts = verdict::verdicts(&outdoor, &indoor, &probe, request.seed);
-    let answer_us = timing::answer_us(&drivers, &examples, instructions)?;
+    let [oracle, ablation] = [Row::Oracle, Row::Ablation].map(|row| outdoor.row(row));
+    let oracle_over_ablation =
+        oracle.zip(ablation).map(|(above, below)| Ratio::of(above, below, request.seed));
+    let answer_us = timing::answer_us(&drivers, &lessons.examples, instructions)?;
     let &Request { seed, minutes, laps, half_width_m, .. } = request;
     Ok(Report {
         seed,
         minutes,
         laps,
         half_width_m,
-        latency,
+        latency: lessons.latency,
         probe,
         grounds,
         answer_us,
         trainings,
         outdoor,
         indoor,
+        oracle_over_ablation,
         verdicts,
     })
 }
@@ -324,57 +235,15 @@ pub fn tune_walls(
     half_widths_m.iter().map(success).collect()
 }
 
-fn prepare(
-    request: &Request,
-    row: Row,
-    recording: &Recording,
-    examples: &[Example],
-    (revision, watch): (&str, &dyn Watch),
-) -> Result<(Driver, Option<TrainingReport>), KinodynamicsError> {
-    let Some(settings) = row.settings(request.seed) else { return Ok((Driver::Baseline, None)) };
-    let settings = Settings { epochs: request.epochs, ..settings };
-    watch.stage(Stage::Training(row, settings.epochs as u64));
-    let outcome = train(recording, &settings, revision, &mut |_| {
-        watch.step();
-        if watch.interrupted() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-    })?;
-    if watch.interrupted() {
-        return Err(KinodynamicsError::Interrupted);
-    }
-    let Outcome { checkpoint, curves, counts, identity_rmse_per_m, n_examples, .. } = outcome;
-    let best = curves.iter().map(|epoch| epoch.validation_rmse_per_m).fold(f64::INFINITY, f64::min);
-    let told = told(row, &checkpoint, examples, request.seed);
-    let report =
-        TrainingReport { row, validation_rmse_per_m: best, identity_rmse_per_m, n_examples, counts, curves };
-    Ok((Driver::Model { checkpoint: Arc::new(checkpoint), told }, Some(report)))
-}
-
-fn told(row: Row, checkpoint: &Checkpoint, examples: &[Example], seed: u64) -> Told {
-    match row {
-        Row::Shuffled => {
-            use rand::RngExt;
-            let mut rng = stream(seed, &[0x5F]);
-            let draw = |_| examples[rng.random_range(0..examples.len())].window.clone();
-            Told::Shuffled(Arc::new((0..POOL).map(draw).collect()))
-        }
-        Row::Constant => {
-            let means = checkpoint.sidecar().standardisation.mean;
-            let column = |mean: f32| std::iter::repeat_n(mean, kinodynamics::WINDOW);
-            Told::Constant(Arc::new(means.into_iter().flat_map(column).collect()))
-        }
-        _ => Told::Measured,
-    }
-}
-
 /// The ground of a lap: the same for all models and speeds, another for every lap.
-fn ground(track: &Track, seed: u64) -> Result<World, WorldError> {
+fn ground(track: &Track, seed: u64) -> Result<(Layout, Arc<World>), WorldError> {
     let bound = |axis: usize, pick: fn(f64, f64) -> f64, start: f64| {
         track.nodes_m.iter().map(|node| node[axis]).fold(start, pick)
     };
     let low_m = [0, 1].map(|axis| bound(axis, f64::min, f64::INFINITY) - MARGIN_M);
     let high_m = [0, 1].map(|axis| bound(axis, f64::max, f64::NEG_INFINITY) + MARGIN_M);
     let layout = if track.name == "indoor" { Layout::Wood { seed } } else { Layout::Patches { seed } };
-    layout.world(low_m, high_m)
+    Ok((layout, Arc::new(layout.world(low_m, high_m)?)))
 }
 
 fn laps(
@@ -384,10 +253,9 @@ fn laps(
     drivers: &[(Row, Driver)],
     (instructions, watch): (Instructions, &dyn Watch),
 ) -> Result<TrackReport, KinodynamicsError> {
-    let worlds = (0..request.laps).map(|lap| {
-        ground(track, seed_of(request.seed, &[0x7AC, track.n_turns() as u64, u64::from(lap)])).map(Arc::new)
-    });
-    let worlds: Vec<Arc<World>> = worlds.collect::<Result<_, _>>()?;
+    let worlds = (0..request.laps)
+        .map(|lap| ground(track, seed_of(request.seed, &[0x7AC, track.n_turns() as u64, u64::from(lap)])));
+    let worlds: Vec<(Layout, Arc<World>)> = worlds.collect::<Result<_, _>>()?;
     let middle = walls::middle_line(track);
     let n = drivers.len() * speeds_mps.len() * worlds.len();
     watch.stage(Stage::Laps(n as u64));
@@ -402,7 +270,8 @@ fn laps(
             vehicle: &request.vehicle,
             track,
             middle: &middle,
-            world: Arc::clone(&worlds[lap]),
+            world: Arc::clone(&worlds[lap].1),
+            layout: worlds[lap].0,
             driver: &drivers[driver].1,
             speed_mps: speeds_mps[speed],
             half_width_m: request.half_width_m,

@@ -1,6 +1,6 @@
 //! What things cost on this machine, and the tables that are published: one update of the controller ([`control`]), a
 //! risk map of the physics prior ([`prior_map`]) and of what was learned ([`learned_map`]), how both grow ([`scaling`]), learning ([`learning`],
-//! [`traction_map`]), navigation ([`navigation`]), inverse kinodynamics ([`mod@kinodynamics`]), diagnoses ([`gap_score`], [`gap_closed_loop`]) and the plant itself
+//! [`traction_map`]), navigation ([`navigation`]), inverse kinodynamics ([`mod@kinodynamics`]), diagnoses ([`gap_score`], [`gap_closed_loop`], [`ground_cases`]), friction ([`mod@friction`]) and the plant itself
 //! ([`plant`]). A part of [Surefoot](../cli/index.html).
 //!
 //! All of it goes through the interfaces that a drive uses. [`closed_loop`] puts plant and planner together;
@@ -11,8 +11,12 @@ pub mod collection;
 pub mod control;
 pub mod crossings;
 mod error;
+pub mod friction;
 pub mod gap_closed_loop;
 pub mod gap_score;
+pub mod ground_cases;
+pub mod ground_drives;
+pub mod ground_score;
 pub mod kinodynamics;
 pub mod learned_map;
 pub mod learning;

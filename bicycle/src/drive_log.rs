@@ -1,5 +1,7 @@
 //! A drive as a time series: what was commanded and what was measured, run by run.
 
+use crate::Odometry;
+
 /// A quantity that a drive log may hold. Body frame forward-left-up, map frame x east, y north, z up.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[repr(u8)]
@@ -138,6 +140,28 @@ impl DriveRow {
     pub fn with(mut self, column: Column, value: f64) -> Self {
         self.values[column as usize] = value;
         self
+    }
+
+    /// With what a localisation says of the motion.
+    pub fn with_odometry(self, odometry: &Odometry) -> Self {
+        let [x_m, y_m, z_m] = odometry.position_m;
+        let [roll_rad, pitch_rad, yaw_rad] = odometry.attitude_rad;
+        let [vx_mps, vy_mps] = odometry.velocity_mps;
+        [
+            (Column::X, x_m),
+            (Column::Y, y_m),
+            (Column::Z, z_m),
+            (Column::Roll, roll_rad),
+            (Column::Pitch, pitch_rad),
+            (Column::Yaw, yaw_rad),
+            (Column::Vx, vx_mps),
+            (Column::Vy, vy_mps),
+            (Column::Wz, odometry.yaw_rate_radps),
+            (Column::WheelSpeed, odometry.wheel_speed_mps),
+            (Column::SteerMeas, odometry.steering_rad),
+        ]
+        .into_iter()
+        .fold(self, |row, (column, value)| row.with(column, value))
     }
 
     /// The value of a column, NaN when it was not measured.

@@ -49,7 +49,9 @@ pub use drive_log::{Column, DriveLog, DriveLogError, DriveRow, Run};
 pub use effect::{Effect, SensorModel};
 pub use model::{GroundSample, Model, ModelError};
 pub use motion::{Command, ImuSample, Odometry, State};
-pub use motion_model::{Extent, MotionCommand, MotionLimits, MotionModel, MotionState, MotionStepper};
+pub use motion_model::{
+    Extent, MotionCommand, MotionLimits, MotionModel, MotionState, MotionStepper, StepInput, StepOutcome,
+};
 pub use skid_steer::{
     SkidSteer, SkidSteerCommand, SkidSteerLimits, SkidSteerState, SkidSteerStepper, SkidSteerVehicle,
 };

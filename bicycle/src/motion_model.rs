@@ -114,29 +114,57 @@ pub trait MotionModel: Clone + Debug + Send + Sync + 'static {
     fn measured_state(&self, odometry: &Odometry) -> Self::State;
 }
 
+/// What a step of one vehicle starts from.
+#[derive(Clone, Copy, Debug)]
+pub struct StepInput {
+    /// In metres and radians.
+    pub state: MotionState,
+    /// Speed [m/s], and steering angle [rad] or yaw rate [rad/s].
+    pub command: [f32; 2],
+    /// The ground where it stands.
+    pub ground: GroundSample,
+}
+
+/// What a step of one vehicle leads to.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct StepOutcome {
+    /// In metres and radians.
+    pub state: MotionState,
+    /// Mean yaw rate of the step [rad/s].
+    pub yaw_rate_radps: f64,
+}
+
 /// A model made ready for one step length and one unit of length.
 ///
 /// Models that remember something of the past override what is said of memory: [`MotionStepper::n_slots`] numbers per
 /// vehicle, of which the last [`MotionStepper::n_held`] are accelerations that are held against forces that were met.
 pub trait MotionStepper: Clone + Debug + Send + Sync + 'static {
+    /// Whether all vehicles are asked for together, by [`MotionStepper::step_together`]: for models that answer a thousand
+    /// vehicles about as fast as one.
+    const GOES_TOGETHER: bool = false;
+
     /// How much of a step there is to compute.
     fn extent(&self) -> Extent;
 
-    /// One step whose actuators follow at once and in which nothing else acts.
+    /// One step whose actuators follow at once and in which nothing else acts; by default the whole step without memory.
     fn step_bare<L: Lanes>(
         &self,
         state: &mut LaneState<L>,
         command: [Real<L>; 2],
         ground: &GroundSample<Real<L>>,
-    ) -> Rates<L>;
+    ) -> Rates<L> {
+        self.step(state, command, ground, &mut [], 0)
+    }
 
-    /// One step whose actuators follow within their limits and in which nothing else acts.
+    /// One step whose actuators follow within their limits and in which nothing else acts; by default as above.
     fn step_plain<L: Lanes>(
         &self,
         state: &mut LaneState<L>,
         command: [Real<L>; 2],
         ground: &GroundSample<Real<L>>,
-    ) -> Rates<L>;
+    ) -> Rates<L> {
+        self.step(state, command, ground, &mut [], 0)
+    }
 
     /// One step of the whole model. `memory` holds [`MotionStepper::n_slots`] values or more, `step` counts from the
     /// start.
@@ -148,6 +176,9 @@ pub trait MotionStepper: Clone + Debug + Send + Sync + 'static {
         memory: &mut [L::Value],
         step: usize,
     ) -> Rates<L>;
+
+    /// One step of every vehicle into as many outcomes, where [`MotionStepper::GOES_TOGETHER`]; without memory.
+    fn step_together(&self, _inputs: &[StepInput], _outcomes: &mut [StepOutcome]) {}
 
     /// Without the limits on how fast the actuators follow.
     fn with_instant_actuators(self) -> Self;

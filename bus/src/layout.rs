@@ -2,9 +2,11 @@
 
 mod c;
 mod python;
+mod values;
 
 pub use c::c_header;
 pub use python::python_module;
+pub use values::{Value, values};
 
 /// One number or record that messages are made of.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

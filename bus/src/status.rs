@@ -98,10 +98,12 @@ pub struct Meter {
 }
 
 impl Meter {
-    /// A meter that has measured nothing.
+    /// A meter that has measured nothing. It tells so at once: whoever made it is there and has opened its channels.
     pub fn new(bus: &Bus, role: Role) -> Result<Self, ChannelError> {
-        let outlet = bus.outlet(&role.status(), 1)?;
-        Ok(Self { role, outlet, reported_at_ns: bus.clock().now_ns(), lateness_s: Vec::with_capacity(64) })
+        let (outlet, now_ns) = (bus.outlet(&role.status(), 1)?, bus.clock().now_ns());
+        let mut meter = Self { role, outlet, reported_at_ns: now_ns, lateness_s: Vec::with_capacity(64) };
+        meter.tell(now_ns, 0.0, Health::default())?;
+        Ok(meter)
     }
 
     /// Notes a cycle that began so much after its time.
@@ -116,14 +118,19 @@ impl Meter {
             return Ok(());
         }
         self.reported_at_ns = now_ns;
+        let rate_hz = self.lateness_s.len() as f64 / (since_ns as f64 * 1e-9);
+        self.tell(now_ns, rate_hz, health())
+    }
+
+    fn tell(&mut self, now_ns: u64, rate_hz: f64, health: Health) -> Result<(), ChannelError> {
         self.lateness_s.sort_by(f64::total_cmp);
         let median_s = self.lateness_s.get(self.lateness_s.len() / 2).copied().unwrap_or_default();
         let largest_s = self.lateness_s.last().copied().unwrap_or_default();
-        let Health { age_s, n_missed, messages: [n_lost, n_refused, n_failed], figure } = health();
+        let Health { age_s, n_missed, messages: [n_lost, n_refused, n_failed], figure } = health;
         let record = StatusRecord {
             role: self.role as u64 + 1,
             process: u64::from(std::process::id()),
-            rate_hz: self.lateness_s.len() as f64 / (since_ns as f64 * 1e-9),
+            rate_hz,
             lateness_s: [median_s, largest_s],
             age_s,
             n_missed,

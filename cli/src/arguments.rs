@@ -6,8 +6,10 @@ mod collect;
 mod crossings;
 mod deviation;
 mod drive;
+mod friction;
 mod gap;
 mod gap_check;
+mod ground;
 mod inspect;
 mod kernels;
 mod kinodynamics;
@@ -33,10 +35,12 @@ pub use collect::{CollectArguments, CollectMap, CollectSplit, CollectWorld};
 pub use crossings::{BenchCrossingsArguments, CrossingHandling};
 pub use deviation::AskedDeviation;
 pub use drive::{Correct, DriveArguments, MapSource, Method, Pace};
+pub use friction::{BenchFrictionArguments, TrainFrictionArguments};
 pub use gap::{
     GapApplyArguments, GapCommand, GapDiagnoseArguments, GapEffectsArguments, GapSimulatorArguments,
 };
 pub use gap_check::{GapScoreArguments, GapSealArguments};
+pub use ground::{BenchGroundArguments, GapGroundArguments};
 pub use inspect::InspectArguments;
 pub use kernels::{InstructionSet, KernelArguments, ThreadArguments};
 pub use kinodynamics::{

@@ -1,7 +1,9 @@
 //! `surefoot bench`: what was asked, handed to the benchmarks, and their result shown and written.
 
 mod crossings;
+mod friction;
 mod gap;
+mod ground;
 mod kinodynamics;
 mod learned_map;
 mod learning;
@@ -16,7 +18,9 @@ use serde::Serialize;
 use crate::UsageError;
 use crate::arguments::{BenchControlArguments, BenchPriorMapArguments, BenchWork, JsonArguments};
 pub(crate) use crossings::run_crossings;
+pub(crate) use friction::run_friction;
 pub(crate) use gap::run_gap;
+pub(crate) use ground::run_ground;
 pub(crate) use kinodynamics::run_kinodynamics;
 pub(crate) use learned_map::run_learned_map;
 pub(crate) use learning::run_learning;

@@ -2,7 +2,7 @@
 #![allow(clippy::disallowed_methods, reason = "--pace real follows the wall clock")]
 
 mod correction;
-mod knowledge;
+pub(crate) mod knowledge;
 mod open_loop;
 mod record;
 pub(crate) mod scene;

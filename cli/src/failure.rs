@@ -1,7 +1,5 @@
 //! The ways a command fails, and the line and exit code that tell them apart.
 
-use std::process::ExitCode;
-
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 
 /// The user asked for something that cannot be: bad arguments, a bad file, a place that cannot be written.
@@ -88,13 +86,13 @@ pub(crate) fn one_line(error: &anyhow::Error) -> String {
 }
 
 /// 2 for bad usage or input anywhere in the chain, 3 for a limit that is exceeded, else 1.
-pub(crate) fn exit_code(error: &anyhow::Error) -> ExitCode {
+pub(crate) fn exit_code(error: &anyhow::Error) -> u8 {
     if error.chain().any(|cause| cause.is::<UsageError>()) || error.is::<UsageError>() {
-        ExitCode::from(2)
+        2
     } else if error.is::<LimitExceeded>() {
-        ExitCode::from(3)
+        3
     } else {
-        ExitCode::from(1)
+        1
     }
 }
 
@@ -107,14 +105,14 @@ mod tests {
     fn usage_error_below_context_still_exits_with_two() {
         let refused: anyhow::Result<()> = Err(UsageError("alpha: expected".into()).into());
         let error = refused.context("world.npz").unwrap_err();
-        assert_eq!(exit_code(&error), ExitCode::from(2));
+        assert_eq!(exit_code(&error), 2);
         assert_eq!(one_line(&error), "world.npz: alpha: expected");
     }
 
     #[test]
     fn failed_work_exits_with_one() {
         let error = anyhow::Error::from(WorkFailed("stuck\nat (1, 2)".into()));
-        assert_eq!(exit_code(&error), ExitCode::from(1));
+        assert_eq!(exit_code(&error), 1);
         assert_eq!(one_line(&error), "stuck at (1, 2)");
     }
 

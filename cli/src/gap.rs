@@ -6,10 +6,10 @@ mod diagnose;
 mod drives;
 mod effects;
 mod follow_up;
+mod ground;
 mod in_simulator;
 mod machine;
 mod outputs;
-mod predictions;
 mod progress;
 mod request;
 mod score;
@@ -23,6 +23,7 @@ pub(crate) fn run(command: &GapCommand) -> anyhow::Result<()> {
     match command {
         GapCommand::Diagnose(diagnose) => diagnose::run(diagnose),
         GapCommand::Apply(apply) => apply::run(apply),
+        GapCommand::Ground(ground) => ground::run(ground),
         GapCommand::Effects(effects) => effects::run(effects),
         GapCommand::Seal(seal) => seal::run(seal),
         GapCommand::Score(score) => score::run(score),

@@ -24,6 +24,7 @@
 //!
 //! - [`kinodynamics`]: which command does what is wanted on the ground that the inertial measurement unit feels.
 //! - [`route`](::route): a route over kilometres of measured ground, and the speeds along it.
+//! - [`friction`]: how much each ground holds, from the vehicle's own drives.
 //! - [`tracking`]: what moves, how, and where it will be.
 //! - [`scenarios`]: the truth that all of it is tested against: worlds, a plant of rigid bodies and tyres, sensors,
 //!   episodes.
@@ -50,6 +51,7 @@
 //! | ask physics about ground | `cargo run -p physics_prior --example judge_a_ramp` |
 //! | ask the networks about ground | `cargo run -p evidential --example learned_weight` |
 //! | learn which command a car wants | `cargo run -p kinodynamics --example learn_understeer` |
+//! | find how much each ground holds | `cargo run -p friction --example braking_distance` |
 //! | search a route around slippery ground | `cargo run -p route --example around_ice` |
 //! | drive the controller over a constant risk map | `cargo run -p mppi --example drive_constant_map` |
 //! | give the controller costs of your own | `cargo run -p mppi --example own_costs` |
@@ -94,6 +96,7 @@ mod inspect;
 pub mod interrupt;
 mod orders;
 pub mod output;
+mod program;
 pub mod progress;
 mod replay;
 mod route;
@@ -101,8 +104,8 @@ pub mod summary;
 mod train;
 mod up;
 
+use std::ffi::OsString;
 use std::io::Write;
-use std::process::ExitCode;
 
 use clap::Parser;
 use clap::error::ErrorKind;
@@ -110,17 +113,29 @@ use navigator::Order;
 
 use arguments::{Arguments, BenchCommand, Command, TrainCommand};
 pub use failure::{LimitExceeded, UsageError, WorkFailed};
+pub use program::Program;
 
-/// Runs the command line of this process.
-pub fn run() -> ExitCode {
+/// Runs the command line of this process, whose executable it is; returns the exit code.
+pub fn run() -> u8 {
+    match Program::of_this_process() {
+        Ok(program) => run_as(program),
+        Err(error) => {
+            report(&format!("surefoot: expected to know its own file, found: {error}"));
+            1
+        }
+    }
+}
+
+/// Runs the command line as another program than this process's executable; returns the exit code.
+pub fn run_as(program: Program) -> u8 {
     be_quiet_when_nobody_reads();
-    let words = std::env::args_os().map(arguments::place_with_minus);
-    let result = match Arguments::try_parse_from(words) {
+    let words = program.claim().words.iter().cloned().map(arguments::place_with_minus);
+    let result = match Arguments::try_parse_from([OsString::from("surefoot")].into_iter().chain(words)) {
         Ok(arguments) => dispatch(arguments.command),
         Err(error) => answer(&error),
     };
     match result {
-        Ok(()) => ExitCode::SUCCESS,
+        Ok(()) => 0,
         Err(error) => {
             report(&format!("surefoot: {}", failure::one_line(&error)));
             failure::exit_code(&error)
@@ -163,6 +178,8 @@ fn dispatch(command: Command) -> anyhow::Result<()> {
         Command::Train { command: TrainCommand::Kinodynamics(kinodynamics) } => {
             train::run_kinodynamics(&kinodynamics)
         }
+        Command::Train { command: TrainCommand::Friction(friction) } => train::run_friction(&friction),
+        Command::Bench { command: BenchCommand::Friction(friction) } => bench::run_friction(&friction),
         Command::Bench { command: BenchCommand::Control(control) } => bench::run_control(&control),
         Command::Bench { command: BenchCommand::PriorMap(prior_map) } => bench::run_prior_map(&prior_map),
         Command::Bench { command: BenchCommand::LearnedMap(learned_map) } => {
@@ -174,6 +191,7 @@ fn dispatch(command: Command) -> anyhow::Result<()> {
         Command::Bench { command: BenchCommand::Crossings(crossings) } => bench::run_crossings(&crossings),
         Command::Bench { command: BenchCommand::Plant(plant) } => bench::run_plant(&plant),
         Command::Bench { command: BenchCommand::Scaling(scaling) } => bench::run_scaling(&scaling),
+        Command::Bench { command: BenchCommand::Ground(ground) } => bench::run_ground(&ground),
         Command::Bench { command: BenchCommand::Gap(gap) } => bench::run_gap(&gap),
         Command::Bench { command: BenchCommand::Learning(learning) } => bench::run_learning(&learning),
         Command::Bench { command: BenchCommand::Navigation(navigation) } => {

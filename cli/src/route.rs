@@ -4,7 +4,8 @@ use ::route::{
     FrictionCurve, GroundLayers, Planner, Route, RouteConfig, RouteError, RoutePoint, SpeedLimits,
 };
 use bicycle::Vehicle;
-use formats::{read_elevation, read_vehicle};
+use formats::{ConfigText, read_elevation, read_vehicle};
+use friction::FrictionTable;
 use report::route::RoutePicture;
 use serde::Serialize;
 
@@ -41,12 +42,17 @@ fn failed(error: RouteError) -> anyhow::Error {
 fn planner(vehicle: &Vehicle, arguments: &RouteArguments) -> Result<Planner, UsageError> {
     let file = read_elevation(&arguments.world).map_err(UsageError::from_input)?;
     let cell_m = arguments.cell.unwrap_or_else(|| file.elevation.geometry().resolution_m.clamp(0.5, 2.0));
+    let learned = learned(arguments)?;
+    let curve = |(name, published): (&str, FrictionCurve)| {
+        learned.as_ref().map_or(published, |table| table.curve_or(name, published))
+    };
     let layers = GroundLayers {
         elevation_m: &file.elevation,
         low_vegetation_fraction: file.layers.low_vegetation_fraction.as_ref(),
         water: file.layers.water.as_ref(),
         ground_gap_m: file.layers.ground_gap_m.as_ref(),
-        bare: arguments.bare.curve(),
+        bare: curve(arguments.bare.published()),
+        grass: curve(BareGround::Grass.published()),
     };
     let ground = layers.ground(cell_m).map_err(UsageError::from_input)?;
     Planner::new(ground, config(vehicle)).map_err(UsageError::from_input)
@@ -73,16 +79,19 @@ fn speed_limits(vehicle: &Vehicle, arguments: &RouteArguments) -> SpeedLimits {
 }
 
 impl BareGround {
-    fn curve(self) -> FrictionCurve {
-        match self {
-            Self::Asphalt => FrictionCurve::ASPHALT,
-            Self::Rock => FrictionCurve::ROCK,
-            Self::Dirt => FrictionCurve::DIRT,
-            Self::Grass => FrictionCurve::GRASS,
-            Self::Mud => FrictionCurve::MUD,
-            Self::Sand => FrictionCurve::SAND,
-            Self::Ice => FrictionCurve::ICE,
-        }
+    fn published(self) -> (&'static str, FrictionCurve) {
+        FrictionCurve::PUBLISHED[self as usize]
+    }
+}
+
+/// The friction that drives showed, if a file was named.
+fn learned(arguments: &RouteArguments) -> Result<Option<FrictionTable>, UsageError> {
+    let Some(path) = &arguments.friction else { return Ok(None) };
+    let text = ConfigText::read(path).map_err(UsageError::from_input)?;
+    let table: FrictionTable = text.parse().map_err(UsageError::from_input)?;
+    match table.validate() {
+        Ok(()) => Ok(Some(table)),
+        Err(error) => Err(UsageError::from_input(text.refuse(&error.field, error.expected, error.found))),
     }
 }
 

@@ -122,6 +122,11 @@ pub fn revision() -> &'static str {
     env!("SUREFOOT_REVISION")
 }
 
+/// Program and revision, for pages.
+pub fn program() -> String {
+    format!("surefoot {}, revision {}", env!("CARGO_PKG_VERSION"), revision())
+}
+
 impl Summary {
     /// Whether the drive did what it should.
     ///

@@ -2,6 +2,7 @@
 #![allow(clippy::disallowed_methods, reason = "people are told how long a training takes")]
 
 mod data;
+mod friction;
 mod kinodynamics;
 mod sweep;
 
@@ -18,6 +19,7 @@ use serde::Serialize;
 use crate::arguments::TrainArguments;
 use crate::{UsageError, WorkFailed, interrupt, progress, summary};
 use data::Data;
+pub(crate) use friction::run_friction;
 pub(crate) use kinodynamics::run_kinodynamics;
 
 /// The content of `training.json`.

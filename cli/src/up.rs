@@ -8,7 +8,6 @@ mod ros;
 
 use std::ffi::OsString;
 use std::path::Path;
-use std::process::Command;
 
 use bus::channel::ChannelError;
 use bus::message::mission::REACHED;
@@ -17,7 +16,7 @@ use runtime::RuntimeError;
 use runtime::supervisor::{RestartPolicy, RunEnd, RunReport, Start, Supervisor};
 
 use crate::arguments::{MapSource, Method, Pace, UpArguments, UpRole};
-use crate::{UsageError, WorkFailed, failure, interrupt};
+use crate::{Program, UsageError, WorkFailed, failure, interrupt};
 
 pub(crate) fn run(arguments: &UpArguments) -> anyhow::Result<()> {
     refuse_what_has_no_meaning(arguments)?;
@@ -120,10 +119,10 @@ fn supervise(arguments: &UpArguments) -> anyhow::Result<()> {
     // What cannot be is said once, before six processes say it.
     let words_of_route = roles::prepare(arguments)?;
     let roles = robot::roles(arguments)?;
-    let program = std::env::current_exe()?;
-    let words = own_words(std::env::args_os().skip(1));
+    let program = Program::current()?;
+    let words = own_words(program.words.iter().cloned());
     let command = |role: Role, start: Start| {
-        let mut command = Command::new(&program);
+        let mut command = program.again();
         command.args(&words).args(["--role", role.name(), "--supervised"]);
         if role == Role::Mission {
             command.args(&words_of_route).args(Some("--again").filter(|_| start == Start::Again));
@@ -131,7 +130,7 @@ fn supervise(arguments: &UpArguments) -> anyhow::Result<()> {
         command.stdout(std::process::Stdio::null());
         command
     };
-    let _live = arguments.live.map(|_| live::Viewer::start(&program, &words)).transpose()?;
+    let _live = arguments.live.map(|_| live::Viewer::start(program, &words)).transpose()?;
     let bus = roles::join(arguments)?;
     let mut supervisor = Supervisor::new(&bus, &roles, RestartPolicy::default(), &command)?;
     if arguments.described.is_some() && !arguments.standby {

@@ -120,6 +120,16 @@ pub enum DatasetError {
         /// The bin's value: traction, or an angle [rad].
         value: f32,
     },
+    /// Examples of two kinds do not go together.
+    #[error("{what}: expected {expected}, as in the first dataset, found {found}")]
+    Mismatch {
+        /// What differs.
+        what: &'static str,
+        /// Of the first.
+        expected: String,
+        /// Of the other.
+        found: String,
+    },
 }
 
 impl Dataset {
@@ -154,6 +164,30 @@ impl Dataset {
             }
         }
         Ok(())
+    }
+
+    /// The examples of both, whose drives stay apart.
+    ///
+    /// # Errors
+    /// Another vehicle, layout or prior.
+    pub fn joined(mut self, other: Self) -> Result<Self, DatasetError> {
+        let refused = |what, expected, found| Err(DatasetError::Mismatch { what, expected, found });
+        let (origin, another) = (&mut self.origin, other.origin);
+        if origin.vehicle != another.vehicle {
+            return refused("vehicle", origin.vehicle.clone(), another.vehicle);
+        }
+        if origin.layout != another.layout {
+            return refused("layout", format!("{:?}", origin.layout), format!("{:?}", another.layout));
+        }
+        if origin.prior != another.prior {
+            return refused("prior", format!("{:?}", origin.prior), format!("{:?}", another.prior));
+        }
+        let n_drives = origin.drives.len() as u32;
+        origin.drives.extend(another.drives);
+        origin.provenance = format!("{}; {}", origin.provenance, another.provenance);
+        let moved = |example: Example| Example { drive: example.drive + n_drives, ..example };
+        self.examples.extend(other.examples.into_iter().map(moved));
+        Ok(self)
     }
 
     /// Examples in which each parameter was measured.

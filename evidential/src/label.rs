@@ -5,7 +5,7 @@ mod config;
 mod response;
 mod signals;
 
-use bicycle::{DriveLog, Geometry, Run};
+use bicycle::{Column, DriveLog, Geometry, Run};
 
 pub use config::{LabelConfig, LabelError, Reversing};
 pub use response::{Response, Responses};
@@ -20,6 +20,17 @@ pub struct Label {
     pub pose: [f64; 3],
     /// Linear traction [-], angular traction [-], |roll| [rad], |pitch| [rad]; NaN where it means nothing.
     pub measured: [f32; 4],
+}
+
+/// How the wheels rolled around a label.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Rolling {
+    /// Mean speed over ground along the body [m/s].
+    pub speed_mps: f64,
+    /// Speed of the wheels over the speed that was asked for; NaN where linear traction means nothing.
+    pub wheel_share: f64,
+    /// Share of the wheels' way that was lost to slip; NaN where the wheels hardly turn.
+    pub slip: f64,
 }
 
 /// Ratios outside are cut: they say no more than "rolled back" and "ran away".
@@ -72,6 +83,38 @@ pub fn labels(
         }
     }
     Ok(labels)
+}
+
+/// How the wheels rolled around labels of a run; without a column of their speed, both shares are NaN.
+///
+/// # Errors
+/// See [`labels`].
+pub(crate) fn rolling(
+    run: &Run<'_>,
+    geometry: &Geometry,
+    responses: &Responses,
+    config: &LabelConfig,
+    labels: &[Label],
+) -> Result<Vec<Rolling>, LabelError> {
+    let signals = Signals::of(run, geometry)?;
+    let aligned = signals.aligned(responses);
+    let missing = vec![f64::NAN; signals.time_s.len()];
+    let wheels_mps = run.column(Column::WheelSpeed).unwrap_or(&missing);
+    let forward_mps = run.column(Column::Vx).unwrap_or(&missing);
+    let of = |label: &Label| {
+        let row = signals.time_s.partition_point(|&time_s| time_s < label.time_s);
+        let window = signals.window(row.min(missing.len() - 1), config.window_s);
+        let mean = |values: &[f64]| values[window.clone()].iter().sum::<f64>() / window.len() as f64;
+        let [speed_mps, wheel_mps] = [forward_mps, wheels_mps].map(mean);
+        let is_rolling = wheel_mps.abs() >= config.speed_min_mps;
+        let is_asked = !label.measured[0].is_nan();
+        Rolling {
+            speed_mps,
+            wheel_share: if is_asked { wheel_mps / mean(&aligned.speed_mps) } else { f64::NAN },
+            slip: if is_rolling { 1.0 - speed_mps / wheel_mps } else { f64::NAN },
+        }
+    };
+    Ok(labels.iter().map(of).collect())
 }
 
 /// Whether enough time has passed since the last label. A vehicle that stands says the same again and again: it is

@@ -19,6 +19,7 @@ mod belief_map;
 mod checkpoint;
 mod dataset;
 pub mod dirichlet;
+mod encounters;
 mod features;
 mod flow;
 mod label;
@@ -41,6 +42,7 @@ pub use dataset::{
     Dataset, DatasetError, DatasetFileError, DatasetOrigin, Example, PARAMETER_BINS, PARAMETER_NAMES,
     Surveyor, SurveyorError,
 };
+pub use encounters::{EncounterError, Foretelling, MapAt, encounters, maps_of_runs};
 pub use features::{FeatureLayout, Standardisation};
 pub use flow::{FlowScratch, LogDensity, RadialFlow};
 pub use label::{Label, LabelConfig, LabelError, Response, Responses, Reversing, estimate_responses, labels};

@@ -18,7 +18,7 @@ use traversability::{N_BINS, Pmf};
 
 pub(crate) use network::{BlockPrediction, Workspace};
 
-use crate::{Architecture, Checkpoint, CheckpointError};
+use crate::{Architecture, Checkpoint, CheckpointError, Prior};
 use network::Network;
 
 /// Features beyond this count as this, which keeps every sum finite: no ground is a thousand wheel radii high.
@@ -79,6 +79,19 @@ pub struct Evidence {
     pub log_density: f32,
     /// Pseudo-count of observations per parameter: s n with n = N p(z) (PIETRA, equation 10).
     pub counts: [f32; 4],
+}
+
+impl Prediction {
+    /// Share of the networks in the posterior of every parameter, against a prior of so much evidence (PIETRA, equation
+    /// 11); all of it without a flow or without a prior.
+    pub(crate) fn learned_share(&self, prior: Prior, prior_evidence: f32) -> [f32; 4] {
+        match (&self.evidence, prior) {
+            (Some(evidence), Prior::Physics | Prior::Uniform) => {
+                evidence.counts.map(|count| count / (prior_evidence + count))
+            }
+            _ => [1.0; 4],
+        }
+    }
 }
 
 /// The networks of a checkpoint.

@@ -283,3 +283,26 @@ fn a_surface_of_another_resolution_is_refused() {
     let told = surveyor().example(&surface, &label([0.0; 3]), 0).unwrap_err().to_string();
     assert_eq!(told, "resolution of the surface: expected 0.2 m, found 0.25 m");
 }
+
+#[test]
+fn drives_of_joined_datasets_stay_apart() {
+    let (one, mut other) = (dataset(), dataset());
+    other.origin.provenance = "made again".to_owned();
+    let joined = one.clone().joined(other.clone()).unwrap();
+    assert_eq!(joined.validate(), Ok(()));
+    assert_eq!(joined.examples.len(), 16);
+    assert_eq!(joined.origin.drives, ["first", "second", "first", "second"]);
+    let drives: Vec<u32> = joined.examples.iter().map(|example| example.drive).collect();
+    assert_eq!(drives, [0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 3, 3, 3, 3]);
+    assert_eq!(joined.origin.provenance, "made by hand; made again");
+
+    other.origin.vehicle = "another".to_owned();
+    let refused = one.clone().joined(other).unwrap_err().to_string();
+    assert_eq!(refused, "vehicle: expected crawler, as in the first dataset, found another");
+    let mut other = dataset();
+    other.origin.layout.wheels.track_m += 0.1;
+    assert!(matches!(one.clone().joined(other), Err(DatasetError::Mismatch { what: "layout", .. })));
+    let mut other = dataset();
+    other.origin.prior.obstacle_margin_m += 0.1;
+    assert!(matches!(one.joined(other), Err(DatasetError::Mismatch { what: "prior", .. })));
+}

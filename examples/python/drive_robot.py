@@ -1,6 +1,6 @@
 """A robot's own driver: a simple vehicle on a plain with one rock in the way, driven by Surefoot's processes.
 
-    pip install iceoryx2==0.10.0
+    pip install surefoot-*.whl
     surefoot up --robot examples/robot.toml &
     python3 examples/python/drive_robot.py --run car
 
@@ -12,11 +12,12 @@ old. Prints one line of JSON and ends with 0 when it has come to its goal, else 
 import argparse
 import json
 import math
+import re
 import sys
+import time
 
-import surefoot_layout as layout
-from channels import Bus, Inlet, Outlet, now_ns, run_name
-from watchdog import Watchdog
+import numpy as np
+import surefoot
 
 PERIOD_NS = 20_000_000
 IMU_PERIOD_NS = 5_000_000
@@ -30,7 +31,7 @@ SENSOR = 1
 GOAL_M, TOLERANCE_M = (5.0, 0.0), 0.3
 ROCK_M, ROCK_RADIUS_M, ROCK_HEIGHT_M = (2.5, 0.1), 0.35, 0.5
 OPEN, OBSTACLE = 0, 3
-UNDER_WAY, GOAL_REACHED, TIMED_OUT = 0, 1, 6
+GOAL_REACHED, TIMED_OUT = 1, 6
 
 
 class Robot:
@@ -50,62 +51,48 @@ class Robot:
         self.y_m += step_s * self.speed_mps * math.sin(self.yaw_rad)
         self.yaw_rad += step_s * self.yaw_rate_radps
 
-    def odometry(self, applied: dict) -> layout.OdometryRecord:
-        return layout.OdometryRecord(
-            position_m=(self.x_m, self.y_m, WHEEL_RADIUS_M),
-            attitude_rad=(0.0, 0.0, self.yaw_rad),
-            velocity_mps=(self.speed_mps, 0.0),
-            yaw_rate_radps=self.yaw_rate_radps,
-            wheel_speed_mps=self.speed_mps,
+    def tell_odometry(self, driver: surefoot.Driver, at_ns: int) -> None:
+        driver.publish_odometry(
+            (self.x_m, self.y_m, WHEEL_RADIUS_M),
+            (0.0, 0.0, self.yaw_rad),
+            (self.speed_mps, 0.0),
+            self.yaw_rate_radps,
             steering_rad=self.steering_rad,
-            **applied,
+            valid_at_ns=at_ns,
         )
 
-    def imu(self, until_ns: int):
+    def tell_imu(self, driver: surefoot.Driver, until_ns: int) -> None:
         """The samples of the last period: what it felt on a plain, all alike."""
         n = PERIOD_NS // IMU_PERIOD_NS
-        samples = (layout.ImuRecord * n)()
-        for place, sample in enumerate(samples):
-            sample.valid_at_ns = until_ns - (n - 1 - place) * IMU_PERIOD_NS
-            lateral_mps2 = self.speed_mps * self.yaw_rate_radps
-            sample.acceleration_mps2[:] = (self.acceleration_mps2, lateral_mps2, GRAVITY_MPS2)
-            sample.angular_rate_radps[:] = (0.0, 0.0, self.yaw_rate_radps)
-        return samples
+        times_ns = until_ns - IMU_PERIOD_NS * np.arange(n - 1, -1, -1)
+        felt = [self.acceleration_mps2, self.speed_mps * self.yaw_rate_radps, GRAVITY_MPS2]
+        turned = [0.0, 0.0, self.yaw_rate_radps]
+        driver.publish_imu(
+            times_ns.astype(np.uint64), np.tile(np.array(felt, np.float32), (n, 1)), np.tile(np.array(turned, np.float32), (n, 1))
+        )
 
-    def scan(self):
+    def tell_scan(self, driver: surefoot.Driver, at_ns: int) -> None:
         """Returns of 240 x 48 rays, in the frame of the sensor."""
-        points = []
-        cos_yaw, sin_yaw = math.cos(self.yaw_rad), math.sin(self.yaw_rad)
+        angles_rad = np.arange(240) * math.tau / 240
+        slopes = np.tan(np.radians(np.arange(48) - 52.0))
         height_m = SENSOR_M[2] + WHEEL_RADIUS_M
-        east_m = self.x_m + cos_yaw * SENSOR_M[0]
-        north_m = self.y_m + sin_yaw * SENSOR_M[0]
-        for azimuth in range(240):
-            angle_rad = azimuth * math.tau / 240
-            rock_m = self.distance_to_rock(east_m, north_m, angle_rad + self.yaw_rad)
-            for beam in range(48):
-                slope = math.tan(math.radians(-52.0 + beam))
-                ground_m = height_m / -slope if slope < -0.06 else math.inf
-                hit_m, class_number = ground_m, OPEN
-                if rock_m < ground_m and height_m + slope * rock_m <= ROCK_HEIGHT_M:
-                    hit_m, class_number = rock_m, OBSTACLE
-                if hit_m <= 6.0:
-                    points.append(
-                        (
-                            hit_m * math.cos(angle_rad),
-                            hit_m * math.sin(angle_rad),
-                            slope * hit_m,
-                            class_number,
-                        )
-                    )
-        records = (layout.PointRecord * len(points))()
-        for record, (x_m, y_m, z_m, class_number) in zip(records, points):
-            record.position_m[:] = (x_m, y_m, z_m)
-            record.class_number = class_number
-        return records
+        ground_m = np.where(slopes < -0.06, height_m / -slopes, np.inf)
+        rock_m = np.array([self.distance_to_rock(angle_rad) for angle_rad in angles_rad])[:, None]
+        is_rock = (rock_m < ground_m) & (height_m + slopes * np.minimum(rock_m, 1e3) <= ROCK_HEIGHT_M)
+        hit_m = np.where(is_rock, rock_m, ground_m)
+        is_seen = hit_m <= 6.0
+        reach_m = np.where(is_seen, hit_m, 0.0)
+        along, across = np.cos(angles_rad)[:, None], np.sin(angles_rad)[:, None]
+        points = np.stack([reach_m * along, reach_m * across, reach_m * slopes], axis=-1)
+        classes = np.where(is_rock, OBSTACLE, OPEN).astype(np.uint8)
+        driver.publish_scan(points[is_seen].astype(np.float32), classes[is_seen], sensor=SENSOR, valid_at_ns=at_ns)
 
-    @staticmethod
-    def distance_to_rock(east_m: float, north_m: float, bearing_rad: float) -> float:
-        dx_m, dy_m = ROCK_M[0] - east_m, ROCK_M[1] - north_m
+    def distance_to_rock(self, angle_rad: float) -> float:
+        """Along a ray of the sensor, whose angle counts from ahead [m]."""
+        cos_yaw, sin_yaw = math.cos(self.yaw_rad), math.sin(self.yaw_rad)
+        dx_m = ROCK_M[0] - self.x_m - cos_yaw * SENSOR_M[0]
+        dy_m = ROCK_M[1] - self.y_m - sin_yaw * SENSOR_M[0]
+        bearing_rad = angle_rad + self.yaw_rad
         along_m = dx_m * math.cos(bearing_rad) + dy_m * math.sin(bearing_rad)
         across_m = -dx_m * math.sin(bearing_rad) + dy_m * math.cos(bearing_rad)
         if along_m <= 0.0 or abs(across_m) >= ROCK_RADIUS_M:
@@ -114,51 +101,48 @@ class Robot:
 
 
 def sleep_until(deadline_ns: int) -> None:
-    import time
-
-    while (left_ns := deadline_ns - now_ns()) > 0:
+    while (left_ns := deadline_ns - time.monotonic_ns()) > 0:
         time.sleep(left_ns * 1e-9)
 
 
-def drive(run: str) -> dict:
-    bus, robot = Bus(run), Robot()
-    odometry, scans, missions = Outlet(bus, "odometry"), Outlet(bus, "scan", 1 << 14), Outlet(bus, "mission")
-    imu = Outlet(bus, "imu", PERIOD_NS // IMU_PERIOD_NS)
-    commands, risks = Inlet(bus, "command"), Inlet(bus, "risk")
-    mission = layout.MissionRecord(goal_m=GOAL_M, tolerance_m=TOLERANCE_M)
-    watchdog = Watchdog()
-    began_ns, n_commands, n_maps, nearest_m = now_ns(), 0, 0, math.inf
+def drive(run: str) -> dict[str, bool | float]:
+    driver, robot = surefoot.Driver(run, surefoot.Vehicle("rc_car")), Robot()
+    began_ns, n_maps, nearest_m, left_m = time.monotonic_ns(), 0, math.inf, math.inf
     for cycle in range(int(TIME_LIMIT_S * 1e9) // PERIOD_NS):
         at_ns = began_ns + cycle * PERIOD_NS
         sleep_until(at_ns)
-        odometry.send(at_ns, (layout.OdometryRecord * 1)(robot.odometry(watchdog.applied())))
-        imu.send(at_ns, robot.imu(at_ns))
+        robot.tell_odometry(driver, at_ns)
+        robot.tell_imu(driver, at_ns)
         if cycle % CYCLES_PER_SCAN == 0:
-            scans.send(at_ns, robot.scan(), sensor=SENSOR)
+            robot.tell_scan(driver, at_ns)
         if cycle % 50 == 0:
-            mission.time_s = cycle * PERIOD_NS * 1e-9
-            missions.send(now_ns(), (layout.MissionRecord * 1)(mission))
-        if (message := commands.newest()) is not None:
-            _, _, payload = message
-            watchdog.admit(payload[0])
-            n_commands += 1
-        if risks.newest() is not None:
+            driver.publish_mission(GOAL_M, TOLERANCE_M, cycle * PERIOD_NS * 1e-9)
+        if driver.run.risk_map() is not None:
             n_maps += 1
-        robot.advance(*watchdog.carry_out(now_ns()), PERIOD_NS * 1e-9)
+        speed_mps, steering_rad, _ = driver.carry_out()
+        robot.advance(speed_mps, steering_rad, PERIOD_NS * 1e-9)
         nearest_m = min(nearest_m, math.dist((robot.x_m, robot.y_m), ROCK_M))
         left_m = math.dist((robot.x_m, robot.y_m), GOAL_M)
         if left_m <= TOLERANCE_M:
             break
-    mission.outcome = GOAL_REACHED if left_m <= TOLERANCE_M else TIMED_OUT
-    missions.send(now_ns(), (layout.MissionRecord * 1)(mission))
+    time_s = (time.monotonic_ns() - began_ns) * 1e-9
+    outcome = GOAL_REACHED if left_m <= TOLERANCE_M else TIMED_OUT
+    driver.publish_mission(GOAL_M, TOLERANCE_M, time_s, outcome=outcome)
     return {
         "reached": left_m <= TOLERANCE_M,
-        "time_s": round((now_ns() - began_ns) * 1e-9, 2),
+        "time_s": round(time_s, 2),
         "distance_to_goal_m": round(left_m, 3),
         "nearest_to_rock_m": round(nearest_m, 3),
-        "commands": n_commands,
+        "commands": driver.n_commands,
         "risk_maps": n_maps,
     }
+
+
+def run_name(word: str) -> str:
+    """A word that may name a run, as for `surefoot up --run`; argparse tells of any other."""
+    if re.fullmatch("[A-Za-z0-9_-]{1,32}", word) is None:
+        raise argparse.ArgumentTypeError(f"expected 1 to 32 letters, digits, - or _, found {word!r}")
+    return word
 
 
 def main() -> int:

@@ -1,6 +1,6 @@
 """A recorded drive as if it were happening now: its poses and commands on Surefoot's channels, at their own pace.
 
-    pip install iceoryx2==0.10.0
+    pip install surefoot-*.whl
     surefoot up --role recorder --run log &
     python3 replay_log.py drive.csv --run log
 
@@ -15,15 +15,18 @@ import argparse
 import csv
 import json
 import math
+import re
 import sys
 import time
+from collections.abc import Iterator
 
-import surefoot_layout as layout
-from channels import Bus, Outlet, now_ns, run_name
-from watchdog import BY_COMMAND, BY_VEHICLE
+import surefoot
 
+Row = dict[str, str]
+# Place, attitude, velocity and yaw rate, and what the wheels do.
+Triple = tuple[float, float, float]
+Pose = tuple[tuple[Triple, Triple, tuple[float, float], float], dict[str, float]]
 NEEDED = ("t", "x", "y", "yaw", "vx", "wz")
-DRIVE = 1
 BETWEEN_RUNS_S = 0.5
 # Whoever listens needs a moment to notice a new voice.
 LEAD_S = 0.5
@@ -33,13 +36,13 @@ class NoLog(Exception):
     """Why a file is no log."""
 
 
-def number(row: dict, name: str, otherwise: float = math.nan) -> float:
+def number(row: Row, name: str, otherwise: float = math.nan) -> float:
     """A field as a number; one that is empty or absent is `otherwise`."""
     text = (row.get(name) or "").strip()
     return float(text) if text else otherwise
 
 
-def rows_of(path: str, seconds_max: float):
+def rows_of(path: str, seconds_max: float) -> Iterator[tuple[float, Row]]:
     """Yields (time since the log began [s], row) with the runs one after the other."""
     with open(path, newline="") as file:
         reader = csv.DictReader(file)
@@ -65,71 +68,68 @@ def rows_of(path: str, seconds_max: float):
             yield since_s, row
 
 
-def odometry(row: dict):
-    """The row as odometry; None where it is not finite."""
-    wheel_mps = number(row, "wheel_speed", number(row, "vx"))
-    record = layout.OdometryRecord(
-        position_m=(number(row, "x"), number(row, "y"), number(row, "z", 0.0)),
-        attitude_rad=(number(row, "roll", 0.0), number(row, "pitch", 0.0), number(row, "yaw")),
-        velocity_mps=(number(row, "vx"), number(row, "vy", 0.0)),
-        yaw_rate_radps=number(row, "wz"),
-        wheel_speed_mps=wheel_mps,
-        steering_rad=number(row, "steer_meas", number(row, "cmd_steer", 0.0)),
+def pose(row: Row) -> Pose | None:
+    """The row as what `publish_odometry` takes; None where it is not finite."""
+    values = (
+        (number(row, "x"), number(row, "y"), number(row, "z", 0.0)),
+        (number(row, "roll", 0.0), number(row, "pitch", 0.0), number(row, "yaw")),
+        (number(row, "vx"), number(row, "vy", 0.0)),
+        number(row, "wz"),
     )
-    values = [*record.position_m, *record.attitude_rad, *record.velocity_mps, record.yaw_rate_radps]
-    values += [record.wheel_speed_mps, record.steering_rad]
-    return record if all(map(math.isfinite, values)) else None
+    wheels = {
+        "wheel_speed_mps": number(row, "wheel_speed", number(row, "vx")),
+        "steering_rad": number(row, "steer_meas", number(row, "cmd_steer", 0.0)),
+    }
+    numbers = [*values[0], *values[1], *values[2], values[3], *wheels.values()]
+    return (values, wheels) if all(map(math.isfinite, numbers)) else None
 
 
-def command(row: dict, at_ns: int):
-    """What was commanded, by whoever knew all of its time; None where that is not known."""
-    speed_mps, steering_rad = number(row, "cmd_speed"), number(row, "cmd_steer")
-    if not (math.isfinite(speed_mps) and math.isfinite(steering_rad)):
-        return None
-    times = {"odometry_at_ns": at_ns, "scan_at_ns": at_ns}
-    return layout.CommandRecord(speed_mps=speed_mps, steering_rad=steering_rad, decision=DRIVE, reason=0, **times)
+def command(row: Row) -> tuple[float, float] | None:
+    """Speed [m/s] and steering [rad] that were commanded; None where they are not known."""
+    told = (number(row, "cmd_speed"), number(row, "cmd_steer"))
+    return told if all(map(math.isfinite, told)) else None
 
 
-def applied(record, told, at_ns: int) -> None:
-    """Says what the actuators were told: the log's command, or, of a drive without, what they did."""
-    record.applied_since_ns = at_ns
-    if told is None:
-        record.applied_speed_mps, record.applied_steering_rad = record.wheel_speed_mps, record.steering_rad
-        record.applied_by = BY_VEHICLE
-    else:
-        record.applied_speed_mps, record.applied_steering_rad = told.speed_mps, told.steering_rad
-        record.applied_by = BY_COMMAND
-
-
-def replay(path: str, run: str, speed: float, seconds_max: float) -> dict:
+def replay(path: str, run: str, speed: float, seconds_max: float) -> dict[str, float]:
     """Tells the log's rows when they are due."""
     rows = rows_of(path, seconds_max)
-    bus = Bus(run)
-    poses, commands = Outlet(bus, "odometry"), Outlet(bus, "command")
+    driver = surefoot.Driver(run, surefoot.Vehicle("rc_car"))
     time.sleep(LEAD_S)
-    began_ns, passed_over, since_s = now_ns(), 0, 0.0
+    began_ns, since_s = time.monotonic_ns(), 0.0
+    told: dict[str, float] = {"poses": 0, "commands": 0, "passed_over": 0}
     for since_s, row in rows:
         due_ns = began_ns + int(since_s / speed * 1e9)
         try:
-            record, told = odometry(row), command(row, due_ns)
+            place, commanded = pose(row), command(row)
         except ValueError as error:
             raise NoLog(f"{path}, {since_s:.3f} s: expected numbers, found: {error}") from None
-        while (left_ns := due_ns - now_ns()) > 0:
+        while (left_ns := due_ns - time.monotonic_ns()) > 0:
             time.sleep(left_ns * 1e-9)
-        if record is None:
-            passed_over += 1
+        if place is None:
+            told["passed_over"] += 1
             continue
-        if told is not None:
-            commands.send(due_ns, (layout.CommandRecord * 1)(told))
-        applied(record, told, due_ns)
-        poses.send(due_ns, (layout.OdometryRecord * 1)(record))
-    return {
-        "poses": poses.n_sent,
-        "commands": commands.n_sent,
-        "passed_over": passed_over,
-        "log_s": round(since_s, 3),
-        "took_s": round((now_ns() - began_ns) * 1e-9, 3),
-    }
+        if commanded is not None:
+            driver.publish_command(commanded[0], commanded[1], due_ns)
+            told["commands"] += 1
+        values, wheels = place
+        # Of a drive without commands, the actuators were told what they did.
+        applied = commanded or (wheels["wheel_speed_mps"], wheels["steering_rad"])
+        driver.publish_odometry(
+            *values,
+            wheel_speed_mps=wheels["wheel_speed_mps"],
+            steering_rad=wheels["steering_rad"],
+            valid_at_ns=due_ns,
+            applied=applied,
+        )
+        told["poses"] += 1
+    return {**told, "log_s": round(since_s, 3), "took_s": round((time.monotonic_ns() - began_ns) * 1e-9, 3)}
+
+
+def run_name(word: str) -> str:
+    """A word that may name a run, as for `surefoot up --run`; argparse tells of any other."""
+    if re.fullmatch("[A-Za-z0-9_-]{1,32}", word) is None:
+        raise argparse.ArgumentTypeError(f"expected 1 to 32 letters, digits, - or _, found {word!r}")
+    return word
 
 
 def main() -> int:

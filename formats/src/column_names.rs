@@ -70,7 +70,7 @@ impl ColumnNames {
     /// counts; where it has, its own of that name is set aside.
     ///
     /// Errors: neither is there, as what was expected.
-    pub(crate) fn renamed(&self, header: &[String]) -> Result<Vec<String>, String> {
+    pub fn renamed(&self, header: &[String]) -> Result<Vec<String>, String> {
         let has = |name: &String| header.contains(name);
         if let Some(Named { ours, in_file }) = self.0.iter().find(|own| !has(&own.in_file) && !has(&own.ours))
         {

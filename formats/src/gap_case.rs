@@ -17,7 +17,10 @@ use crate::{ConfigError, ConfigText};
 pub use drive::{DriveFileError, ReadDrive, read_drive, read_drive_named};
 pub use grid::GapGround;
 pub use labels::{GapKind, GapLabel, parse_gap_labels, read_gap_labels};
-pub use vehicle::{GapNoise, GapVehicle, GapVehicleError, read_gap_vehicle};
+pub use vehicle::{
+    DescribedVehicle, GapNoise, GapVehicle, GapVehicleError, parse_gap_vehicle, read_described_vehicle,
+    read_gap_vehicle,
+};
 
 /// Name of the file that a case's folder holds.
 const CASE_FILE: &str = "case.toml";

@@ -45,18 +45,21 @@ pub use elevation::{
     ElevationError, ElevationFile, ElevationLayers, PngScale, read_elevation, read_elevation_png,
 };
 pub use gap_case::{
-    DriveFileError, GapCase, GapGround, GapKind, GapLabel, GapNoise, GapVehicle, GapVehicleError, ReadDrive,
-    parse_gap_labels, read_drive, read_drive_named, read_gap_case, read_gap_labels, read_gap_vehicle,
+    DescribedVehicle, DriveFileError, GapCase, GapGround, GapKind, GapLabel, GapNoise, GapVehicle,
+    GapVehicleError, ReadDrive, parse_gap_labels, parse_gap_vehicle, read_described_vehicle, read_drive,
+    read_drive_named, read_gap_case, read_gap_labels, read_gap_vehicle,
 };
 pub use gap_case_write::{
     GapSeal, GapSealError, read_sealed_labels, write_gap_case, write_gap_labels, write_gap_seal,
     write_gap_vehicle,
 };
-pub use model_text::model_text;
+pub use model_text::{model_text, toml_text};
 pub use overlay::overlay;
 pub use recording::{
-    DriveRecorder, DriveTopics, McapDriveLog, McapReadError, RecordError, RecordedChannel, RecordedMessage,
-    RecordingError, RecordingMessages, open_recording, read_drive_log_mcap,
+    DriveRecorder, DriveTopics, McapDriveLog, McapReadError, RecordError, RecordedCell, RecordedChannel,
+    RecordedColumn, RecordedMessage, RecordedRisk, RecordedTable, RecordingError, RecordingMessages,
+    json_row, open_recording, read_drive_log_mcap, read_recorded_maps, read_recorded_table,
+    recorded_elevation, recorded_risk, recorded_scan,
 };
 pub use refusal::ArrayFileError;
 pub use results::{OutputError, config_hash, prepare_out_dir, write_bytes_atomic, write_json_atomic};

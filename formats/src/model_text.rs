@@ -1,12 +1,20 @@
-//! A controller's model as TOML.
+//! Models and tables as TOML.
 
 use bicycle::Model;
+use serde::Serialize;
 
 /// The text that [`crate::parse_model`] reads back as the same model, to the last bit of every number.
 ///
 /// Errors: a number that TOML cannot hold.
 pub fn model_text(model: &Model) -> Result<String, toml::ser::Error> {
-    toml::to_string(model)
+    toml_text(model)
+}
+
+/// The text that [`crate::ConfigText::parse`] reads back as the same table.
+///
+/// Errors: what is no table, and what TOML cannot hold.
+pub fn toml_text(table: &impl Serialize) -> Result<String, toml::ser::Error> {
+    toml::to_string(table)
 }
 
 #[cfg(test)]

@@ -27,6 +27,11 @@ pub enum Sensing {
         /// Numbers of the embedding.
         embedding: usize,
     },
+    /// Numbers that somebody else knows of it, instead of an embedding: how far knowledge of the ground can help at all.
+    Told {
+        /// How many.
+        numbers: usize,
+    },
 }
 
 /// What a model answers.
@@ -77,6 +82,16 @@ impl Architecture {
         match self.sensing {
             Sensing::Blind => 0,
             Sensing::Imu { embedding } => embedding,
+            Sensing::Told { numbers } => numbers,
+        }
+    }
+
+    /// Numbers of an example's window: the history's, or those that are told.
+    pub(crate) fn n_window(&self) -> usize {
+        match self.sensing {
+            Sensing::Blind => 0,
+            Sensing::Imu { .. } => WINDOW * AXES,
+            Sensing::Told { numbers } => numbers,
         }
     }
 
@@ -90,7 +105,7 @@ impl Architecture {
 
     /// Whether it sees the unit's history.
     pub fn senses(&self) -> bool {
-        self.n_embedding() > 0
+        matches!(self.sensing, Sensing::Imu { .. })
     }
 
     /// Largest value of every answer: the hyperbolic tangents are multiplied by it.
@@ -101,7 +116,7 @@ impl Architecture {
         }
     }
 
-    /// The encoder's layers; none of a blind model.
+    /// The encoder's layers; none of a model without a history.
     pub(crate) fn encoder(&self) -> Vec<LayerShape> {
         if !self.senses() {
             return Vec::new();

@@ -76,7 +76,14 @@ impl InverseModel {
 
     /// Whether it wants to be told what the unit measured.
     pub fn senses(&self) -> bool {
-        self.n_embedding > 0
+        !self.encoder.is_empty()
+    }
+
+    /// Takes in what somebody knows of the ground, where a model was trained to be told.
+    pub fn tell(&mut self, numbers: &[f32]) {
+        for (place, number) in self.embedding.iter_mut().zip(numbers) {
+            *place = *number;
+        }
     }
 
     /// Takes in [`WINDOW`] samples from old to new: angular rate x, y, z and specific force x, y, z each. A blind model only

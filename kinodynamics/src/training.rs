@@ -18,12 +18,13 @@ use candle_core::Tensor;
 use serde::{Deserialize, Serialize};
 
 use crate::CheckpointError;
-use crate::architecture::{AXES, Architecture, WINDOW};
+use crate::architecture::{AXES, Architecture, Sensing, WINDOW};
 use crate::checkpoint::{Checkpoint, Sidecar, Standardisation};
+use crate::familiarity::Fade;
 use crate::label::{Example, LabelConfig, LabelCounts, label};
 use crate::latency::{Latency, LatencyError, estimate_latency};
 use crate::recording::{ImuCheckError, Recording, VehicleSummary, check_imu};
-use crate::split::block_split;
+use crate::split::{Split, block_split};
 use data::Data;
 use fit::fit;
 
@@ -193,6 +194,10 @@ pub fn train(
     on_epoch: &mut dyn FnMut(&Epoch) -> ControlFlow<()>,
 ) -> Result<Outcome, TrainError> {
     validate(settings)?;
+    if let Sensing::Told { numbers } = settings.architecture.sensing {
+        let expected = "none: a recording tells nothing of the ground but its name";
+        return Err(TrainError::Setting { field: "numbers told", expected, found: numbers as f64 });
+    }
     check_imu(recording)?;
     let grounds = recording.grounds_driven();
     if let ([only], true) = (&grounds[..], settings.architecture.senses()) {
@@ -202,75 +207,90 @@ pub fn train(
     // The correlation finds the middle of the effect; a command is held for a tick, whose mean rate is the label.
     let labels = LabelConfig { latency_s: latency.seconds, ..settings.labels };
     let (examples, counts) = label(recording, &labels);
-    let split = block_split(&examples, settings.seed);
-    let n_examples = [split.training.len(), split.validation.len()];
-    if n_examples[0] < EXAMPLES_MIN || n_examples[1] < EXAMPLES_MIN / 10 {
-        return Err(TrainError::TooFew { found: n_examples, ticks: counts.ticks });
-    }
-    let standardisation = standardisation(&examples, &split.training);
-    let data = Data::new(&examples, &split, &standardisation, settings)?;
-    let (network, curves) = fit(&data, settings, on_epoch)?;
-    let mut tensors = network.tensors()?;
-    let fade = density::fit(&data, settings, &mut tensors)?;
+    let split = split(&examples, settings, counts.ticks)?;
     let sidecar = Sidecar {
         format: 0,
         revision: revision.to_owned(),
         vehicle: recording.vehicle.clone(),
         architecture: settings.architecture,
-        standardisation,
-        fade,
+        standardisation: standardisation(&examples, &split.training),
+        fade: Fade { none: 0.0, whole: 1.0 },
         latency,
         labels,
         grounds: grounds.into_iter().map(str::to_owned).collect(),
         weights_sha256: String::new(),
     };
-    Ok(Outcome {
-        checkpoint: Checkpoint::new(sidecar, tensors)?,
-        curves,
-        counts,
-        latency,
-        identity_rmse_per_m: identity_rmse_per_m(&examples, &split.validation),
-        n_examples,
-    })
+    fit_to(&examples, &split, (settings, counts), sidecar, on_epoch)
 }
 
-/// Fits a blind model to examples without histories, as a log without the unit gives them.
+/// Fits a model to examples without histories, as a log without the unit gives them: a blind one, or one that is told what
+/// their windows hold. It is of no vehicle.
 ///
 /// # Errors
-/// An architecture that senses, too few examples, and what [`train`] refuses in settings.
-pub fn train_blind(examples: &[Example], settings: &Settings) -> Result<Checkpoint, TrainError> {
+/// An architecture that senses, windows that hold less than is told, too few examples, and what [`train`] refuses in settings.
+pub fn train_without_history(
+    examples: &[Example],
+    settings: &Settings,
+    on_epoch: &mut dyn FnMut(&Epoch) -> ControlFlow<()>,
+) -> Result<Outcome, TrainError> {
     validate(settings)?;
-    if settings.architecture.senses() {
-        let expected = "a blind architecture: there are no histories";
-        return Err(TrainError::Setting {
-            field: "embedding",
-            expected,
-            found: settings.architecture.n_embedding() as f64,
-        });
+    let refuse = |field, expected, found| Err(TrainError::Setting { field, expected, found: found as f64 });
+    let architecture = settings.architecture;
+    if architecture.senses() {
+        let expected = "an architecture that senses nothing: there are no histories";
+        return refuse("embedding", expected, architecture.n_embedding());
     }
-    let split = block_split(examples, settings.seed);
-    let found = [split.training.len(), split.validation.len()];
-    if found[0] < EXAMPLES_MIN || found[1] < EXAMPLES_MIN / 10 {
-        return Err(TrainError::TooFew { found, ticks: examples.len() });
+    if let Some(found) = examples.iter().map(|one| one.window.len()).find(|n| *n < architecture.n_window()) {
+        return refuse("numbers told", "no more than every window holds", found);
     }
-    let standardisation = Standardisation { mean: [0.0; AXES], deviation: [1.0; AXES] };
-    let data = Data::new(examples, &split, &standardisation, settings)?;
-    let (network, _) = fit(&data, settings, &mut |_| ControlFlow::Continue(()))?;
-    let mut tensors = network.tensors()?;
-    let fade = density::fit(&data, settings, &mut tensors)?;
+    let split = split(examples, settings, examples.len())?;
     let sidecar = Sidecar {
         format: 0,
         revision: String::new(),
         vehicle: VehicleSummary { name: String::new(), wheelbase_m: 1.0, steering_max_rad: 1.0 },
-        architecture: settings.architecture,
-        standardisation,
-        fade,
+        architecture,
+        standardisation: Standardisation { mean: [0.0; AXES], deviation: [1.0; AXES] },
+        fade: Fade { none: 0.0, whole: 1.0 },
         latency: Latency { seconds: settings.labels.latency_s, correlation: 1.0 },
         labels: settings.labels,
         grounds: Vec::new(),
         weights_sha256: String::new(),
     };
-    Ok(Checkpoint::new(sidecar, tensors)?)
+    let n = examples.len();
+    let counts = LabelCounts { ticks: n, kept: n, ..LabelCounts::default() };
+    fit_to(examples, &split, (settings, counts), sidecar, on_epoch)
+}
+
+fn split(examples: &[Example], settings: &Settings, ticks: usize) -> Result<Split, TrainError> {
+    let split = block_split(examples, settings.seed);
+    let found = [split.training.len(), split.validation.len()];
+    if found[0] < EXAMPLES_MIN || found[1] < EXAMPLES_MIN / 10 {
+        return Err(TrainError::TooFew { found, ticks });
+    }
+    Ok(split)
+}
+
+/// Fits networks and density; the sidecar's fade is that of the density.
+fn fit_to(
+    examples: &[Example],
+    split: &Split,
+    (settings, counts): (&Settings, LabelCounts),
+    sidecar: Sidecar,
+    on_epoch: &mut dyn FnMut(&Epoch) -> ControlFlow<()>,
+) -> Result<Outcome, TrainError> {
+    let data = Data::new(examples, split, &sidecar.standardisation, settings)?;
+    let (network, curves) = fit(&data, settings, on_epoch)?;
+    let mut tensors = network.tensors()?;
+    let fade = density::fit(&data, settings, &mut tensors)?;
+    let latency = sidecar.latency;
+    Ok(Outcome {
+        checkpoint: Checkpoint::new(Sidecar { fade, ..sidecar }, tensors)?,
+        curves,
+        counts,
+        latency,
+        identity_rmse_per_m: identity_rmse_per_m(examples, &split.validation),
+        n_examples: [split.training.len(), split.validation.len()],
+    })
 }
 
 fn validate(settings: &Settings) -> Result<(), TrainError> {

@@ -5,8 +5,7 @@ use crate::diagnostics::CostTerm;
 use crate::kernel::Row;
 use crate::sampling::Control;
 use crate::summary::Totals;
-use bicycle::MotionState;
-use std::f64::consts::TAU;
+use crate::trace::{TraceRows, TracedStep};
 
 /// Controls, costs and sums of [`crate::kernel::CHUNK`] rollouts.
 #[derive(Clone)]
@@ -17,6 +16,8 @@ pub(crate) struct Chunk {
     pub(crate) terms: [Row; CostTerm::COUNT],
     /// Where every rollout ends, where somebody asks: position in cells, yaw in turns, speed [m/s] and what turns.
     pub(crate) ends: [Row; 5],
+    /// Every step of every rollout, where somebody looks at them; else nothing.
+    pub(crate) trace: Vec<TraceRows>,
     /// Cost of every rollout [s]; not finite when the rollout met a number that is not.
     pub(crate) costs: Row,
     /// Steps of every rollout that break a limit of attitude.
@@ -37,6 +38,7 @@ impl Chunk {
             controls: vec![[Row::ZERO; 2]; n_steps],
             terms: [Row::ZERO; CostTerm::COUNT],
             ends: [Row::ZERO; 5],
+            trace: Vec::new(),
             costs: Row::ZERO,
             n_broken: Row::ZERO,
             weights: Row::ZERO,
@@ -48,16 +50,22 @@ impl Chunk {
 
     /// One rollout, whose end is kept.
     pub(crate) fn future(&self, lane: usize, frame: &Frame) -> Future {
-        let [x_cells, y_cells, turns, speed_mps, turn] =
-            self.ends.each_ref().map(|row| f64::from(row.0[lane]));
-        let end = MotionState {
-            x_m: frame.corner_m[0] + x_cells * frame.cell_m,
-            y_m: frame.corner_m[1] + y_cells * frame.cell_m,
-            yaw_rad: turns * TAU,
-            speed_mps,
-            turn,
-        };
+        let end = frame.state(self.ends.each_ref().map(|row| row.0[lane]));
         Future { end, cost_s: self.costs.0[lane], n_broken: self.n_broken.0[lane] }
+    }
+
+    /// One step of one rollout, whose trace is kept.
+    pub(crate) fn traced_step(&self, lane: usize, t: usize, frame: &Frame) -> TracedStep {
+        let TraceRows { state, rates, risk, under_way } = &self.trace[t];
+        let [speed_mps, yaw_rate_radps] = rates.each_ref().map(|row| row.0[lane]);
+        TracedStep {
+            state: frame.state(state.each_ref().map(|row| row.0[lane])),
+            command: self.controls[t].each_ref().map(|row| row.0[lane]),
+            speed_mps,
+            yaw_rate_radps,
+            risk: risk.each_ref().map(|row| row.0[lane]),
+            is_under_way: under_way.0[lane] > 0.0,
+        }
     }
 
     /// The controls of one rollout, step by step.

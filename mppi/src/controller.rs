@@ -21,6 +21,7 @@ use crate::recovery::{Mode, Watch};
 use crate::rollout::MAX_SLOTS;
 use crate::sampling::Control;
 use crate::summary::Totals;
+use crate::trace::TraceRows;
 use crate::weights::WeightSummary;
 use bicycle::lanes::Instructions;
 use bicycle::{
@@ -124,9 +125,11 @@ impl<M: Driven, S: StepCost, R: RolloutCost> Controller<M, S, R> {
         let reach_s = config.delay_s + LONGEST_STEPS * config.step_s + stepper.past_s();
         let ledger = Ledger::new(reach_s, config.period_min_s);
         let n_chunks = config.n_rollouts / CHUNK;
+        let n_traced = if R::KEEPS_STEPS { config.n_steps } else { 0 };
+        let chunk = Chunk { trace: vec![TraceRows::ZERO; n_traced], ..Chunk::new(config.n_steps) };
         Ok(Self {
             workers: Workers::new(config.n_threads, n_chunks)?,
-            chunks: vec![Chunk::new(config.n_steps); n_chunks],
+            chunks: vec![chunk; n_chunks],
             n_used: n_chunks,
             plan: Plan::new(&config),
             ranking: Ranking::new(config.n_rollouts),

@@ -7,6 +7,7 @@
 
 use crate::driven::Driven;
 use crate::rollout::Job;
+use crate::trace::Trace;
 use bicycle::lanes::{Lanes, Real};
 use bicycle::{LaneState, MotionState, Rates};
 use std::f64::consts::TAU;
@@ -25,6 +26,18 @@ impl Frame {
     /// A point of the map frame in cells from the corner.
     pub(crate) fn cells(&self, at_m: [f64; 2]) -> [f64; 2] {
         [0, 1].map(|axis| (at_m[axis] - self.corner_m[axis]) / self.cell_m)
+    }
+
+    /// The state of a lane in the map frame: of position in cells, yaw in turns, speed and what turns.
+    pub(crate) fn state(&self, lane: [f32; 5]) -> MotionState {
+        let [x_cells, y_cells, turns, speed_mps, turn] = lane.map(f64::from);
+        MotionState {
+            x_m: self.corner_m[0] + x_cells * self.cell_m,
+            y_m: self.corner_m[1] + y_cells * self.cell_m,
+            yaw_rad: turns * TAU,
+            speed_mps,
+            turn,
+        }
     }
 }
 
@@ -139,6 +152,9 @@ pub trait StepCost: Send + Sync {
     /// Whether there is nothing to pay, ever.
     #[doc(hidden)]
     const IS_NOTHING: bool = false;
+    /// Whether every step of every rollout is kept.
+    #[doc(hidden)]
+    const KEEPS_STEPS: bool = false;
 
     /// Cost of a step [s]. It counts until the goal is reached.
     fn step<L: Lanes>(&self, step: &Step<'_, L>) -> Real<L>;
@@ -200,10 +216,16 @@ pub trait RolloutCost: Send {
     /// Whether there is nothing to pay, ever.
     #[doc(hidden)]
     const IS_NOTHING: bool = false;
+    /// Whether it looks at every step of the rollouts, which are kept for it: that takes time and memory.
+    const KEEPS_STEPS: bool = false;
 
     /// Adds to `added_s` what each of the futures costs more [s]; both have the same length, and the order is the same
     /// for any number of threads. A cost that is not finite leaves the future out. Must not allocate.
     fn add(&self, futures: &[Future], added_s: &mut [f32]);
+
+    /// The same for who looks at every step and says so by [`RolloutCost::KEEPS_STEPS`]; asked after
+    /// [`RolloutCost::add`].
+    fn add_traced(&self, _trace: &Trace<'_>, _added_s: &mut [f32]) {}
 }
 
 /// No cost.
@@ -241,11 +263,18 @@ macro_rules! sum {
         /// The sum.
         impl<$($name: RolloutCost),+> RolloutCost for ($($name,)+) {
             const IS_NOTHING: bool = $($name::IS_NOTHING)&&+;
+            const KEEPS_STEPS: bool = $($name::KEEPS_STEPS)||+;
 
             fn add(&self, futures: &[Future], added_s: &mut [f32]) {
                 #[allow(non_snake_case, reason = "a name for the value as for its type")]
                 let ($($name,)+) = self;
                 $($name.add(futures, added_s);)+
+            }
+
+            fn add_traced(&self, trace: &Trace<'_>, added_s: &mut [f32]) {
+                #[allow(non_snake_case, reason = "a name for the value as for its type")]
+                let ($($name,)+) = self;
+                $($name.add_traced(trace, added_s);)+
             }
         }
     };

@@ -60,6 +60,7 @@ mod replay;
 mod rollout;
 mod sampling;
 mod summary;
+mod trace;
 mod weights;
 
 pub use bicycle::lanes::Isa;
@@ -72,3 +73,4 @@ pub use discs::{Disc, DiscPrices, MovingDiscs, Outline};
 pub use driven::Driven;
 pub use objective::{Input, Objective, ReferencePath, Terminal};
 pub use replay::Rollout;
+pub use trace::{Trace, TracedStep};

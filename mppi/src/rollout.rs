@@ -6,6 +6,7 @@
 
 mod motion;
 mod stage;
+pub(crate) mod together;
 
 use crate::chunk::Chunk;
 use crate::cost::{Frame, Place, Step, StepCost};
@@ -13,6 +14,7 @@ use crate::diagnostics::CostTerm;
 use crate::judgement::TRACTION_LEAST;
 use crate::kernel::{self, CHUNK, Kernel, Row, Work};
 use crate::objective::{ReferenceStep, TerminalField};
+use crate::trace::TraceRows;
 use bicycle::lanes::{Instructions, Real};
 use bicycle::{Extent, GroundSample, LaneState, MotionStepper, Rates};
 use motion::{Bare, Leaving, Motion, Plain, Whole};
@@ -317,9 +319,10 @@ fn roll_packs<K: Kernel, P: MotionStepper, C: StepCost, S: Stage<K>, M: Motion, 
         for (t, controls) in chunk.controls.iter().enumerate() {
             // Written out, because flights that a loop indexes would live in memory instead of registers.
             let fly = Fly { scene, index: &index, stage, controls, t };
-            fly.step::<M>(&mut flights[0], &mut memory[0], first);
+            let mut trace = if C::KEEPS_STEPS { chunk.trace.get_mut(t) } else { None };
+            fly.step::<M>(&mut flights[0], &mut memory[0], first, trace.as_deref_mut());
             if G == 2 {
-                fly.step::<M>(&mut flights[1], &mut memory[1], first + K::WIDTH);
+                fly.step::<M>(&mut flights[1], &mut memory[1], first + K::WIDTH, trace);
             }
         }
         store_costs::<K, P, C, S, M>((scene, stage), flights[0], chunk, first);
@@ -340,14 +343,39 @@ struct Fly<'a, K: Kernel, P, C, S: Stage<K>> {
 
 impl<K: Kernel, P: MotionStepper, C: StepCost, S: Stage<K>> Fly<'_, K, P, C, S> {
     #[inline(always)]
-    fn step<M: Motion>(&self, flight: &mut Flight<K>, memory: &mut Memory<K>, first: usize) {
+    fn step<M: Motion>(
+        &self,
+        flight: &mut Flight<K>,
+        memory: &mut Memory<K>,
+        first: usize,
+        trace: Option<&mut TraceRows>,
+    ) {
         let kernel = flight.state.x.0;
         let command = self.controls.each_ref().map(|row| Real(kernel, kernel.load(row, first)));
-        let (rates, risk) =
-            advance::<K, P, C, M>(self.scene, self.index, &mut flight.state, command, (memory, self.t));
+        let (risk, ground) = look_up::<K, P, C, M>(self.scene, self.index, &flight.state);
+        let rates = M::step(self.scene.stepper, &mut flight.state, command, &ground, (memory, self.t));
+        self.arrive::<M>(flight, command, (rates, risk), first, trace);
+    }
+
+    /// What the step comes to, whose end is where the flight is now.
+    #[inline(always)]
+    fn arrive<M: Motion>(
+        &self,
+        flight: &mut Flight<K>,
+        command: [Real<K>; 2],
+        (rates, risk): (Rates<K>, [Real<K>; 4]),
+        first: usize,
+        trace: Option<&mut TraceRows>,
+    ) {
         watch_attitude::<K, P, C, M>(self.scene, flight, [risk[2], risk[3]]);
         let place = Place { state: flight.state, frame: &self.scene.frame };
-        self.pay::<M>(flight, &Step { t: self.t, place, rates, command, risk });
+        let step = Step { t: self.t, place, rates, command, risk };
+        if C::KEEPS_STEPS
+            && let Some(rows) = trace
+        {
+            keep(&step, flight.under_way, rows, first);
+        }
+        self.pay::<M>(flight, &step);
     }
 
     /// What the step costs, which counts until the goal is reached.
@@ -369,6 +397,24 @@ impl<K: Kernel, P: MotionStepper, C: StepCost, S: Stage<K>> Fly<'_, K, P, C, S> 
     }
 }
 
+/// Keeps a step of a pack for who looks at it later.
+#[inline(always)]
+fn keep<K: Kernel>(step: &Step<'_, K>, under_way: K::Mask, rows: &mut TraceRows, first: usize) {
+    let kernel = step.lanes();
+    let LaneState { x, y, turns, speed, steering } = step.place.state;
+    for (row, value) in rows.state.iter_mut().zip([x, y, turns, speed, steering]) {
+        kernel.store(row, first, value.1);
+    }
+    for (row, value) in rows.rates.iter_mut().zip([step.rates.speed, step.rates.yaw_rate]) {
+        kernel.store(row, first, value.1);
+    }
+    for (row, value) in rows.risk.iter_mut().zip(step.risk) {
+        kernel.store(row, first, value.1);
+    }
+    let counts = kernel.real(0.0).add_where(under_way, kernel.real(1.0));
+    kernel.store(&mut rows.under_way, first, counts.1);
+}
+
 /// Every rollout starts with the same memory.
 #[inline(always)]
 fn recall<K: Kernel>(kernel: K, slots: &[f32], memory: &mut Memory<K>) {
@@ -377,16 +423,14 @@ fn recall<K: Kernel>(kernel: K, slots: &[f32], memory: &mut Memory<K>) {
     }
 }
 
-/// One step of the model over the ground where a pack stands: what moved it, and the risk that it met.
+/// The risk where a pack stands, and the ground that its next step drives on.
 #[inline(always)]
-fn advance<K: Kernel, P: MotionStepper, C, M: Motion>(
+fn look_up<K: Kernel, P: MotionStepper, C, M: Motion>(
     scene: &Scene<'_, P, C>,
     index: &Index<K>,
-    state: &mut LaneState<K>,
-    command: [Real<K>; 2],
-    memory: (&mut Memory<K>, usize),
-) -> (Rates<K>, [Real<K>; 4]) {
-    let kernel = command[0].0;
+    state: &LaneState<K>,
+) -> ([Real<K>; 4], GroundSample<Real<K>>) {
+    let kernel = state.x.0;
     let cell = index.cell(state);
     let risk = kernel.risks(scene.grid.risks, index.risk(cell, state.turns)).map(|value| Real(kernel, value));
     let least = kernel.real_single(TRACTION_LEAST);
@@ -398,7 +442,7 @@ fn advance<K: Kernel, P: MotionStepper, C, M: Motion>(
         let [east, north, class] = kernel.grounds(scene.grid.ground, cell).map(|value| Real(kernel, value));
         (ground.gradient, ground.class) = ([east, north], class);
     }
-    (M::step(scene.stepper, state, command, &ground, memory), risk)
+    (risk, ground)
 }
 
 /// Counts the poses beyond a limit. A vehicle that stands beyond one may leave: its first poses break a limit only where

@@ -6,7 +6,7 @@ mod fixture;
 use bicycle::lanes::{Lanes, Real};
 use bicycle::{Command, Decision, GroundSample, Model, MotionState, State, Stepper};
 use fixture::{STEP_S, goal, level, model, rough};
-use mppi::{Config, Controller, CostTerm, Future, Input, Isa, RolloutCost, Step, StepCost};
+use mppi::{Config, Controller, CostTerm, Future, Input, Isa, RolloutCost, Step, StepCost, Trace};
 use traversability::RiskMap;
 
 /// The same for every step.
@@ -182,4 +182,99 @@ fn a_cost_that_is_no_number_leaves_the_rollout_out() {
     let mut controller = controller(((), Broken));
     assert!(matches!(controller.decide(&input(&map, 0)), Decision::Drive(_)));
     assert_eq!(controller.diagnostics().n_non_finite, 100);
+}
+
+/// Lateral acceleration and reverse as the controller prices them, but over the steps that it kept, and a price for what
+/// is asked for.
+struct Retold {
+    lateral_max_mps2: f32,
+    lateral_s: f32,
+    reverse_s: f32,
+}
+
+impl RolloutCost for Retold {
+    const KEEPS_STEPS: bool = true;
+
+    fn add(&self, _: &[Future], _: &mut [f32]) {}
+
+    fn add_traced(&self, trace: &Trace<'_>, added_s: &mut [f32]) {
+        assert_eq!((trace.n_rollouts(), trace.n_steps()), (1024, 50));
+        assert!(trace.step(1024, 0).is_none() && trace.step(0, 50).is_none());
+        for (rollout, added_s) in added_s.iter_mut().enumerate() {
+            for step in (0..trace.n_steps()).filter_map(|t| trace.step(rollout, t)) {
+                let is_sideways = (step.speed_mps * step.yaw_rate_radps).abs() > self.lateral_max_mps2;
+                let lateral_s = if is_sideways { self.lateral_s } else { 0.0 };
+                let reverse_s = if step.speed_mps < 0.0 { self.reverse_s } else { 0.0 };
+                *added_s += if step.is_under_way { lateral_s + reverse_s } else { 0.0 };
+            }
+        }
+    }
+}
+
+/// A term of the controller's own and its copy over the kept steps come to the same, on every instruction set, and the
+/// rollouts that are kept are those of the controller that keeps none.
+#[test]
+fn a_copy_of_a_term_over_the_steps_that_were_kept_costs_the_same() {
+    let map = rough(3);
+    let own = mppi::Costs { lateral_s: 0.7, reverse_s: 0.4, ..Config::default().costs };
+    let none = mppi::Costs { lateral_s: 0.0, reverse_s: 0.0, ..own };
+    let mut limits = model().limits;
+    (limits.reverse_speed_max_mps, limits.lateral_acceleration_max_mps2) = (1.0, 0.3);
+    let model = Model { limits, ..model() };
+    for isa in [Isa::Portable, Isa::Avx2, Isa::Avx512] {
+        let config = |costs| Config { isa, costs, ..Config::default() };
+        let Ok(mut compiled) = Controller::new(config(own), model.clone(), 3) else { continue };
+        let retold = Retold { lateral_max_mps2: 0.3, lateral_s: 0.7, reverse_s: 0.4 };
+        let mut kept = Controller::with_costs(config(none), model.clone(), ((), retold), 3).unwrap();
+        for cycle in 0..3 {
+            let (decided, expected) =
+                (kept.decide(&input(&map, cycle)), compiled.decide(&input(&map, cycle)));
+            let (Decision::Drive(decided), Decision::Drive(expected)) = (decided, expected) else { panic!() };
+            assert!(
+                (decided.speed_mps - expected.speed_mps).abs() < 1e-4,
+                "{isa:?} {decided:?} {expected:?}"
+            );
+            assert!((decided.steering_rad - expected.steering_rad).abs() < 1e-4, "{decided:?} {expected:?}");
+            let terms = compiled.diagnostics().mean_terms_s;
+            let paid_s = [CostTerm::Lateral, CostTerm::Reverse].map(|term| terms[term as usize]);
+            assert!(paid_s.iter().all(|paid_s| *paid_s > 0.01), "there is something to pay: {paid_s:?}");
+            let expected_s: f32 = paid_s.iter().sum();
+            let found_s = added_s(&kept);
+            assert!((found_s - expected_s).abs() < 1e-4 * expected_s, "{isa:?} {found_s} {expected_s}");
+        }
+    }
+}
+
+/// What is kept of a step is where it ends, in the map frame, and the last one is the end that is told.
+#[test]
+fn kept_steps_lead_from_the_start_to_the_end() {
+    struct Recorded(std::sync::Mutex<Vec<(MotionState, Vec<MotionState>, MotionState)>>);
+    impl RolloutCost for Recorded {
+        const KEEPS_STEPS: bool = true;
+        fn add(&self, futures: &[Future], _: &mut [f32]) {
+            let ends = futures.iter().map(|future| (MotionState::default(), Vec::new(), future.end));
+            *self.0.lock().unwrap() = ends.collect();
+        }
+        fn add_traced(&self, trace: &Trace<'_>, _: &mut [f32]) {
+            for (rollout, (start, steps, _)) in self.0.lock().unwrap().iter_mut().enumerate() {
+                *start = trace.start();
+                *steps = (0..50).map(|t| trace.step(rollout, t).unwrap().state).collect();
+            }
+        }
+    }
+    let map = level();
+    let mut controller = controller(((), Recorded(std::sync::Mutex::default())));
+    let state = State { x_m: 1.0, y_m: -2.0, yaw_rad: 0.4, speed_mps: 1.0, ..State::default() };
+    controller.decide(&Input { state, ..input(&map, 0) });
+    let kept = controller.rollout_cost_mut().0.lock().unwrap().clone();
+    assert_eq!(kept.len(), 1024);
+    for (start, steps, end) in kept {
+        assert_eq!((start.x_m, start.y_m, start.yaw_rad), (1.0, -2.0, 0.4));
+        assert_eq!(*steps.last().unwrap(), end);
+        let ways_m = std::iter::once(&start)
+            .chain(&steps)
+            .zip(&steps)
+            .map(|(from, to)| (to.x_m - from.x_m).hypot(to.y_m - from.y_m));
+        assert!(ways_m.fold(0.0, f64::max) < 2.0 * STEP_S + 1e-3);
+    }
 }

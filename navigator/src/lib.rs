@@ -50,5 +50,5 @@ pub use pilot::{Destination, Pilot, PilotAges};
 pub use risk::{Belief, RiskOracle, StuckPose};
 pub use risk_estimator::RiskEstimator;
 pub use route::{CORNERS_MAX, Route, RouteError};
-pub use surveyor::{ScanTally, Surveyor};
+pub use surveyor::{ScanTally, Surveyor, assumed_ground};
 pub use track::Whereabouts;

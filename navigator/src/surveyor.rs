@@ -363,7 +363,8 @@ impl Surveyor {
     }
 }
 
-fn assumed_ground(geometry: &Geometry) -> AssumedGround {
+/// Level ground below a vehicle that has seen nothing yet.
+pub fn assumed_ground(geometry: &Geometry) -> AssumedGround {
     // A quarter of the length more on every side: the blind zone of a roof sensor reaches beyond the bumpers.
     let margin_m = 0.25 * geometry.length_m;
     AssumedGround {

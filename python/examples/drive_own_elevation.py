@@ -14,13 +14,14 @@ matplotlib.use("agg")
 import matplotlib.pyplot as plt
 import numpy as np
 import surefoot
+from numpy.typing import NDArray
 
 RESOLUTION_M = 0.25
 START_M, GOAL_M = (6.0, 6.0), (44.0, 33.0)
 CYCLE_S = 0.1
 
 
-def hills(n_rows=160, n_cols=200, seed=3):
+def hills(n_rows: int = 160, n_cols: int = 200, seed: int = 3) -> NDArray[np.float32]:
     """Rolling ground [m] with a ridge across the straight line, which is steep but for its southern end, and some rocks."""
     rng = np.random.default_rng(seed)
     x_m, y_m = np.meshgrid((np.arange(n_cols) + 0.5) * RESOLUTION_M, (np.arange(n_rows) + 0.5) * RESOLUTION_M)
@@ -31,10 +32,16 @@ def hills(n_rows=160, n_cols=200, seed=3):
         rock_m = rng.uniform([2.0, 2.0], [48.0, 38.0])
         if min(np.hypot(*(rock_m - START_M)), np.hypot(*(rock_m - GOAL_M))) > 4.0:
             height_m += 0.6 * np.exp(-(((x_m - rock_m[0]) ** 2 + (y_m - rock_m[1]) ** 2) / 0.5**2))
-    return height_m.astype(np.float32)
+    return np.asarray(height_m, np.float32)
 
 
-def drive(state, command, traction, limits, wheelbase_m):
+def drive(
+    state: NDArray[np.float64],
+    command: tuple[float, float],
+    traction: float,
+    limits: dict[str, float],
+    wheelbase_m: float,
+) -> NDArray[np.float64]:
     """The state a cycle later, in steps of a hundredth of a second."""
     x_m, y_m, yaw_rad, speed_mps, steering_rad = state
     step_s = 0.01
@@ -49,7 +56,7 @@ def drive(state, command, traction, limits, wheelbase_m):
     return np.array([x_m, y_m, yaw_rad, speed_mps, steering_rad])
 
 
-def main(picture):
+def main(picture: str) -> None:
     vehicle = surefoot.Vehicle("pietra_full_size")
     model = vehicle.model()
     settings = surefoot.settings_for(vehicle)
@@ -74,14 +81,20 @@ def main(picture):
         traction = 0.9 * risk_map.risk_at(state[:3])[0]
         state = drive(state, decision.command, traction, description["limits"], description["wheelbase_m"])
         way.append(state)
-    way = np.array(way)
-    length_m = np.hypot(*np.diff(way[:, :2], axis=0).T).sum()
+    driven = np.array(way)
+    length_m = np.hypot(*np.diff(driven[:, :2], axis=0).T).sum()
     print(f"{decision.reason or decision.kind} after {len(way) * CYCLE_S:.0f} s and {length_m:.1f} m")
-    draw(picture, height_m, risk_map, way, futures)
+    draw(picture, height_m, risk_map, driven, futures)
     assert decision.reason == "at_goal"
 
 
-def draw(picture, height_m, risk_map, way, futures):
+def draw(
+    picture: str,
+    height_m: NDArray[np.float32],
+    risk_map: surefoot.RiskMap,
+    way: NDArray[np.float64],
+    futures: list[NDArray[np.float64]],
+) -> None:
     extent = (0.0, height_m.shape[1] * RESOLUTION_M, 0.0, height_m.shape[0] * RESOLUTION_M)
     figure, axes = plt.subplots(1, 2, figsize=(13, 5.2), sharey=True, layout="constrained")
     traction = risk_map.risks[:, :, :, 0].mean(axis=2)

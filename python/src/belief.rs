@@ -67,7 +67,7 @@ impl PhysicsPrior {
 #[pyclass(frozen, module = "surefoot")]
 pub struct Evidential {
     judge: Judge,
-    method: Method,
+    checkpoint: Arc<Checkpoint>,
 }
 
 #[pymethods]
@@ -113,7 +113,7 @@ impl Evidential {
     /// How the networks were trained.
     #[getter]
     fn method(&self) -> &'static str {
-        self.method.name()
+        self.checkpoint.sidecar.method.name()
     }
 
     /// The risk map of the ground, as `PhysicsPrior.judge`. Cells unlike the training data have flag 4.
@@ -128,7 +128,7 @@ impl Evidential {
     }
 
     fn __repr__(&self) -> String {
-        format!("<surefoot.Evidential {}>", self.method.name())
+        format!("<surefoot.Evidential {}>", self.checkpoint.sidecar.method.name())
     }
 }
 
@@ -146,10 +146,15 @@ impl Evidential {
             other => return Err(refused("unfamiliar", "\"fuse\" or \"avoid\"", format!("{other:?}"))),
         };
         let config = config(vehicle, settings)?;
-        let (method, obstacle_margin_m) = (checkpoint.sidecar.method, config.prior.obstacle_margin_m);
-        let learned = Learned { checkpoint: Arc::new(checkpoint), unfamiliar, obstacle_margin_m, level };
+        let (checkpoint, obstacle_margin_m) = (Arc::new(checkpoint), config.prior.obstacle_margin_m);
+        let learned = Learned { checkpoint: Arc::clone(&checkpoint), unfamiliar, obstacle_margin_m, level };
         let judge = Judge::new(vehicle, config, Belief::Learned(learned))?;
-        Ok(Self { judge, method })
+        Ok(Self { judge, checkpoint })
+    }
+
+    /// The networks.
+    pub fn checkpoint(&self) -> &Checkpoint {
+        &self.checkpoint
     }
 }
 

@@ -1,7 +1,7 @@
 //! The controller.
 
-use bicycle::{Decision as Decided, MotionCommand, MotionLimits, MotionModel, SkidSteerCommand};
-use mppi::{Config, Controller, Objective, ReferencePath, Terminal};
+use bicycle::Decision as Decided;
+use mppi::{Config, Objective, ReferencePath, Terminal};
 use numpy::ndarray::Ix2;
 use numpy::{PyArray1, PyArray2, PyArray3, PyUntypedArrayMethods};
 use pyo3::exceptions::PyRuntimeError;
@@ -9,79 +9,34 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use toml::Value;
 
+use crate::any_model::AnyModel;
 use crate::arrays::{array, kind, numbers, owned, require_shape, values};
 use crate::cost_to_go::CostToGo;
 use crate::detached::{BrokenOff, Turns, detached, forked, n_forks};
 use crate::failure::{refused, refused_controller, refused_type};
-use crate::model::{Model, SkidSteerModel};
 use crate::planner::{Cycle, N_STATE, Outcome, Planner};
+use crate::plug_in::{Called, is_within};
 use crate::risk_map::RiskMap;
 use crate::settings::{Source, dict};
 
-/// A model, however its vehicle is steered.
-pub enum AnyModel {
-    /// By its front wheels.
-    Steered(Model),
-    /// By its sides.
-    SkidSteered(SkidSteerModel),
-}
-
-impl<'py> FromPyObject<'_, 'py> for AnyModel {
-    type Error = PyErr;
-
-    fn extract(found: Borrowed<'_, 'py, PyAny>) -> PyResult<Self> {
-        if let Ok(model) = found.cast::<Model>() {
-            return Ok(Self::Steered(model.get().clone()));
-        }
-        let model = found.cast::<SkidSteerModel>();
-        let model = model.map_err(|_| refused_type("model", "a Model or a SkidSteerModel", kind(&found)))?;
-        Ok(Self::SkidSteered(model.get().clone()))
-    }
-}
-
-impl AnyModel {
-    /// What its vehicle can or may do.
-    pub fn limits(&self) -> MotionLimits {
-        match self {
-            Self::Steered(model) => model.0.motion_limits(),
-            Self::SkidSteered(model) => model.0.motion_limits(),
-        }
-    }
-
-    fn planner(self, config: Config, seed: u64) -> Result<Box<dyn Planner>, mppi::ConfigError> {
-        Ok(match self {
-            Self::Steered(model) => Box::new(Controller::new(config, model.0, seed)?),
-            Self::SkidSteered(model) => Box::new(Controller::new(config, model.0, seed)?),
-        })
-    }
-
-    fn turn_name(&self) -> &'static str {
-        match self {
-            Self::Steered(_) => "steering_rad",
-            Self::SkidSteered(_) => "yaw_rate_radps",
-        }
-    }
-
-    /// What is told to stand still who was told `last` before.
-    fn at_standstill(&self) -> fn([f32; 2]) -> [f32; 2] {
-        match self {
-            Self::Steered(_) => |last| bicycle::Command::from(last).at_standstill().into(),
-            Self::SkidSteered(_) => |last| SkidSteerCommand::from(last).at_standstill().into(),
-        }
-    }
-}
-
 /// Model predictive path integral control over a risk map (Williams et al. 2017).
 ///
-/// Mppi(model, settings=None, *, seed=1). model: `Model` or `SkidSteerModel`. settings: a dict, TOML text or a path with what
-/// differs from the defaults, as the part "controller" of `settings_for(vehicle)`. A decision is a function of the calls
-/// before it, settings and seed, bit for bit, for any number of threads. Threads of Python take turns. Raises `ValueError`
-/// for a setting out of range, with its name, range and value.
+/// Mppi(model, settings=None, *, seed=1, cost=None). model: `Model`, `SkidSteerModel` or `PythonModel`. settings: a dict, TOML
+/// text or a path with what differs from the defaults, as the part "controller" of `settings_for(vehicle)`. A decision is a
+/// function of the calls before it, settings and seed, bit for bit, for any number of threads. Threads of Python take turns.
+/// Raises `ValueError` for a setting out of range, with its name, range and value.
+///
+/// cost: a function of your own, for trying out, called once per update with all `SampledRollouts`; it returns what they cost
+/// more [s], float32 or float64 (rollout, step), of which the steps before the goal count, or (rollout,). Infinity is for
+/// what may not be; NaN, another shape and what the function raises come out of `decide`, whose plan then goes without.
+/// It must not call a controller.
 #[pyclass(frozen, module = "surefoot")]
 pub struct Mppi {
     run: Turns<Run>,
     config: Config,
     state_names: [&'static str; N_STATE],
+    /// What of Python's it calls.
+    called: Vec<Called>,
     born: u64,
 }
 
@@ -98,22 +53,30 @@ struct Run {
 #[pymethods]
 impl Mppi {
     #[new]
-    #[pyo3(signature = (model, settings=None, *, seed=1))]
+    #[pyo3(signature = (model, settings=None, *, seed=1, cost=None))]
     fn new(
         py: Python<'_>,
         model: AnyModel,
         settings: Option<&Bound<'_, PyAny>>,
         seed: u64,
+        cost: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
+        if let Some(cost) = cost.filter(|cost| !cost.is_callable()) {
+            return Err(refused_type("cost", "a function of rollouts", kind(cost)));
+        }
+        let cost = cost.map(|cost| Called::new(cost.clone().unbind()));
+        let called: Vec<Called> = cost.iter().cloned().chain(model.called()).collect();
         let config: Config = match settings {
             Some(settings) => Source::new("settings", settings)?.parse(formats::ConfigText::parse)?,
             None => Config::default(),
         };
         let state_names = ["x_m", "y_m", "yaw_rad", "speed_mps", model.turn_name()];
         let at_standstill = model.at_standstill();
-        let planner = detached(py, || model.planner(config.clone(), seed))?.map_err(refused_controller)?;
+        let planner =
+            detached(py, || model.planner(config.clone(), cost, seed))?.map_err(refused_controller)?;
+        require_no_fault(&called)?;
         let run = Run { planner: Some(planner), at_standstill, told: [0.0; 2], cycle: 0, has_sampled: false };
-        Ok(Self { run: Turns::new(run), config, state_names, born: n_forks() })
+        Ok(Self { run: Turns::new(run), config, state_names, called, born: n_forks() })
     }
 
     /// Decides what to do now to reach a point.
@@ -275,11 +238,17 @@ impl Mppi {
         if self.has_lost_threads() {
             return Err(forked("Mppi"));
         }
+        if is_within() {
+            return Err(PyRuntimeError::new_err(
+                "Mppi: expected a cost and a model that call no controller, found one that does",
+            ));
+        }
         let result = self.run.take(py, |run| {
             let Run { planner, at_standstill, told, cycle, has_sampled } = run;
             let rest = Rest { at_standstill: *at_standstill, told, cycle, has_sampled };
             planner.as_mut().map(|planner| work(&mut **planner, rest))
         })?;
+        require_no_fault(&self.called)?;
         result.ok_or_else(|| forked("Mppi"))
     }
 
@@ -343,6 +312,13 @@ impl Drop for Mppi {
             std::mem::forget(planner);
         }
     }
+}
+
+/// Raises what went wrong in Python first.
+fn require_no_fault(called: &[Called]) -> PyResult<()> {
+    // All are asked, so that none keeps a fault for later.
+    let faults: Vec<PyErr> = called.iter().filter_map(Called::fault).collect();
+    faults.into_iter().next().map_or(Ok(()), Err)
 }
 
 /// What came out of a cycle.

@@ -4,8 +4,8 @@ use mppi::CostToGoConfig;
 use numpy::PyArray2;
 use pyo3::prelude::*;
 
+use crate::any_model::AnyModel;
 use crate::arrays::{numbers, owned};
-use crate::controller::AnyModel;
 use crate::detached::Turns;
 use crate::failure::refused_value;
 use crate::ground::grid;

@@ -3,7 +3,10 @@
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::sync::{Arc, Mutex, PoisonError};
+use std::thread::Builder;
+use std::time::Duration;
 
 use pyo3::exceptions::{PyOSError, PyRuntimeError};
 use pyo3::{PyErr, PyResult, Python, pyfunction};
@@ -13,6 +16,8 @@ use crate::failure::Defect;
 
 /// How often this process was forked: threads that were started before belong to its parent.
 static N_FORKS: AtomicU64 = AtomicU64::new(0);
+/// Messages of a recording between two looks for a signal: some milliseconds.
+const LOOKS_BETWEEN: u32 = 256;
 /// The threads that maps are made by, and the number of forks before them.
 static POOL: Mutex<Option<(u64, Arc<ThreadPool>)>> = Mutex::new(None);
 
@@ -62,6 +67,86 @@ impl From<BrokenOff> for PyErr {
 /// A panic, as [`Defect`].
 pub fn detached<R: Send>(py: Python<'_>, work: impl FnOnce() -> R + Send) -> PyResult<R> {
     py.detach(|| catch_unwind(AssertUnwindSafe(work))).map_err(|panic| defect(said(&*panic)))
+}
+
+/// Looks, now and then, whether Python has a signal to handle, in work that has let go of its lock.
+#[derive(Default)]
+pub struct Interrupts {
+    n_looks: u32,
+    raised: Option<PyErr>,
+}
+
+impl Interrupts {
+    /// Looks every so many calls between which not even a person notices time to pass.
+    ///
+    /// # Errors
+    /// A signal whose handler raised, Ctrl-C above all: the work is to end.
+    pub fn look(&mut self) -> Result<(), String> {
+        self.n_looks = self.n_looks.wrapping_add(1);
+        if self.n_looks.is_multiple_of(LOOKS_BETWEEN) { self.look_now() } else { Ok(()) }
+    }
+
+    /// The same at once.
+    ///
+    /// # Errors
+    /// Those of [`Interrupts::look`].
+    pub fn look_now(&mut self) -> Result<(), String> {
+        match Python::attach(|py| py.check_signals()) {
+            Ok(()) => Ok(()),
+            Err(error) => {
+                self.raised = Some(error);
+                Err("interrupted".to_owned())
+            }
+        }
+    }
+
+    /// Raises what a handler raised.
+    ///
+    /// # Errors
+    /// That.
+    pub fn raise(self) -> PyResult<()> {
+        self.raised.map_or(Ok(()), Err)
+    }
+}
+
+/// What a thread found, or how it panicked.
+pub type Outcome<R> = Result<R, Box<dyn Any + Send>>;
+
+/// Time between two looks for a signal while a thread works.
+const PATIENCE: Duration = Duration::from_millis(50);
+
+/// Does long `work` in a thread of its own, so that Ctrl-C is heard meanwhile: work that nobody waits for any more ends by
+/// itself, and what it found is lost.
+///
+/// # Errors
+/// What a handler of a signal raised; a panic, as [`Defect`]; an `OSError` where the system refuses a thread.
+pub fn interruptible<R: Send + 'static>(
+    py: Python<'_>,
+    work: impl FnOnce() -> R + Send + 'static,
+) -> PyResult<R> {
+    let (sender, receiver) = channel();
+    let spawned = Builder::new().spawn(move || drop(sender.send(catch_unwind(AssertUnwindSafe(work)))));
+    spawned.map_err(|error| PyOSError::new_err(error.to_string()))?;
+    interruptible_answer(py, receiver)
+}
+
+/// Waits for what a thread finds, or how it panicked, and hears Ctrl-C meanwhile.
+///
+/// # Errors
+/// What a handler of a signal raised; a panic, as [`Defect`].
+pub fn interruptible_answer<R: Send>(py: Python<'_>, mut answer: Receiver<Outcome<R>>) -> PyResult<R> {
+    loop {
+        let (waiting, heard) = py.detach(move || {
+            let heard = answer.recv_timeout(PATIENCE);
+            (answer, heard)
+        });
+        answer = waiting;
+        match heard {
+            Ok(found) => return found.map_err(|panic| defect(said(&*panic))),
+            Err(RecvTimeoutError::Timeout) => py.check_signals()?,
+            Err(RecvTimeoutError::Disconnected) => return Err(defect("a thread that ended without a word")),
+        }
+    }
 }
 
 /// The threads of this process, in which all parallel work is to be installed.

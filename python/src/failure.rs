@@ -1,9 +1,10 @@
 //! Errors as Python's exceptions.
 
 use std::fmt::Display;
-use std::io::ErrorKind;
+use std::io::{self, ErrorKind};
+use std::path::Path;
 
-use formats::ConfigError;
+use formats::{ConfigError, ElevationError};
 use pyo3::PyErr;
 use pyo3::exceptions::{
     PyFileNotFoundError, PyOSError, PyPermissionError, PyRuntimeError, PyTypeError, PyValueError,
@@ -35,13 +36,34 @@ pub fn refused_type(argument: &str, expected: impl Display, found: impl Display)
 pub fn refused_config(error: ConfigError) -> PyErr {
     let text = error.to_string();
     match error {
-        ConfigError::Unreadable { source, .. } => match source.kind() {
-            ErrorKind::NotFound => PyFileNotFoundError::new_err(text),
-            ErrorKind::PermissionDenied => PyPermissionError::new_err(text),
-            ErrorKind::InvalidData => PyValueError::new_err(text),
-            _ => PyOSError::new_err(text),
-        },
+        ConfigError::Unreadable { source, .. } => refused_by_system(source.kind(), text),
         _ => PyValueError::new_err(text),
+    }
+}
+
+/// An elevation file that cannot be used: what the file system said is an `OSError`, all else a `ValueError`.
+pub fn refused_elevation(error: ElevationError) -> PyErr {
+    let text = error.to_string();
+    let said = std::error::Error::source(&error).and_then(|source| source.downcast_ref::<std::io::Error>());
+    match said.map(std::io::Error::kind) {
+        Some(kind) => refused_by_system(kind, text),
+        None => PyValueError::new_err(text),
+    }
+}
+
+/// A file that the system does not give.
+pub fn refused_file(path: &Path, error: &io::Error) -> PyErr {
+    let text = format!("{}: expected a readable file, found: {error}", path.display());
+    refused_by_system(error.kind(), text)
+}
+
+/// What the file system said.
+pub fn refused_by_system(kind: ErrorKind, text: String) -> PyErr {
+    match kind {
+        ErrorKind::NotFound => PyFileNotFoundError::new_err(text),
+        ErrorKind::PermissionDenied => PyPermissionError::new_err(text),
+        ErrorKind::InvalidData => PyValueError::new_err(text),
+        _ => PyOSError::new_err(text),
     }
 }
 

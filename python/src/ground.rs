@@ -3,7 +3,8 @@
 use numpy::ndarray::{Ix2, Ix3};
 use numpy::{PyArray2, PyArray3, PyUntypedArrayMethods};
 use pyo3::prelude::*;
-use terrain::{GridGeometry, GridMap, LATTICE_MAX, SurfaceCell, TerrainClass};
+use pyo3::types::PyDict;
+use terrain::{GridGeometry, GridMap, Knowledge, LATTICE_MAX, SurfaceCell, TerrainClass};
 
 use crate::arrays::{array, optional, owned, require_shape, values};
 use crate::failure::refused;
@@ -28,11 +29,13 @@ impl Surface {
     ///
     /// height_m: float32 (row, col), NaN where nothing is known. resolution_m: edge of a cell [m]. origin: lattice index
     /// (col, row) of the south-west cell, whose south-west corner lies at origin * resolution_m. terrain_class: uint8
-    /// (row, col), 0 open, 1 loose, 2 vegetation, 3 obstacle. vegetation_height_m: float32 (row, col), height of soft plants
-    /// above the ground [m]. height_variance_m2: float32 (row, col). Cells are interleaved, so each array is copied.
-    /// Raises `TypeError` for another type of number, `ValueError` for another shape and for values that no ground has.
+    /// (row, col), 0 open, 1 loose, 2 vegetation, 3 obstacle; or class_probability: float32 (row, col, class), which sums to
+    /// one where the ground is known. vegetation_height_m: float32 (row, col), height of soft plants above the ground [m].
+    /// height_variance_m2: float32 (row, col). knowledge: uint8 (row, col), 1 where a height was filled in between measured
+    /// ones, else 2, and 0 where nothing is known. Cells are interleaved, so each array is copied. Raises `TypeError` for another type of number, `ValueError` for another shape and for values that no ground has.
     #[staticmethod]
-    #[pyo3(signature = (height_m, resolution_m, *, origin=(0, 0), terrain_class=None, vegetation_height_m=None, height_variance_m2=None))]
+    #[pyo3(signature = (height_m, resolution_m, *, origin=(0, 0), terrain_class=None, vegetation_height_m=None, height_variance_m2=None, class_probability=None, knowledge=None))]
+    #[expect(clippy::too_many_arguments, reason = "keywords in Python")]
     fn from_arrays(
         height_m: &Bound<'_, PyAny>,
         resolution_m: f64,
@@ -40,6 +43,8 @@ impl Surface {
         terrain_class: Option<&Bound<'_, PyAny>>,
         vegetation_height_m: Option<&Bound<'_, PyAny>>,
         height_variance_m2: Option<&Bound<'_, PyAny>>,
+        class_probability: Option<&Bound<'_, PyAny>>,
+        knowledge: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
         let height = array::<f32, Ix2>("height_m", height_m, "row, col")?;
         let &[n_rows, n_cols] = height.shape() else { return Err(refused("height_m", "two axes", "others")) };
@@ -64,8 +69,17 @@ impl Surface {
                 cell.class_probability[usize::from(class)] = 1.0;
             });
         }
+        if let Some(class_probability) = class_probability {
+            if terrain_class.is_some() {
+                return Err(refused("class_probability", "no terrain_class beside it", "both"));
+            }
+            set_probabilities(&mut cells, class_probability, geometry)?;
+        }
         for (index, cell) in cells.iter_mut().enumerate() {
             *cell = checked(*cell, geometry, index)?;
+        }
+        if let Some(knowledge) = self::layer::<u8>("knowledge", knowledge, [n_rows, n_cols])? {
+            set_knowledge(&mut cells, &knowledge, n_cols)?;
         }
         let surface = GridMap::from_values(geometry, cells);
         surface.map(Self).ok_or_else(|| refused("height_m", "one value for every cell", "others"))
@@ -128,6 +142,20 @@ impl Surface {
         self.cells(py, |cell| cell.knowledge as u8)
     }
 
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<Pickled<'py>> {
+        let layers = PyDict::new(py);
+        layers.set_item("origin", self.origin())?;
+        layers.set_item("vegetation_height_m", self.vegetation_height_m(py)?)?;
+        // Unknown ground varies without bounds; what is said of it counts for nothing.
+        let variance_m2 =
+            |cell: &SurfaceCell| Some(cell.height_variance_m2).filter(|value| value.is_finite());
+        layers.set_item("height_variance_m2", self.cells(py, |cell| variance_m2(cell).unwrap_or(0.0))?)?;
+        layers.set_item("class_probability", self.class_probability(py)?)?;
+        layers.set_item("knowledge", self.knowledge(py)?)?;
+        let make = with_keywords(&py.get_type::<Self>().getattr("from_arrays")?, &layers)?;
+        Ok((make, (self.height_m(py)?.into_any(), self.resolution_m())))
+    }
+
     fn __repr__(&self) -> String {
         let (n_rows, n_cols) = self.shape();
         format!("<surefoot.Surface of {n_rows} x {n_cols} cells of {} m>", self.resolution_m())
@@ -143,6 +171,17 @@ impl Surface {
         let (n_rows, n_cols) = self.shape();
         owned(py, self.0.values().iter().map(of).collect(), [n_rows, n_cols])
     }
+}
+
+/// How a map is made again: a function, what it is mostly made of, and the edge of a cell [m].
+pub type Pickled<'py> = (Bound<'py, PyAny>, (Bound<'py, PyAny>, f64));
+
+/// A function of Python's with these keywords, which can be pickled.
+pub fn with_keywords<'py>(
+    function: &Bound<'py, PyAny>,
+    keywords: &Bound<'py, PyDict>,
+) -> PyResult<Bound<'py, PyAny>> {
+    function.py().import("functools")?.getattr("partial")?.call((function,), Some(keywords))
 }
 
 /// A grid of at least 3 x 3 cells on the lattice, refused where cells cannot be counted.
@@ -197,6 +236,47 @@ pub fn pairs(
     let Some(pairs) = optional::<f32, Ix3>(argument, found, "row, col, 2")? else { return Ok(None) };
     require_shape(argument, pairs.shape(), &[n_rows, n_cols, 2])?;
     Ok(Some(values(argument, &pairs)?.as_chunks().0.to_vec()))
+}
+
+/// Probabilities that sum to one, or to none at all where nothing was seen.
+fn set_probabilities(
+    cells: &mut [SurfaceCell],
+    found: &Bound<'_, PyAny>,
+    geometry: GridGeometry,
+) -> PyResult<()> {
+    let probabilities = array::<f32, Ix3>("class_probability", found, "row, col, class")?;
+    let shape = [geometry.n_rows, geometry.n_cols, TerrainClass::COUNT];
+    require_shape("class_probability", probabilities.shape(), &shape)?;
+    let rows = values("class_probability", &probabilities)?.as_chunks().0;
+    for (index, (cell, row)) in cells.iter_mut().zip(rows).enumerate() {
+        let sum: f32 = row.iter().sum();
+        let is_of_one = row.iter().all(|share| *share >= 0.0) && (sum - 1.0).abs() < 1e-3;
+        let is_unseen = cell.height_m.is_nan() && *row == [0.0; TerrainClass::COUNT];
+        if !(is_of_one || is_unseen) {
+            let terrain::Cell { row: r, col } = geometry.cell(index);
+            let expected = "probabilities that sum to one";
+            return Err(refused(&format!("class_probability[{r}, {col}]"), expected, format!("{row:?}")));
+        }
+        cell.class_probability = *row;
+    }
+    Ok(())
+}
+
+/// How heights came to be known; none where there is none.
+fn set_knowledge(cells: &mut [SurfaceCell], values: &[u8], n_cols: usize) -> PyResult<()> {
+    for (index, (cell, value)) in cells.iter_mut().zip(values).enumerate() {
+        cell.knowledge = match (value, cell.height_m.is_nan()) {
+            (0, true) => Knowledge::Unknown,
+            (1, false) => Knowledge::Interpolated,
+            (2, false) => Knowledge::Measured,
+            (_, is_unknown) => {
+                let expected = if is_unknown { "0 where no height is known" } else { "1 or 2 where one is" };
+                let place = format!("knowledge[{}, {}]", index / n_cols, index % n_cols);
+                return Err(refused(&place, expected, value));
+            }
+        };
+    }
+    Ok(())
 }
 
 fn set<T: Copy>(cells: &mut [SurfaceCell], values: &[T], write: impl Fn(&mut SurfaceCell, T)) {

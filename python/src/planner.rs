@@ -1,7 +1,7 @@
 //! The controller of whatever model, in numbers that all models share.
 
 use bicycle::{Decision, MotionState};
-use mppi::{Controller, Diagnostics, Driven, Input, Objective};
+use mppi::{Controller, Diagnostics, Driven, Input, Objective, RolloutCost, StepCost};
 use traversability::RiskMapView;
 
 /// Numbers of a state: x [m], y [m], yaw [rad], speed [m/s], and the steering angle [rad] or the yaw rate [rad/s].
@@ -45,7 +45,7 @@ pub trait Planner: Send {
     fn futures(&self, n: usize, map: RiskMapView<'_>) -> Futures;
 }
 
-impl<M: Driven> Planner for Controller<M> {
+impl<M: Driven, S: StepCost, R: RolloutCost> Planner for Controller<M, S, R> {
     fn decide(&mut self, cycle: &Cycle<'_>) -> Outcome {
         let &Cycle { state: [x_m, y_m, yaw_rad, speed_mps, turn], elapsed_s, map, objective, cycle } = cycle;
         let state = MotionState { x_m, y_m, yaw_rad, speed_mps, turn }.into();

@@ -3,12 +3,13 @@
 use numpy::ndarray::Ix4;
 use numpy::{PyArray2, PyArray3, PyArray4, PyArrayMethods, PyReadonlyArray4, PyUntypedArrayMethods};
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
 use terrain::{Cell, GridGeometry};
 use traversability::{Ground, GroundFlags, Risk, RiskMapView};
 
 use crate::arrays::{array, numbers, owned, require_shape, values};
 use crate::failure::{refused, refused_value};
-use crate::ground::{grid, layer, pairs, require_classes};
+use crate::ground::{Pickled, grid, layer, pairs, require_classes, with_keywords};
 
 /// Numbers of one risk: linear traction, angular traction, |roll|, |pitch|.
 const N_PARAMETERS: usize = 4;
@@ -139,6 +140,16 @@ impl RiskMap {
         Ok((risk.linear_traction, risk.angular_traction, risk.roll_rad, risk.pitch_rad))
     }
 
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<Pickled<'py>> {
+        let layers = PyDict::new(py);
+        layers.set_item("origin", self.origin())?;
+        layers.set_item("gradient", self.gradient(py)?)?;
+        layers.set_item("terrain_class", self.terrain_class(py)?)?;
+        layers.set_item("flags", self.flags(py)?)?;
+        let make = with_keywords(&py.get_type::<Self>().getattr("from_arrays")?, &layers)?;
+        Ok((make, (self.risks(py)?, self.resolution_m())))
+    }
+
     fn __repr__(&self) -> String {
         let (n_rows, n_cols, n_yaws) = self.shape();
         let resolution_m = self.resolution_m();
@@ -160,13 +171,7 @@ impl RiskMap {
 
     /// What Python is to hold of a map of the crates: one copy of it, which can be made without Python's lock.
     pub fn copied(map: &traversability::RiskMap) -> Copied {
-        let view = map.view();
-        Copied {
-            geometry: view.geometry,
-            n_yaws: view.n_yaws,
-            risks: bytemuck::cast_slice(view.risks).to_vec(),
-            ground: view.ground.to_vec(),
-        }
+        Copied::of(&map.view())
     }
 
     /// Does `work` with the map as the controller reads it.
@@ -196,6 +201,16 @@ pub struct Copied {
 }
 
 impl Copied {
+    /// A copy of a view.
+    pub fn of(view: &RiskMapView<'_>) -> Self {
+        Self {
+            geometry: view.geometry,
+            n_yaws: view.n_yaws,
+            risks: bytemuck::cast_slice(view.risks).to_vec(),
+            ground: view.ground.to_vec(),
+        }
+    }
+
     /// The map over the memory of the copy.
     pub fn into_python(self, py: Python<'_>) -> PyResult<RiskMap> {
         let Self { geometry, n_yaws, risks, ground } = self;

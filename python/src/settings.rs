@@ -50,6 +50,11 @@ impl Source {
         Ok(Self { text: ConfigText::new(what, text), dict_of: Some(what.to_owned()) })
     }
 
+    /// What `parse` makes of the text, whatever its errors are.
+    pub fn with_text<T>(&self, parse: impl FnOnce(&ConfigText) -> T) -> T {
+        parse(&self.text)
+    }
+
     /// What `parse` makes of the text.
     pub fn parse<T>(&self, parse: impl FnOnce(&ConfigText) -> Result<T, ConfigError>) -> PyResult<T> {
         parse(&self.text).map_err(|error| match (&self.dict_of, error) {

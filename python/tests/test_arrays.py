@@ -1,5 +1,7 @@
 """Arrays in and out: whose memory they are, and what is said of those that are refused."""
 
+import pickle
+
 import ground
 import numpy as np
 import pytest
@@ -184,3 +186,57 @@ def test_ground_that_cannot_be_is_refused(changes, told):
     with pytest.raises(ValueError) as refusal:
         surefoot.Surface.from_arrays(**arguments)
     assert told in str(refusal.value)
+
+
+def fused_surface():
+    """A slope seen by one scan with a bush and a wall on it: measured, filled in and unknown ground."""
+    rng = np.random.default_rng(3)
+    points = rng.uniform([-6.0, -6.0, 0.0], [6.0, 6.0, 0.0], (6000, 3)).astype(np.float32)
+    points[:, 2] = 0.1 * points[:, 0]
+    terrain_class = np.zeros(6000, np.uint8)
+    is_bush = (np.abs(points[:, 0] - 2.0) < 1.0) & (np.abs(points[:, 1]) < 1.0)
+    is_wall = points[:, 0] > 5.0
+    points[is_bush, 2] += rng.uniform(0.0, 0.6, is_bush.sum())
+    points[is_wall, 2] += rng.uniform(0.0, 2.0, is_wall.sum())
+    terrain_class[is_bush], terrain_class[is_wall] = 2, 3
+    elevation = surefoot.ElevationMap(surefoot.settings_for(surefoot.Vehicle("pietra_full_size"))["elevation"])
+    elevation.fuse(points, (0.0, 0.0, 1.0, 0.0, 0.0, 0.0), terrain_class=terrain_class)
+    return elevation.surface()
+
+
+SURFACE_LAYERS = [
+    "height_m", "height_variance_m2", "vegetation_height_m", "terrain_class", "class_probability", "knowledge",
+]  # fmt: skip
+
+
+def test_maps_can_be_pickled():
+    surface = fused_surface()
+    assert set(np.unique(surface.knowledge)) == {0, 1, 2}
+    copy = pickle.loads(pickle.dumps(surface))
+    assert (copy.shape, copy.resolution_m, copy.origin) == (surface.shape, surface.resolution_m, surface.origin)
+    for layer in SURFACE_LAYERS:
+        assert np.array_equal(getattr(copy, layer), getattr(surface, layer), equal_nan=True), layer
+    risk_map = surefoot.PhysicsPrior(surefoot.Vehicle("pietra_full_size")).judge(surface)
+    copy = pickle.loads(pickle.dumps(risk_map))
+    assert (copy.shape, copy.resolution_m, copy.origin) == (risk_map.shape, risk_map.resolution_m, risk_map.origin)
+    for layer in ["risks", "gradient", "terrain_class", "flags"]:
+        assert np.array_equal(getattr(copy, layer), getattr(risk_map, layer)), layer
+
+
+@pytest.mark.parametrize(
+    "layers, message",
+    [
+        ({"knowledge": np.zeros((4, 4), np.uint8)}, r"knowledge\[0, 0\]: expected 1 or 2 where one is, found 0"),
+        ({"knowledge": np.full((4, 4), 3, np.uint8)}, r"knowledge\[0, 0\]: expected 1 or 2"),
+        ({"class_probability": np.full((4, 4, 4), 0.3, np.float32)}, r"class_probability\[0, 0\]: expected prob"),
+        ({"class_probability": np.full((4, 4, 4), np.nan, np.float32)}, r"class_probability\[0, 0\]: expected prob"),
+        ({"class_probability": np.full((4, 4, 3), 0.25, np.float32)}, r"shape \(4, 4, 4\)"),
+        (
+            {"class_probability": np.full((4, 4, 4), 0.25, np.float32), "terrain_class": np.zeros((4, 4), np.uint8)},
+            "no terrain_class beside it",
+        ),
+    ],
+)
+def test_layers_that_no_ground_has_are_refused(layers, message):
+    with pytest.raises(ValueError, match=message):
+        surefoot.Surface.from_arrays(np.zeros((4, 4), np.float32), 0.2, **layers)

@@ -66,6 +66,10 @@ def entries():
             "height_m": cells, "resolution_m": 0.2, "origin": (0, 0), "terrain_class": bytes_,
             "vegetation_height_m": cells, "height_variance_m2": cells,
         }),
+        (surefoot.Surface.from_arrays, {
+            "height_m": cells, "resolution_m": 0.2, "knowledge": bytes_ + 2,
+            "class_probability": np.full((9, 9, 4), 0.25, np.float32),
+        }),
         (surefoot.ElevationMap, {"settings": {}}),
         (elevation.fuse, {
             "points": np.zeros((5, 3), np.float32), "pose": np.zeros(6), "terrain_class": np.zeros(5, np.uint8),

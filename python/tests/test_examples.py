@@ -7,7 +7,9 @@ import sys
 import pytest
 
 FOLDER = pathlib.Path(__file__).resolve().parent.parent / "examples"
-EXAMPLES = sorted(FOLDER.glob("*.py"))
+#: What takes a minute and a learner that is not installed here.
+BY_HAND = {"ppo_smoke"}
+EXAMPLES = sorted(path for path in FOLDER.glob("*.py") if path.stem not in BY_HAND)
 
 
 @pytest.mark.parametrize("example", EXAMPLES, ids=lambda path: path.stem)

@@ -110,9 +110,14 @@ pub(super) struct Canvas {
 }
 
 impl Canvas {
+    /// An empty page of a size [px].
+    pub(super) fn blank(width: f64, height: f64) -> Self {
+        Self { scene: Scene::new(width.round(), height.round()) }
+    }
+
     /// A page of a height [px] with a title and lines below it; what else it shows begins at [`below_title`].
     pub(super) fn titled(height: f64, title: &str, lines: &[&str]) -> Self {
-        let mut canvas = Self { scene: Scene::new(PAGE_WIDTH.round(), height.round()) };
+        let mut canvas = Self::blank(PAGE_WIDTH, height);
         canvas.text((MARGIN, 48.0), title, TextStyle::new(30, Anchor::Start).bold());
         let soft = TextStyle::new(18, Anchor::Start).coloured(Rgb::INK_SOFT);
         for (line, place) in lines.iter().zip(0..) {

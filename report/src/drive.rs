@@ -97,6 +97,22 @@ pub fn picture(picture: &DrivePicture<'_>) -> Result<Vec<u8>, EncodeError> {
     page(picture).png()
 }
 
+/// Draws the map alone, as a frame of a film: all frames of a task show the same part of the world, start and goal with
+/// room around them, whatever was driven. `width_px` bounds both sides.
+///
+/// # Errors
+/// The encoder refuses.
+pub fn frame(picture: &DrivePicture<'_>, width_px: u32) -> Result<Vec<u8>, EncodeError> {
+    let side = f64::from(width_px);
+    let task = DrivePicture { driven: &[], planned: &[], ..picture.clone() };
+    let slot = view::Slot { left: 0.0, top: 0.0, width: side, height_min: 0.5 * side, height_max: side };
+    let mut axes = view::map_axes(interest(&task), 1.5 * margin_m(&task), picture.world.bounds(), slot);
+    axes.frame.x = 0.0;
+    let mut canvas = Canvas::blank(axes.frame.width, axes.frame.height);
+    map::draw_inside(picture, &axes, &mut canvas);
+    canvas.png()
+}
+
 fn page(picture: &DrivePicture<'_>) -> Canvas {
     let header_height = 96.0 + 26.0 * picture.subtitles.len() as f64;
     let slot = view::Slot {

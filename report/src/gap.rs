@@ -6,9 +6,11 @@ mod heldout;
 mod in_simulator;
 mod page;
 mod places;
+mod predictions;
 mod ranking;
 mod residuals;
 pub(crate) mod text;
+mod told;
 mod words;
 
 use sim_to_real::{Answer, Findings, GroundMap, ResidualCell};
@@ -19,6 +21,7 @@ use crate::colour::Rgb;
 pub use heldout::{HeldOutSample, HeldOutStrip};
 pub use page::{Page, page};
 pub use text::text;
+pub use told::Told;
 pub use words::Reference;
 
 /// Colours that mean the same on every page.

@@ -11,6 +11,7 @@ use bench::gap_score::Score;
 
 use crate::Picture;
 use crate::canvas::EncodeError;
+pub(crate) use confusion::page as confusion_page;
 pub use page::page;
 pub use text::text;
 

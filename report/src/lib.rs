@@ -12,9 +12,10 @@
 //! | a training | `surefoot train` | [picture](training::picture) |
 //! | a route | `surefoot route` | [picture](route::picture) |
 //! | a diagnosis | `surefoot gap diagnose` | [text](gap::text()), [pictures](gap::pictures), [page](gap::page()) |
+//! | a belief about the ground | `surefoot gap ground` | [text](ground::text()), [picture](ground::picture()), [page](ground::page()) |
 //! | the score of diagnoses | `surefoot gap score` | [text](gap_score::text()), [pictures](gap_score::pictures), [page](gap_score::page()) |
 //! | the catalogue of effects | `surefoot gap effects` | [text](effects::text()), [picture](effects::picture), [Markdown](effects::page()) |
-//! | benchmarks | `surefoot bench` | [`crossings`], [`gap_closed_loop`], [`kinodynamics`], [`learning`], [`navigation`], [`plant`], [`scaling`], [`traction_map`] |
+//! | benchmarks | `surefoot bench` | [`crossings`], [`mod@friction`], [`gap_closed_loop`], [`ground_score`], [`kinodynamics`], [`learning`], [`navigation`], [`plant`], [`scaling`], [`traction_map`] |
 
 mod axes;
 mod canvas;
@@ -24,9 +25,12 @@ mod colour_bar;
 pub mod crossings;
 pub mod drive;
 pub mod effects;
+pub mod friction;
 pub mod gap;
 pub mod gap_closed_loop;
 pub mod gap_score;
+pub mod ground;
+pub mod ground_score;
 mod html;
 pub mod kinodynamics;
 pub mod learning;

@@ -29,6 +29,38 @@ fn kept(name: &str, png: &[u8]) -> [u32; 2] {
     [number(16), number(20)]
 }
 
+/// Every frame of a task has the same size, wherever the vehicle has been by then.
+#[test]
+fn frames_of_a_task_show_the_same_part_of_the_world() {
+    let world = arena(&ArenaConfig::default()).expect("the hall can be built");
+    let goal = ARENA_GOAL_M;
+    let path = swinging_path(&world, [ARENA_START[0], ARENA_START[1]], goal, 1.5, 1.0);
+    let vehicle = vehicle("rc_car");
+    let framed = |driven: &[PathSample], name: &str| {
+        let picture = DrivePicture {
+            title: "",
+            subtitles: &[],
+            world: &world,
+            risk: None,
+            known: None,
+            unfamiliar: None,
+            driven,
+            walked: &[],
+            planned: &[],
+            areas: None,
+            start_m: [ARENA_START[0], ARENA_START[1]],
+            goal_m: goal,
+            goal_radius_m: 0.3,
+            failure: None,
+            vehicle: &vehicle,
+        };
+        kept(name, &report::drive::frame(&picture, 640).expect("it encodes"))
+    };
+    let [width, height] = framed(&path[..1], "frame_first.png");
+    assert_eq!(framed(&path, "frame_last.png"), [width, height]);
+    assert!(width <= 640 && height <= 640 && width.max(height) == 640, "{width} x {height}");
+}
+
 /// A way from `start` to `goal` that swings to both sides, with the attitude that the ground gives.
 fn swinging_path(
     world: &World,

@@ -2,11 +2,12 @@
 
 import math
 import os
-import sys
 import time
 from pathlib import Path
 
 import pytest
+import surefoot_layout as layout
+from channels import Bus, Inlet, Outlet, now_ns
 from conftest import SUREFOOT, Process, until
 from cyclone import (
     LATCHED,
@@ -24,9 +25,6 @@ from cyclone import (
     Vector3,
 )
 
-sys.path.insert(0, str(Path(__file__).parents[2] / "examples/python"))
-import surefoot_layout as layout  # noqa: E402
-from channels import Bus, Inlet, Outlet, now_ns  # noqa: E402
 
 FRAMES = Path(__file__).parent / "frames.toml"
 DRIVE, SPEED_MPS, STEERING_RAD = 1, 0.75, -0.25

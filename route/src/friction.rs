@@ -44,6 +44,37 @@ impl FrictionCurve {
     /// Ice.
     pub const ICE: Self = Self::new(0.40, 0.20, 0.0, 0.5);
 
+    /// The seven by name.
+    pub const PUBLISHED: [(&'static str, Self); 7] = [
+        ("asphalt", Self::ASPHALT),
+        ("rock", Self::ROCK),
+        ("dirt", Self::DIRT),
+        ("grass", Self::GRASS),
+        ("mud", Self::MUD),
+        ("sand", Self::SAND),
+        ("ice", Self::ICE),
+    ];
+
+    /// The one of that name.
+    pub fn published(name: &str) -> Option<Self> {
+        Self::PUBLISHED.into_iter().find(|(known, _)| *known == name).map(|(_, curve)| curve)
+    }
+
+    /// Their names, for messages.
+    pub fn names() -> String {
+        Self::PUBLISHED.map(|(name, _)| name).join(", ")
+    }
+
+    /// The same curve with its friction coefficients multiplied by `factor`.
+    pub fn scaled(self, factor: f32) -> Self {
+        Self {
+            static_friction: self.static_friction * factor,
+            sliding_friction: self.sliding_friction * factor,
+            viscous_friction: self.viscous_friction * factor,
+            ..self
+        }
+    }
+
     /// Friction coefficient at a speed of sliding [-].
     pub fn at(&self, sliding_mps: f32) -> f32 {
         let x = sliding_mps / self.stribeck_speed_mps;
@@ -62,6 +93,10 @@ impl FrictionCurve {
             0.5 * (self.stribeck_speed_mps + other.stribeck_speed_mps),
         )
     }
+
+    /// What [`FrictionCurve::is_valid`] asks for.
+    pub const EXPECTED: &'static str =
+        "friction coefficients within 0.01 and 3, 0 to 1 s/m of viscous and 0.01 to 100 m/s of Stribeck";
 
     /// Whether every coefficient is a number that a ground can have.
     pub fn is_valid(&self) -> bool {

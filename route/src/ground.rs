@@ -66,9 +66,7 @@ fn fault(cell: &GroundCell) -> Option<(&'static str, f32)> {
         return Some(("a finite height or NaN for none", cell.height_m));
     }
     if !cell.friction.is_valid() {
-        let expected =
-            "friction coefficients within 0.01 and 3, 0 to 1 s/m of viscous and 0.01 to 100 m/s of Stribeck";
-        return Some((expected, cell.friction.static_friction));
+        return Some((FrictionCurve::EXPECTED, cell.friction.static_friction));
     }
     let is_rough = (0.0..=100.0).contains(&cell.roughness_m);
     (!is_rough).then_some(("a roughness within 0 and 100 m", cell.roughness_m))

@@ -18,6 +18,8 @@ pub struct GroundLayers<'a> {
     pub ground_gap_m: Option<&'a GridMap<f32>>,
     /// Friction of ground without plants, as far as the layers do not tell.
     pub bare: FrictionCurve,
+    /// Friction of ground under low plants.
+    pub grass: FrictionCurve,
 }
 
 /// Share of returns from low plants above which ground counts as grass.
@@ -74,7 +76,7 @@ impl GroundLayers<'_> {
         let is_guessed = layer(self.ground_gap_m) > GAP_MAX_M;
         GroundCell {
             height_m: if is_guessed { f32::NAN } else { height_m },
-            friction: if plants > GRASS_FROM { FrictionCurve::GRASS } else { self.bare },
+            friction: if plants > GRASS_FROM { self.grass } else { self.bare },
             roughness_m: libm::hypotf(roughness_m, plants * HIDDEN_ROUGHNESS_M),
             is_obstacle: layer(self.water) > 0.0,
         }

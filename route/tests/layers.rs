@@ -21,6 +21,7 @@ fn layers(elevation_m: &GridMap<f32>) -> GroundLayers<'_> {
         water: None,
         ground_gap_m: None,
         bare: FrictionCurve::DIRT,
+        grass: FrictionCurve::GRASS,
     }
 }
 

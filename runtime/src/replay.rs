@@ -5,6 +5,7 @@ mod difference;
 mod maps;
 mod records;
 mod survey;
+mod tables;
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -22,6 +23,7 @@ use bus::message::{DecisionRecord, Source};
 use choice::Choice;
 use maps::{Maps, Unmade};
 pub use records::{Key, ReadError, Records, recorded_decision, recorded_stamp};
+pub use tables::{Row, recorded_odometry, recorded_rows};
 
 /// What a replay came to.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize)]

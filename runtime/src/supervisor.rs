@@ -41,6 +41,8 @@ impl Default for RestartPolicy {
 
 /// Time between two looks [ns].
 const POLL_NS: u64 = SECOND_NS / 50;
+/// Time that the others wait for the recorder, so that it misses nothing that they hear [ns].
+const RECORDER_PATIENCE_NS: u64 = 10 * SECOND_NS;
 /// Time that processes have to end when they are told to [ns].
 const PATIENCE_NS: u64 = 3 * SECOND_NS;
 
@@ -103,6 +105,7 @@ pub struct Supervisor<'a> {
     unended: Vec<String>,
     /// Whether the run is over when the mission is.
     ends_with_mission: bool,
+    began_at_ns: u64,
 }
 
 impl<'a> Supervisor<'a> {
@@ -135,6 +138,7 @@ impl<'a> Supervisor<'a> {
             command,
             unended: Vec::new(),
             ends_with_mission: false,
+            began_at_ns: clock::now_ns(),
         })
     }
 
@@ -198,8 +202,18 @@ impl<'a> Supervisor<'a> {
     }
 
     fn tend(&mut self, now_ns: u64) -> Option<RunEnd> {
+        let awaits_recorder = self.awaits_recorder(now_ns);
         let Self { kept, policy, command, .. } = self;
-        kept.iter_mut().find_map(|kept| kept.tend(now_ns, policy, command))
+        let mut tended = kept.iter_mut().filter(|kept| !awaits_recorder || kept.role == Role::Recorder);
+        tended.find_map(|kept| kept.tend(now_ns, policy, command))
+    }
+
+    /// Whether the recorder has yet to open its channels. A robot speaks whenever it likes: what the others made of a
+    /// message that was not recorded could not be made again. Without a recording the vehicle still drives.
+    fn awaits_recorder(&self, now_ns: u64) -> bool {
+        let recorder = self.kept.iter().find(|kept| kept.role == Role::Recorder);
+        let is_awaited = recorder.is_some_and(|kept| kept.last.is_none() && kept.deaths_at_ns.is_empty());
+        is_awaited && now_ns.saturating_sub(self.began_at_ns) < RECORDER_PATIENCE_NS
     }
 
     fn listen(&mut self) {

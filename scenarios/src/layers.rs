@@ -6,7 +6,7 @@ use rand_distr::{Distribution, Poisson};
 use terrain::{Cell, GridGeometry, GridMap, Knowledge};
 
 use crate::random::stream;
-use crate::{Bounds, Patch, Stribeck, World, WorldError};
+use crate::{Bounds, Patch, ROCK_FIELD_DISTANCE_M, Stribeck, World, WorldError};
 
 /// Cells that a world may have: a square kilometre at 0.25 m.
 const CELLS_MAX: f64 = 16e6;
@@ -118,6 +118,24 @@ pub enum LayersError {
 }
 
 impl WorldLayers {
+    /// Height alone.
+    pub fn bare(elevation_m: GridMap<f32>) -> Self {
+        Self {
+            elevation_m,
+            canopy_height_m: None,
+            low_vegetation_fraction: None,
+            water: None,
+            ground_gap_m: None,
+        }
+    }
+
+    /// How far start and goal lie apart where nobody says: as in the rock field, or half a side of a small map [m].
+    pub fn drive_distance_m(&self) -> f64 {
+        let Bounds { south_west_m, north_east_m } = self.bounds();
+        let shortest_m = (0..2).map(|k| north_east_m[k] - south_west_m[k]).fold(f64::MAX, f64::min);
+        ROCK_FIELD_DISTANCE_M.min(0.5 * shortest_m)
+    }
+
     /// The outer border of the coarse cells.
     pub fn bounds(&self) -> Bounds {
         Bounds::of(self.elevation_m.geometry())

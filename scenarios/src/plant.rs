@@ -20,6 +20,7 @@ mod load;
 mod machine;
 mod receiver;
 mod rest;
+mod ruts;
 mod servo;
 mod strut;
 mod trailer;
@@ -48,6 +49,7 @@ use load::Load;
 use machine::Machine;
 use receiver::Receiver;
 use rest::{Rest, Stance};
+use ruts::Ruts;
 use servo::SteeringServo;
 use strut::Strut;
 pub use tyre::steady_friction;
@@ -82,6 +84,8 @@ pub struct WheelState {
 /// The machine in its world.
 pub struct Plant {
     ground: Ground,
+    /// None where no ground gives way.
+    ruts: Option<Ruts>,
     chassis: Chassis,
     gear: [RunningGear; 4],
     wheels: [Wheel; 4],
@@ -182,6 +186,7 @@ impl Plant {
             n_steps: 0,
             left_world: false,
             collisions: Collisions::default(),
+            ruts: Ruts::new(&ground, vehicle.wheel.width_m),
             ground,
             gear,
         })
@@ -215,6 +220,9 @@ impl Plant {
         let [left_rad, right_rad] = self.servo.wheel_angles_rad();
         let steering_rad = [left_rad, right_rad, 0.0, 0.0];
         let anti_roll_n = self.anti_roll_n();
+        if let Some(ruts) = &mut self.ruts {
+            ruts.press(&mut self.wheels, &self.ground);
+        }
         let mut wrench = Wrench::default();
         for i in 0..4 {
             let input =

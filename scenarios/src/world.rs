@@ -21,6 +21,9 @@ pub struct Patch {
     pub friction: Stribeck,
     /// Resistance of loose or soft ground over load, beside the tyre's own [-].
     pub rolling_resistance: f32,
+    /// Shear deformation modulus K of Janosi and Hanamoto on ground that nothing has gone over, zero of firm ground [m]: the
+    /// displacement at which 63 % of the friction is there.
+    pub shear_deformation_m: f32,
     /// Whether the height was measured or filled in between measurements.
     pub knowledge: Knowledge,
 }
@@ -34,6 +37,7 @@ impl Patch {
             obstacle_height_m: 0.0,
             friction,
             rolling_resistance: 0.0,
+            shear_deformation_m: 0.0,
             knowledge: Knowledge::Measured,
         }
     }
@@ -59,6 +63,7 @@ impl Patch {
             self.vegetation_height_m,
             self.obstacle_height_m,
             self.rolling_resistance,
+            self.shear_deformation_m,
             friction.static_friction,
             friction.dynamic_friction,
             friction.viscous_friction,

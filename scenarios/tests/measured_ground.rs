@@ -28,13 +28,7 @@ fn layer(n: usize, value: impl Fn(f64, f64) -> f64) -> GridMap<f32> {
 }
 
 fn bare(elevation_m: GridMap<f32>) -> WorldLayers {
-    WorldLayers {
-        elevation_m,
-        canopy_height_m: None,
-        low_vegetation_fraction: None,
-        water: None,
-        ground_gap_m: None,
-    }
+    WorldLayers::bare(elevation_m)
 }
 
 fn built(layers: &WorldLayers) -> World {

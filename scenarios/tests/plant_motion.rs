@@ -4,9 +4,12 @@
 #[allow(dead_code)] // each test file takes what it needs
 mod plant_machines;
 
+use std::sync::Arc;
+
 use bicycle::{Command, Differential, Vehicle};
 use plant_machines::*;
-use scenarios::{Plant, Stribeck};
+use scenarios::{Patch, Plant, Stribeck, World};
+use terrain::GridGeometry;
 
 /// Runs on until something has happened; fails after two minutes.
 fn drive_until(plant: &mut Plant, happened: impl Fn(&Plant) -> bool) {
@@ -271,4 +274,26 @@ fn commands_arrive_after_the_delay_and_at_the_limited_rate() {
     assert!((plant.motion().steering_rad - vehicle.limits.steering_max_rad).abs() < 1e-9);
     let refused = plant.set_command(Command { speed_mps: f32::NAN, steering_rad: 0.0 });
     assert!(refused.is_err());
+}
+
+#[test]
+fn loose_ground_makes_a_balanced_vehicle_understeer_because_its_rear_wheels_follow_the_front_ones() {
+    // Contact under 3679 N: 2 sqrt(2 0.45 3679 / 150 000) = 0.297 m. With K = 25 mm the ground answers 0.98 0.297 / 0.05 =
+    // 5.82 to the front wheels and 2.5 times that to the rear ones in their ruts: at a lateral acceleration a the front slips
+    // by a / g (1 / 5.82 - 1 / 14.6) = 0.103 a / g more, and the curvature is that of firm ground over
+    // 1 + 0.103 v^2 / (g 2.5 m) = 1.27 at 8 m/s.
+    let curvature_per_m = |shear_deformation_m: f32| {
+        let geometry = GridGeometry::centred(1.0, 400, 400, 0.0, 0.0);
+        let patch = Patch { shear_deformation_m, ..Patch::open(Stribeck::ASPHALT) };
+        let world = Arc::new(World::from_fn("level", geometry, |_, _| 0.0, |_, _| patch).unwrap());
+        let mut vehicle = with(Differential::Open);
+        vehicle.tyre.rolling_resistance = 0.0;
+        let mut plant = Plant::new(&vehicle, world, [-100.0, 0.0, 0.0]).unwrap();
+        drive(&mut plant, 8.0, 0.02, 16.0);
+        let motion = plant.motion();
+        motion.angular_rate_radps[2] / motion.velocity_mps[0]
+    };
+    let ratio = curvature_per_m(0.0) / curvature_per_m(0.025);
+    println!("curvature on firm over that on loose ground: {ratio:.3}, expected 1.269");
+    assert!((ratio - 1.269).abs() < 0.02, "{ratio}");
 }

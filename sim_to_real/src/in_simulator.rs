@@ -11,6 +11,7 @@
 mod intervals;
 mod judgement;
 mod lever;
+mod memory;
 mod reference;
 mod replay;
 mod search;
@@ -18,7 +19,7 @@ mod trial;
 mod types;
 mod verification;
 
-use crate::answer::Ranked;
+use crate::answer::{Answer, Ranked};
 use crate::baseline::{GapError, drives_of};
 use crate::drive::Drive;
 use crate::evidence::{SpeedInput, TurnInput};
@@ -26,6 +27,7 @@ use crate::machine::Machine;
 use bicycle::DriveLog;
 use judgement::Judged;
 use lever::{Lever, levers};
+pub use memory::RunMemory;
 use reference::Reference;
 use trial::Trial;
 pub use types::{
@@ -92,6 +94,32 @@ pub fn judge_in_simulator<E>(
     let trial = Trial::new(simulator, &reference, &drives, run);
     let judged = Judged::of(&trial, &levers(simulator, screened, N_CAUSES)).map_err(InSimulatorError::Run)?;
     Ok(judged.diagnosis(simulator, reference))
+}
+
+/// From here on a simulator does not drive its own recorded drives again, in their measurements' noise [-].
+const OTHER_DRIVES: f64 = 5.0;
+
+/// [`judge_in_simulator`] of an answer's ranking; what the simulator says goes into the answer.
+///
+/// # Errors
+/// Those of [`judge_in_simulator`].
+pub fn decide_in_simulator<E>(
+    simulator: &SimulatorDescription,
+    machine: &Machine,
+    answer: &mut Answer,
+    drives: (&[DriveLog], &[DriveLog]),
+    run: &RunSimulator<'_, E>,
+) -> Result<InSimulatorDiagnosis, InSimulatorError<E>> {
+    let diagnosis = judge_in_simulator(simulator, machine, &answer.ranking, drives, run)?;
+    let error = diagnosis.answer.own_drives_error;
+    if error > OTHER_DRIVES {
+        answer.advice.push(format!(
+            "record the nominal drives again: {} misses those that were given by {error:.1} times their noise",
+            diagnosis.answer.simulator
+        ));
+    }
+    answer.in_simulator = Some(diagnosis.answer.clone());
+    Ok(diagnosis)
 }
 
 /// The simulator's own recorded drives for the simulator as it is: what it is asked first.

@@ -9,6 +9,7 @@
 //! 4. [`verify`] opens the drives that were held out and says how far the gap shrinks; an [`Answer`] keeps it all.
 //! 5. [`judge_in_simulator`] lets the user's own simulator decide what was screened, and about its own parameters.
 //! 6. [`design_manoeuvre`] asks for the drive that would tell apart what is left open.
+//! 7. [`judge_ground`] holds a belief about the ground against what drives met there.
 //!
 //! Drives are `bicycle::DriveLog`s. The crate never sees the plant that made them. `examples/diagnose_a_delay.rs` goes
 //! through steps 2 to 4.
@@ -23,10 +24,13 @@ mod constancy;
 mod cross_validation;
 mod diagnosis;
 mod drive;
+mod drives;
 mod evidence;
 mod explanation;
 mod findings;
+mod follow_up;
 mod ground;
+mod ground_belief;
 mod in_simulator;
 mod intervals;
 mod judgement;
@@ -35,6 +39,7 @@ mod least_squares;
 mod limits_shown;
 mod machine;
 mod manoeuvre;
+mod repair;
 mod residual_table;
 mod rollout;
 mod screening;
@@ -57,18 +62,26 @@ pub use baseline::{Baseline, GapError};
 pub use causes::composed;
 pub use diagnosis::{Diagnosis, diagnose};
 pub use drive::DriveError;
+pub use drives::{Case, Drives, DrivesError};
 pub use findings::{
     ConditionBin, ConditionTable, Findings, GroundResidual, Prediction, PredictionModel, QuantityError,
     ResidualCell, ResidualState,
 };
+pub use follow_up::Diagnosed;
+pub use ground_belief::{
+    BlockMean, Calibration, GROUND_SCHEMA_VERSION, GroundBeliefError, GroundCause, GroundChange,
+    GroundCondition, GroundReport, HeightErrors, LayerErrors, N_PIT, PARAMETERS, Parting, PlaceBin,
+    PlaceTable, RankedGroundCause, judge_ground,
+};
 pub use in_simulator::{
-    CauseKind, InSimulator, InSimulatorDiagnosis, InSimulatorError, Knob, KnobError, Motion, RunSimulator,
-    SimulatorCandidate, SimulatorCause, SimulatorDescription, SimulatorRun, StartState, judge_in_simulator,
-    own_runs,
+    CauseKind, InSimulator, InSimulatorDiagnosis, InSimulatorError, Knob, KnobError, Motion, RunMemory,
+    RunSimulator, SimulatorCandidate, SimulatorCause, SimulatorDescription, SimulatorRun, StartState,
+    decide_in_simulator, judge_in_simulator, own_runs,
 };
 pub use learned_bound::{LearnedBound, LearnedBoundError, learned_bound};
 pub use machine::{GroundMap, Machine, SensorNoise};
 pub use manoeuvre::{Manoeuvre, design_manoeuvre};
+pub use repair::{PartUnknown, RepairError, repaired};
 pub use screening::{Gravity, Place as RowPlace, Suspicion, screen, screen_sets, split_at_breaks};
 pub use signature::{Signature, signature};
 pub use steering::Steering;

@@ -28,6 +28,7 @@
 
 mod bins;
 mod cvar;
+mod encounter;
 mod parameters;
 mod partial_moments;
 mod pmf;
@@ -36,6 +37,7 @@ mod risk_map;
 
 pub use bins::{Bins, N_BINS};
 pub use cvar::{CvarLevel, CvarLevelError, lower_tail_cvar, upper_tail_cvar};
+pub use encounter::{Encounter, Foretold, GroundShown};
 pub use parameters::{Attitude, Traction, Traversability};
 pub use partial_moments::PartialMoments;
 pub use pmf::{Pmf, PmfError};

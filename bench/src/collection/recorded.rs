@@ -41,7 +41,8 @@ pub fn collect_recorded(
     if n_labels == 0 {
         return Err(CollectionError::NothingLabelled { n_rows: log.n_rows(), n_runs: log.runs().len() });
     }
-    let (world, surface) = ground(vehicle, layers, poses_m(), &source.ground, config.elevation.resolution_m)?;
+    let (world, surface) =
+        recorded_surface(vehicle, layers, poses_m(), &source.ground, config.elevation.resolution_m)?;
 
     let layout = FeatureLayout::for_vehicle(&vehicle.geometry);
     let surveyor = Surveyor::new(&vehicle.geometry, layout, prior, config.elevation.resolution_m)?;
@@ -81,7 +82,10 @@ fn around(poses_m: impl Iterator<Item = [f64; 2]>) -> Bounds {
 
 /// The part of the layers that the poses need, as a world and as the surface that a robot's map would show; unknown
 /// where the layers have no height.
-fn ground(
+///
+/// # Errors
+/// Layers that make no world.
+pub fn recorded_surface(
     vehicle: &Vehicle,
     layers: &WorldLayers,
     poses_m: impl Iterator<Item = [f64; 2]>,

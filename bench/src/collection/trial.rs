@@ -5,12 +5,12 @@ use std::sync::Arc;
 
 use bicycle::{Column, Command, Decision, DriveRow, Odometry, Vehicle};
 use evidential::{Example, Label, Surveyor};
-use navigator::Config;
+use navigator::{Config, assumed_ground};
 use rand::{Rng, RngExt};
 use scenarios::{
     Bounds, Episode, EpisodeConfig, Outcome, RangeSensorConfig, Split, Task, Truth, World, stream,
 };
-use terrain::{AssumedGround, ElevationMap, Footprint, GridMap, Pose, SurfaceCell};
+use terrain::{AssumedGround, ElevationMap, GridMap, Pose, SurfaceCell};
 
 use super::{CollectionError, Place, Request, Trial};
 use crate::closed_loop::MapSource;
@@ -117,7 +117,7 @@ pub(super) fn drive(
             speed_mps: request.speed_mps as f32,
             steering_rad: steering.at(time_s, lock_rad) as f32,
         };
-        rows.push(row(time_s, &observation.odometry, &command));
+        rows.push(measured_row(time_s, &observation.odometry, &command));
         if let Some(own_map) = &mut own_map {
             own_map.observe(&observation.odometry, observation.scan.as_deref(), &field.surface)?;
         }
@@ -140,7 +140,7 @@ fn split(place: &Place) -> Split {
 }
 
 /// The vehicle with limits that no attitude breaks: trials end when it lies on its side, not before.
-fn untilted(vehicle: &Vehicle) -> Vehicle {
+pub(crate) fn untilted(vehicle: &Vehicle) -> Vehicle {
     let mut vehicle = vehicle.clone();
     vehicle.limits.roll_max_rad = TILT_MAX_RAD;
     vehicle.limits.pitch_max_rad = TILT_MAX_RAD;
@@ -191,26 +191,11 @@ fn task(vehicle: &Vehicle, field: &Field, map: u32, rng: &mut impl Rng) -> Resul
 }
 
 /// The row of a drive log that a robot would write: what it measures, and the command that it answers with.
-fn row(time_s: f64, odometry: &Odometry, command: &Command) -> DriveRow {
-    let [x_m, y_m, z_m] = odometry.position_m;
-    let [roll_rad, pitch_rad, yaw_rad] = odometry.attitude_rad;
-    [
-        (Column::X, x_m),
-        (Column::Y, y_m),
-        (Column::Z, z_m),
-        (Column::Roll, roll_rad),
-        (Column::Pitch, pitch_rad),
-        (Column::Yaw, yaw_rad),
-        (Column::Vx, odometry.velocity_mps[0]),
-        (Column::Vy, odometry.velocity_mps[1]),
-        (Column::Wz, odometry.yaw_rate_radps),
-        (Column::CmdSpeed, f64::from(command.speed_mps)),
-        (Column::CmdSteer, f64::from(command.steering_rad)),
-        (Column::WheelSpeed, odometry.wheel_speed_mps),
-        (Column::SteerMeas, odometry.steering_rad),
-    ]
-    .into_iter()
-    .fold(DriveRow::new(time_s), |row, (column, value)| row.with(column, value))
+pub(crate) fn measured_row(time_s: f64, odometry: &Odometry, command: &Command) -> DriveRow {
+    DriveRow::new(time_s)
+        .with_odometry(odometry)
+        .with(Column::CmdSpeed, f64::from(command.speed_mps))
+        .with(Column::CmdSteer, f64::from(command.steering_rad))
 }
 
 /// The map that the robot makes as it drives, and what it shows under the vehicle at every row.
@@ -220,9 +205,6 @@ struct OwnMap {
     surveyor: Surveyor,
     under_rows: Vec<Option<Example>>,
 }
-
-/// How well the ground below a vehicle that has seen nothing yet is assumed to be known [m].
-const ASSUMED_HEIGHT_STD_M: f64 = 0.05;
 
 impl OwnMap {
     /// `None` where features come from the true surface.
@@ -235,17 +217,7 @@ impl OwnMap {
         if request.map_source == MapSource::Oracle {
             return Ok(None);
         }
-        let geometry = &vehicle.geometry;
-        let margin_m = 0.25 * geometry.length_m;
-        let assumed = AssumedGround {
-            footprint: Footprint {
-                front_m: geometry.length_m - geometry.rear_overhang_m + margin_m,
-                rear_m: geometry.rear_overhang_m + margin_m,
-                half_width_m: 0.5 * geometry.width_m + margin_m,
-            },
-            axle_height_m: geometry.wheel_radius_m,
-            height_std_m: ASSUMED_HEIGHT_STD_M,
-        };
+        let assumed = assumed_ground(&vehicle.geometry);
         let elevation = ElevationMap::new(config.elevation)?;
         Ok(Some(Self { elevation, assumed, surveyor: surveyor.clone(), under_rows: Vec::new() }))
     }

@@ -18,12 +18,13 @@ pub struct Confusion {
 }
 
 impl Confusion {
-    pub(super) fn of(diagnosed: &[DiagnosedCase]) -> Self {
-        let pairs: Vec<(String, String)> = diagnosed
-            .iter()
-            .filter(|case| case.label.kind != GapKind::Pair)
-            .map(|case| (truth(case), answer(case)))
-            .collect();
+    pub(super) fn of_diagnosed(diagnosed: &[DiagnosedCase]) -> Self {
+        let singles = diagnosed.iter().filter(|case| case.label.kind != GapKind::Pair);
+        Self::of(singles.map(|case| (truth(case), answer(case))).collect())
+    }
+
+    /// Of what had been added and what was announced first, case by case.
+    pub fn of(pairs: Vec<(String, String)>) -> Self {
         let truths = in_order(pairs.iter().map(|(truth, _)| truth));
         let answers = in_order(pairs.iter().map(|(_, answer)| answer));
         let count = |truth: &String, answer: &String| {

@@ -12,6 +12,7 @@ use serde::Serialize;
 
 use super::KinodynamicsError;
 use super::machine::Machine;
+use super::surfaces::Layout;
 use super::teleoperation::CURVATURE_MAX_PER_M;
 use super::track::Track;
 
@@ -42,6 +43,8 @@ pub enum Told {
     Shuffled(Arc<Vec<Vec<f32>>>),
     /// The same half second always.
     Constant(Arc<Vec<f32>>),
+    /// The truth about the ground under the wheels, and nothing that the unit measures.
+    Known,
 }
 
 /// Who turns the wish into a command.
@@ -68,6 +71,8 @@ pub struct Lap<'a> {
     pub middle: &'a Track,
     /// The ground.
     pub world: Arc<World>,
+    /// Where its surfaces lie.
+    pub layout: Layout,
     /// Who drives.
     pub driver: &'a Driver,
     /// Target speed [m/s].
@@ -182,7 +187,7 @@ impl Attempt {
         let (first_m, begin_ns) = (self.way_m, self.machine.now_ns());
         loop {
             let wish = self.wish(lap);
-            let command = self.asker.ask(wish, self.machine.now_ns());
+            let command = self.asker.ask(wish, &self.machine, &lap.layout);
             let failure = self.advance(lap, command)?;
             self.asker.hear(&self.machine);
             if let Some(failure) = failure {
@@ -291,14 +296,15 @@ impl Asker {
     }
 
     /// Speed and curvature to command.
-    fn ask(&mut self, wish: Desired, now_ns: u64) -> [f32; 2] {
+    fn ask(&mut self, wish: Desired, machine: &Machine, layout: &Layout) -> [f32; 2] {
         let Some((model, told)) = &mut self.model else { return [wish.speed_mps, wish.curvature_per_m] };
         match told {
-            Told::Measured if model.senses() => match self.history.window(now_ns, 50_000_000) {
+            Told::Measured if model.senses() => match self.history.window(machine.now_ns(), 50_000_000) {
                 Ok(samples) => model.sense(samples),
                 Err(_) => return [wish.speed_mps, wish.curvature_per_m],
             },
             Told::Measured => {}
+            Told::Known => model.tell(&layout.coefficients_under(machine.plant())),
             Told::Shuffled(windows) => {
                 let drawn = self.rng.random_range(0..windows.len());
                 model.sense_columns(&windows[drawn]);

@@ -4,7 +4,9 @@
 //! held-out run, and intervals a bootstrap over runs.
 
 use bicycle::{Column, DriveLog};
-use kinodynamics::{Desired, InverseModel, Settings, train_blind};
+use std::ops::ControlFlow;
+
+use kinodynamics::{Desired, InverseModel, Settings, train_without_history};
 use rand::RngExt;
 use scenarios::stream;
 use serde::Serialize;
@@ -228,8 +230,8 @@ fn network(training: &[&[Row]], epochs: usize, seed: u64) -> Result<InverseModel
         }
     }
     let settings = Settings { epochs, ..Settings::paper(kinodynamics::Architecture::ABLATION, seed) };
-    let checkpoint = train_blind(&examples, &settings)?;
-    Ok(InverseModel::new(&checkpoint, bicycle::lanes::Instructions::widest())?)
+    let outcome = train_without_history(&examples, &settings, &mut |_| ControlFlow::Continue(()))?;
+    Ok(InverseModel::new(&outcome.checkpoint, bicycle::lanes::Instructions::widest())?)
 }
 
 #[cfg(test)]

@@ -1,9 +1,9 @@
 //! What the car drives on: four surfaces in patches, each covered more or less densely, and a floor that nobody learned on.
 //!
-//! Rough ground is slippery ground here, because leaves and twigs are both; so what the unit feels tells something of the
-//! friction. Frozen before the first model was trained.
+//! Rough ground is loose and slippery ground here, because leaves and twigs are all three; so what the unit feels tells
+//! something of how the ground gives way under the tyres, and of its friction. Frozen before the first model was trained.
 
-use scenarios::{Patch, Stribeck, World, WorldError, seed_of};
+use scenarios::{Patch, Plant, Stribeck, World, WorldError, seed_of};
 use terrain::{GridGeometry, TerrainClass};
 
 /// Edge of a cell [m].
@@ -12,6 +12,11 @@ const RESOLUTION_M: f64 = 0.025;
 const PATCH_M: f64 = 1.6;
 /// Friction that the densest cover takes away [-].
 const COVER_FRICTION: f32 = 0.2;
+
+/// Numbers of [`Layout::coefficients_under`].
+pub(super) const COEFFICIENTS: usize = 4;
+/// What the ground is to a tyre.
+pub(super) type Coefficients = [f32; COEFFICIENTS];
 
 /// A surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -24,45 +29,52 @@ pub struct Surface {
     roughness_m: f64,
     /// Resistance over load [-].
     rolling_resistance: f32,
+    /// Shear deformation modulus where nothing covers it [m].
+    shear_deformation_m: f32,
     class: TerrainClass,
 }
 
-/// Cement, dirt, grass, and leaves on mud: the paper's ground. Friction is that of AnyNav's table; leaves slide on mud.
+/// Cement, dirt, grass, and leaves: the paper's ground. What soil holds is Mohr and Coulomb's, cohesion over pressure and the
+/// tangent of the friction angle; under a car that presses with 7 kPa that is more than under a lorry. Sources of both
+/// properties: docs/plant.md, "Loose ground".
 pub const SURFACES: [Surface; 4] = [
     Surface {
         name: "cement",
         friction: Stribeck::ASPHALT,
         roughness_m: 0.0002,
         rolling_resistance: 0.0,
+        shear_deformation_m: 0.0,
         class: TerrainClass::Open,
     },
     Surface {
         name: "dirt",
-        friction: Stribeck::DIRT,
+        friction: soil(0.90, 0.85),
         roughness_m: 0.0010,
         rolling_resistance: 0.01,
+        shear_deformation_m: 0.0006,
         class: TerrainClass::Loose,
     },
     Surface {
         name: "grass",
-        friction: Stribeck::GRASS,
+        friction: soil(0.85, 0.80),
         roughness_m: 0.0020,
         rolling_resistance: 0.03,
+        shear_deformation_m: 0.0010,
         class: TerrainClass::Vegetation,
     },
     Surface {
         name: "leaves",
-        friction: Stribeck {
-            static_friction: 0.45,
-            dynamic_friction: 0.42,
-            viscous_friction: 0.005,
-            stribeck_speed_mps: 5.0,
-        },
+        friction: soil(0.70, 0.65),
         roughness_m: 0.0030,
         rolling_resistance: 0.02,
+        shear_deformation_m: 0.0020,
         class: TerrainClass::Loose,
     },
 ];
+
+const fn soil(static_friction: f32, dynamic_friction: f32) -> Stribeck {
+    Stribeck { static_friction, dynamic_friction, viscous_friction: 0.005, stribeck_speed_mps: 5.0 }
+}
 
 /// A wooden floor: even, and less grip than cement.
 const WOOD: Surface = Surface {
@@ -75,6 +87,7 @@ const WOOD: Surface = Surface {
     },
     roughness_m: 0.0001,
     rolling_resistance: 0.0,
+    shear_deformation_m: 0.0,
     class: TerrainClass::Open,
 };
 
@@ -107,6 +120,24 @@ impl Layout {
     /// Index into [`SURFACES`] of what lies at a point; none of the floor.
     pub fn surface_at(&self, x_m: f64, y_m: f64) -> Option<u32> {
         self.place(x_m, y_m).index
+    }
+
+    /// Everything that acts on the tyres, in numbers of about one, the mean of what lies under the wheels: static and sliding
+    /// friction, shear deformation modulus [mm] and standard deviation of the heights [mm].
+    pub(super) fn coefficients_under(&self, plant: &Plant) -> Coefficients {
+        let mut mean = [0.0; COEFFICIENTS];
+        for wheel in plant.wheels() {
+            let [x_m, y_m, _] = wheel.hub_m;
+            let (Place { surface, cover, .. }, patch) = (self.place(x_m, y_m), self.patch(x_m, y_m));
+            let roughness_m = (surface.roughness_m * (1.0 + cover)) as f32;
+            let friction = patch.friction;
+            let millimetres = [patch.shear_deformation_m, roughness_m].map(|metres| 1e3 * metres);
+            let found = [friction.static_friction, friction.dynamic_friction, millimetres[0], millimetres[1]];
+            for (mean, found) in mean.iter_mut().zip(found) {
+                *mean += 0.25 * found;
+            }
+        }
+        mean
     }
 
     /// A world between two corners.
@@ -150,6 +181,7 @@ impl Layout {
         Patch {
             class: surface.class,
             rolling_resistance: surface.rolling_resistance,
+            shear_deformation_m: surface.shear_deformation_m * (1.0 + cover as f32),
             ..Patch::open(friction)
         }
     }

@@ -12,7 +12,7 @@ use scenarios::{seed_of, stream};
 
 use super::KinodynamicsError;
 use super::machine::{Machine, TICK_S};
-use super::surfaces::{Layout, SURFACES};
+use super::surfaces::{Coefficients, Layout, SURFACES};
 
 /// Fastest command [m/s].
 const SPEED_MAX_MPS: f64 = 3.0;
@@ -47,27 +47,35 @@ pub fn teleoperate(
     asked: &Teleoperation,
     on_run: &(dyn Fn() + Sync),
 ) -> Result<Recording, KinodynamicsError> {
+    teleoperate_knowing(vehicle, asked, on_run).map(|(recording, _)| recording)
+}
+
+/// The same with what the ground under the wheels was at every command of every run.
+pub(super) fn teleoperate_knowing(
+    vehicle: &Vehicle,
+    asked: &Teleoperation,
+    on_run: &(dyn Fn() + Sync),
+) -> Result<(Recording, Vec<Vec<Coefficients>>), KinodynamicsError> {
     let runs = (0..asked.minutes).into_par_iter().map(|minute| {
         let run = drive(vehicle, asked, minute);
         on_run();
         run
     });
-    Ok(Recording {
-        vehicle: vehicle.into(),
-        tick_s: TICK_S,
-        grounds: SURFACES.iter().map(|surface| surface.name.to_owned()).collect(),
-        runs: runs.collect::<Result<_, _>>()?,
-    })
+    let (runs, coefficients) = runs.collect::<Result<Vec<_>, _>>()?.into_iter().unzip();
+    let grounds = SURFACES.iter().map(|surface| surface.name.to_owned()).collect();
+    Ok((Recording { vehicle: vehicle.into(), tick_s: TICK_S, grounds, runs }, coefficients))
 }
 
-fn drive(vehicle: &Vehicle, asked: &Teleoperation, minute: u32) -> Result<RecordedRun, KinodynamicsError> {
+type KnownRun = (RecordedRun, Vec<Coefficients>);
+
+fn drive(vehicle: &Vehicle, asked: &Teleoperation, minute: u32) -> Result<KnownRun, KinodynamicsError> {
     let seed = seed_of(asked.seed, &[0x7E1E, u64::from(minute)]);
     let layout = asked.only.map_or(Layout::Patches { seed }, Layout::One);
     let world = Arc::new(layout.world([-GROUND_M; 2], [GROUND_M; 2])?);
     let mut rng = stream(seed, &[1]);
     let mut machine = Machine::new(vehicle, world, [0.0, 0.0, rng.random_range(-3.1..3.1)], seed)?;
     let mut stick = Stick::default();
-    let mut run = RecordedRun::default();
+    let (mut run, mut coefficients) = KnownRun::default();
     for _ in 0..(RUN_S / TICK_S) as usize {
         if machine.plant().rolled_over() || machine.plant().left_world() {
             break;
@@ -83,10 +91,11 @@ fn drive(vehicle: &Vehicle, asked: &Teleoperation, minute: u32) -> Result<Record
             yaw_rate_radps: odometry.yaw_rate_radps as f32,
             ground: layout.surface_at(pose.x_m, pose.y_m),
         });
+        coefficients.push(layout.coefficients_under(machine.plant()));
         machine.drive([speed_mps as f32, curvature_per_m as f32], |_| {})?;
         run.imu.extend_from_slice(machine.samples());
     }
-    Ok(run)
+    Ok((run, coefficients))
 }
 
 /// Where the driver holds the stick, and where it is going.

@@ -68,24 +68,10 @@ impl Grid {
 
 /// A row of a drive log: odometry, and the command of its time [m/s], [rad].
 pub fn drive_row(time_s: f64, odometry: &Odometry, [speed_mps, steering_rad]: [f64; 2]) -> DriveRow {
-    let [x, y, z] = odometry.position_m;
-    let [roll, pitch, yaw] = odometry.attitude_rad;
-    let [vx, vy] = odometry.velocity_mps;
-    [
-        (Column::X, x),
-        (Column::Y, y),
-        (Column::Z, z),
-        (Column::Roll, roll),
-        (Column::Pitch, pitch),
-        (Column::Yaw, yaw),
-        (Column::Vx, vx),
-        (Column::Vy, vy),
-        (Column::Wz, odometry.yaw_rate_radps),
-        (Column::CmdSpeed, speed_mps),
-        (Column::CmdSteer, steering_rad),
-    ]
-    .into_iter()
-    .fold(DriveRow::new(time_s), |row, (column, value)| row.with(column, value))
+    DriveRow::new(time_s)
+        .with_odometry(odometry)
+        .with(Column::CmdSpeed, speed_mps)
+        .with(Column::CmdSteer, steering_rad)
 }
 
 impl From<&Odometry> for OdometryRecord {

@@ -27,9 +27,15 @@ pub enum BenchCommand {
     /// Drives among people who cross the way
     #[command(long_about = super::crossings::LONG_ABOUT)]
     Crossings(super::BenchCrossingsArguments),
+    /// Causes of wrong beliefs about the ground, withheld from who names them
+    #[command(long_about = super::ground::BENCH_ABOUT)]
+    Ground(super::BenchGroundArguments),
     /// The simulated machine: its tyre, what its drives teach, and how fast it runs
     #[command(long_about = super::plant::LONG_ABOUT)]
     Plant(super::BenchPlantArguments),
+    /// Friction found from drives without labels, beside the truth
+    #[command(long_about = super::friction::BENCH_ABOUT)]
+    Friction(super::BenchFrictionArguments),
     /// Drives of plants with a gap, with nominal, repaired and true models
     #[command(long_about = super::bench_gap::LONG_ABOUT)]
     Gap(super::BenchGapArguments),

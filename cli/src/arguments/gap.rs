@@ -15,6 +15,9 @@ pub enum GapCommand {
     /// Put the effects of a diagnosis into the controller's model
     #[command(long_about = APPLY_ABOUT)]
     Apply(GapApplyArguments),
+    /// Say where the belief about the ground and what drives met on it part, and what has changed
+    #[command(long_about = super::ground::GAP_ABOUT)]
+    Ground(super::GapGroundArguments),
     /// List the effects that a diagnosis knows: equations, parameters and what each does to a drive
     Effects(GapEffectsArguments),
     /// Make cases with withheld causes, to try a diagnosis on

@@ -34,6 +34,10 @@ pub struct RouteArguments {
     #[arg(long, value_name = "GROUND", default_value = "dirt")]
     pub bare: BareGround,
 
+    /// Friction of the vehicle's own drives in place of the published, as `surefoot train friction` writes it (TOML)
+    #[arg(long, value_name = "FILE")]
+    pub friction: Option<PathBuf>,
+
     /// Fastest [m/s] [default: the vehicle's]
     #[arg(long, value_name = "M/S", allow_hyphen_values = true)]
     pub speed: Option<f64>,
@@ -75,8 +79,10 @@ Writes route.png, route.csv and route.json.
   route.csv   x_m, y_m, yaw_rad, height_m, speed_mps, curvature_per_m, grade, friction along the way
   path        `surefoot path` takes the corners that are printed
 
-Friction comes from the file's share of low plants (grass) and from --bare; nothing is learned from images.
+The file's share of low plants (grass) and --bare say what the ground is; how much it holds comes from the published
+table, or from --friction for the grounds that are in it. Nothing is learned from images.
 
 Examples:
   surefoot route --world hills.npz --start 20,20,0.8 --goal 250,240
-  surefoot route --world hills.npz --start 20,20,0.8 --goal 250,240 --bare mud --speed 5 --vehicle mine.toml";
+  surefoot route --world hills.npz --start 20,20,0.8 --goal 250,240 --bare mud --speed 5 --vehicle mine.toml
+  surefoot route --world hills.npz --start 20,20,0.8 --goal 250,240 --friction friction.toml";

@@ -1,4 +1,4 @@
-//! `surefoot train traversability`.
+//! `surefoot train`; this file holds `traversability`.
 
 use std::path::PathBuf;
 
@@ -16,6 +16,9 @@ pub enum TrainCommand {
     /// A model that says which command does what is wanted on the ground that the IMU feels
     #[command(long_about = super::kinodynamics::TRAIN_LONG_ABOUT)]
     Kinodynamics(Box<super::TrainKinodynamicsArguments>),
+    /// How much each ground holds, from drives over it, for `surefoot route --friction`
+    #[command(long_about = super::friction::TRAIN_ABOUT)]
+    Friction(super::TrainFrictionArguments),
 }
 
 /// What to fit, to what, and how.

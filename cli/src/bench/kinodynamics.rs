@@ -64,12 +64,28 @@ fn request(arguments: &BenchKinodynamicsArguments) -> Result<Request, UsageError
         minutes: arguments.minutes,
         epochs: arguments.epochs,
         laps: arguments.laps,
-        rows: match arguments.rows {
-            KinodynamicsRows::Paper => Row::PAPER.to_vec(),
-            KinodynamicsRows::All => Row::ALL.to_vec(),
-        },
+        rows: rows(&arguments.rows),
         half_width_m: arguments.half_width.unwrap_or(HALF_WIDTH_M),
     })
+}
+
+/// All that were asked for, alone or in a group, in the order of the tables.
+fn rows(asked: &[KinodynamicsRows]) -> Vec<Row> {
+    let of = |asked: &KinodynamicsRows| -> &'static [Row] {
+        match asked {
+            KinodynamicsRows::Paper => &Row::PAPER,
+            KinodynamicsRows::Controls => &Row::CONTROLS,
+            KinodynamicsRows::All => &Row::ALL,
+            KinodynamicsRows::Baseline => &[Row::Baseline],
+            KinodynamicsRows::Ablation => &[Row::Ablation],
+            KinodynamicsRows::Learned => &[Row::Learned],
+            KinodynamicsRows::Oracle => &[Row::Oracle],
+            KinodynamicsRows::Shuffled => &[Row::Shuffled],
+            KinodynamicsRows::Constant => &[Row::Constant],
+            KinodynamicsRows::Wide => &[Row::Wide],
+        }
+    };
+    Row::ALL.into_iter().filter(|row| asked.iter().any(|asked| of(asked).contains(row))).collect()
 }
 
 /// Too little data is the user's choice; all else is not.

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use bench::closed_loop::layers_of;
 use bench::collection::{Collection, Recorded, collect_recorded};
 use bicycle::{Column, DriveLog, Vehicle};
 use formats::{read_drive_log_csv, read_drive_log_mcap, read_elevation};
@@ -9,7 +10,6 @@ use formats::{read_drive_log_csv, read_drive_log_mcap, read_elevation};
 use super::told;
 use crate::UsageError;
 use crate::arguments::{CollectArguments, Goal};
-use crate::drive::scene::layers;
 
 /// Reads both files and labels what was driven.
 pub(super) fn gather(
@@ -23,7 +23,7 @@ pub(super) fn gather(
     if let Some(Goal { x_m, y_m }) = arguments.elevation_origin {
         log = moved(&log, [-x_m, -y_m])?;
     }
-    let layers = layers(read_elevation(elevation).map_err(UsageError::from_input)?);
+    let layers = layers_of(read_elevation(elevation).map_err(UsageError::from_input)?);
     collect_recorded(vehicle, log, &layers, &source).map_err(told)
 }
 

@@ -32,12 +32,17 @@ impl Knowledge {
     /// Reads what was asked for; refuses networks that do not fit the vehicle or the method.
     pub fn choose(arguments: &DriveArguments, vehicle: &Vehicle) -> Result<Self, UsageError> {
         let corrector = correction::choose(arguments, vehicle)?;
-        Ok(Self { corrector, ..Self::of_ground(arguments, vehicle)? })
+        let asked = arguments.method.map(Method::from);
+        Ok(Self { corrector, ..Self::of_ground(arguments.weights.as_deref(), asked, vehicle)? })
     }
 
-    fn of_ground(arguments: &DriveArguments, vehicle: &Vehicle) -> Result<Self, UsageError> {
-        let asked = arguments.method.map(Method::from);
-        if let Some(folder) = &arguments.weights {
+    /// The same without what corrects commands: networks of a folder, of a method, or the best that come with the program.
+    pub fn of_ground(
+        weights: Option<&Path>,
+        asked: Option<Method>,
+        vehicle: &Vehicle,
+    ) -> Result<Self, UsageError> {
+        if let Some(folder) = weights {
             return Self::from_folder(folder, asked, vehicle);
         }
         match asked {

@@ -4,9 +4,9 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use bench::closed_loop::{ClosedLoop, Cycle};
-use bicycle::{Column, DriveRow, Odometry, State};
+use bicycle::State;
 use formats::{DriveRecorder, RecordError};
-use scenarios::{Observation, TraceRow, World};
+use scenarios::{Observation, World};
 use terrain::{GridGeometry, GridMap, Pose};
 use traversability::{GroundFlags, RiskMapView};
 
@@ -51,7 +51,7 @@ impl Recording {
         self.recorder.command(at_ns, &row.command)?;
         self.recorder.decision(at_ns, &cycle.decision)?;
         self.recorder.controller(at_ns, closed.navigator.controller().diagnostics())?;
-        self.recorder.drive_row(at_ns, "1", &measured_row(row, &measured.odometry))?;
+        self.recorder.drive_row(at_ns, "1", &row.measured_row(&measured.odometry))?;
         let number = closed.episode.n_cycles() - 1;
         if number.is_multiple_of(CYCLES_PER_ROLLOUTS) {
             self.rollouts(at_ns, closed, pose.z_m)?;
@@ -85,29 +85,6 @@ impl Recording {
         }
         Ok(())
     }
-}
-
-/// The row of the drive log: what the sensors said, as a robot's log would have it, with all their faults. What the
-/// localisation does not measure, the specific force, is the true one.
-fn measured_row(row: &TraceRow, odometry: &Odometry) -> DriveRow {
-    let [x_m, y_m, z_m] = odometry.position_m;
-    let [roll_rad, pitch_rad, yaw_rad] = odometry.attitude_rad;
-    let [vx_mps, vy_mps] = odometry.velocity_mps;
-    [
-        (Column::X, x_m),
-        (Column::Y, y_m),
-        (Column::Z, z_m),
-        (Column::Roll, roll_rad),
-        (Column::Pitch, pitch_rad),
-        (Column::Yaw, yaw_rad),
-        (Column::Vx, vx_mps),
-        (Column::Vy, vy_mps),
-        (Column::Wz, odometry.yaw_rate_radps),
-        (Column::WheelSpeed, odometry.wheel_speed_mps),
-        (Column::SteerMeas, odometry.steering_rad),
-    ]
-    .into_iter()
-    .fold(row.drive_row(), |row, (column, value)| row.with(column, value))
 }
 
 /// The risk of every place as it was last known, over the whole world.

@@ -2,14 +2,12 @@
 
 use std::path::{Path, PathBuf};
 
+use bench::closed_loop::layers_of;
 use bicycle::lanes::{Instructions, Isa};
 use bicycle::{Model, Vehicle};
-use formats::{ConfigText, ElevationFile, overlay, read_elevation, read_model, read_vehicle};
+use formats::{ConfigText, overlay, read_elevation, read_model, read_vehicle};
 use navigator::{Config, GuardConfig, Route};
-use scenarios::{
-    ArenaConfig, ArenaError, EpisodeConfig, Pair, PairWish, ROCK_FIELD_DISTANCE_M, RockFieldConfig, Task,
-    WorldLayers, check_pair,
-};
+use scenarios::{ArenaConfig, ArenaError, EpisodeConfig, Pair, PairWish, RockFieldConfig, Task, check_pair};
 
 use super::knowledge::Knowledge;
 use super::open_loop::Script;
@@ -156,13 +154,11 @@ fn arena(arguments: &DriveArguments) -> Result<Task, UsageError> {
 }
 
 fn in_file(arguments: &DriveArguments, vehicle: &Vehicle, path: &Path) -> Result<Task, UsageError> {
-    let layers = layers(read_elevation(path).map_err(UsageError::from_input)?);
-    let bounds = layers.bounds();
-    let shortest_m = (0..2).map(|k| bounds.north_east_m[k] - bounds.south_west_m[k]).fold(f64::MAX, f64::min);
+    let layers = layers_of(read_elevation(path).map_err(UsageError::from_input)?);
     let wish = PairWish {
         start: arguments.start.map(|start| [start.x_m, start.y_m, start.yaw_rad]),
         goal_m: last_goal_m(arguments),
-        distance_m: ROCK_FIELD_DISTANCE_M.min(0.5 * shortest_m),
+        distance_m: layers.drive_distance_m(),
     };
     let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
     let task =
@@ -171,17 +167,6 @@ fn in_file(arguments: &DriveArguments, vehicle: &Vehicle, path: &Path) -> Result
         check_goals(arguments, vehicle, &task)?;
     }
     Ok(task)
-}
-
-/// The file's layers as a world takes them.
-pub(crate) fn layers(file: ElevationFile) -> WorldLayers {
-    WorldLayers {
-        elevation_m: file.elevation,
-        canopy_height_m: file.layers.canopy_height_m,
-        low_vegetation_fraction: file.layers.low_vegetation_fraction,
-        water: file.layers.water,
-        ground_gap_m: file.layers.ground_gap_m,
-    }
 }
 
 #[cfg(test)]

@@ -2,25 +2,21 @@
 
 use std::path::Path;
 
-use bicycle::effect::{CATALOGUE, DriveLag, EffectError, SpeedLag};
 use bicycle::{Effect, Model};
 use formats::ConfigText;
-use sim_to_real::{Answer, NamedEffect, SCHEMA_VERSION, Steering, Verdict};
+use sim_to_real::{Answer, PartUnknown, RepairError, Verdict, repaired};
 
 use crate::UsageError;
 use crate::arguments::GapApplyArguments;
 
 pub(super) fn run(arguments: &GapApplyArguments) -> anyhow::Result<()> {
     let answer = read_answer(&arguments.diagnosis)?;
-    let told = |message: String| UsageError(format!("{}: {message}", arguments.diagnosis.display()));
-    if answer.verdict == Verdict::EffectsAndUnknown && !arguments.force {
-        return Err(told(FORCED.to_owned()).into());
-    }
-    let effects = effects(&answer).map_err(told)?;
-    let mut model = read_model(&arguments.model)?;
-    let effects: Vec<Effect> = effects.into_iter().map(|effect| fitting(effect, &model)).collect();
-    model.effects.extend(&effects);
-    model.validate().map_err(|error| told(error.to_string()))?;
+    let part_unknown = if arguments.force { PartUnknown::Applied } else { PartUnknown::Refused };
+    let found = repaired(&read_model(&arguments.model)?, &answer, part_unknown);
+    let (model, effects) = found.map_err(|error| {
+        let told = if error == RepairError::PartUnknown { FORCED.to_owned() } else { error.to_string() };
+        UsageError(format!("{}: {told}", arguments.diagnosis.display()))
+    })?;
     let text = text(&model, &answer, &arguments.model)?;
     formats::write_bytes_atomic(&arguments.out, text.as_bytes())
         .map_err(|error| UsageError(format!("--out: {}", UsageError::from_input(error))))?;
@@ -36,65 +32,8 @@ fn read_answer(path: &Path) -> Result<Answer, UsageError> {
     let file = path.display();
     let text = std::fs::read_to_string(path)
         .map_err(|error| UsageError(format!("{file}: expected a readable file, found: {error}")))?;
-    let answer: Answer = serde_json::from_str(&text).map_err(|error| {
-        UsageError(format!("{file}: expected the answer of gap diagnose, found: {error}"))
-    })?;
-    if answer.schema_version > SCHEMA_VERSION {
-        let found = answer.schema_version;
-        let told = format!("{file}: schema_version: expected at most {SCHEMA_VERSION}, found {found}");
-        return Err(UsageError(told));
-    }
-    Ok(answer)
-}
-
-/// The announced effects as pieces of a model.
-fn effects(answer: &Answer) -> Result<Vec<Effect>, String> {
-    if answer.steering == Steering::YawRate {
-        return Err(
-            "steering: expected a diagnosis of a machine that steers by an angle, as the controller does, \
-                    found one that is skid-steered: its effects on the steering mean yaw rates"
-                .to_owned(),
-        );
-    }
-    match answer.verdict {
-        Verdict::None => Ok(Vec::new()),
-        Verdict::Unknown => {
-            Err("verdict: expected effects to apply, found 'unknown': no effect of the catalogue explains the gap"
-                .to_owned())
-        }
-        Verdict::Effects | Verdict::EffectsAndUnknown => answer.effects.iter().map(effect).collect(),
-    }
-}
-
-fn effect(named: &NamedEffect) -> Result<Effect, String> {
-    let id = named.form.as_deref().unwrap_or(&named.id);
-    let description = CATALOGUE.iter().find(|description| description.id == id);
-    let Some(description) = description else {
-        let known: Vec<_> = CATALOGUE.iter().map(|description| description.id).collect();
-        return Err(format!("effects: expected one of {}, found '{id}'", known.join(", ")));
-    };
-    let mut values = [0.0; 4];
-    for (value, parameter) in values.iter_mut().zip(description.parameters) {
-        let estimate = named.parameters.get(parameter.name);
-        *value = estimate
-            .ok_or_else(|| format!("effects: {id}: expected parameter {}, found none", parameter.name))?
-            .value;
-    }
-    let effect = Effect::from_values(id, values).ok_or_else(|| format!("effects: '{id}' cannot be made"))?;
-    effect.validate().map_err(|error: EffectError| error.to_string())?;
-    Ok(effect)
-}
-
-/// A motor's lag acts inside a speed loop. A model without one closes any distance within a step, which a late motor would
-/// overshoot: there it is a lag of the command.
-fn fitting(effect: Effect, model: &Model) -> Effect {
-    let has_loop = model.effects.iter().any(|own| matches!(own, Effect::SpeedLoop(_)));
-    match effect {
-        Effect::DriveLag(DriveLag { time_constant_s }) if !has_loop => {
-            Effect::SpeedLag(SpeedLag { time_constant_s })
-        }
-        _ => effect,
-    }
+    serde_json::from_str(&text)
+        .map_err(|error| UsageError(format!("{file}: expected the answer of gap diagnose, found: {error}")))
 }
 
 /// A model's file, or the model that a vehicle's file or a shipped vehicle stands for.

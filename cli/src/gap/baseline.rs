@@ -8,7 +8,7 @@ use bicycle::DriveLog;
 use sim_to_real::{Baseline, GapError, Machine};
 
 use super::progress::Progress;
-use crate::summary;
+use crate::{Program, summary};
 
 /// The kept baseline of these inputs, else a new one, which is kept. A cache that cannot be read or written costs time
 /// and nothing else; that is told in `doubts`.
@@ -61,7 +61,7 @@ fn key(machine: &Machine, sim: &[DriveLog]) -> Option<String> {
 
 /// Size and time of the program's file: a revision alone does not tell uncommitted changes apart.
 fn program() -> Option<(u64, u128)> {
-    let file = std::env::current_exe().and_then(std::fs::metadata).ok()?;
+    let file = Program::current().and_then(|program| std::fs::metadata(program.file())).ok()?;
     Some((file.len(), file.modified().ok()?.duration_since(UNIX_EPOCH).ok()?.as_nanos()))
 }
 

@@ -2,33 +2,23 @@
 
 use std::path::Path;
 
-use bicycle::DriveLog;
-use report::Picture;
-use report::gap::{Page, Pictures, Reference};
+use report::gap::Told;
 use sim_to_real::{
-    Answer, Baseline, Diagnosis, Machine, Verification, WithoutSimulator, diagnose,
+    Answer, Baseline, Case, Diagnosed, Diagnosis, Drives, Verification, WithoutSimulator, diagnose,
     diagnose_without_simulator, verify,
 };
 
-use super::follow_up::Diagnosed;
 use super::in_simulator::Decider;
 use super::outputs::Outputs;
 use super::progress::Progress;
 use super::request::Request;
-use super::{baseline, drives, machine, predictions};
+use super::{baseline, drives, follow_up, machine};
 use crate::arguments::GapDiagnoseArguments;
 use crate::{LimitExceeded, UsageError, summary};
 
-/// What a diagnosis is made from.
-struct Inputs {
-    machine: Machine,
-    sim: Vec<DriveLog>,
-    real: Vec<DriveLog>,
-}
-
 /// The held-out drives and what they say; without any there is nothing.
 struct Verified {
-    heldout: Vec<DriveLog>,
+    heldout: Drives,
     verification: Option<Verification>,
 }
 
@@ -41,40 +31,34 @@ pub(super) fn run(arguments: &GapDiagnoseArguments) -> anyhow::Result<()> {
     }
     let outputs = Outputs::prepare(arguments)?;
     let mut doubts = request.doubtful_names()?;
-    let inputs = read(&request, &mut doubts)?;
-    let mut decider = Decider::start(&arguments.simulator, &inputs.machine, &inputs.sim)?;
+    let case = read(&request, &mut doubts)?;
+    let mut decider = Decider::start(&arguments.simulator, &case.machine, &case.sim.logs)?;
     let folder = arguments.baseline_cache.clone().or_else(baseline::default_folder);
-    let (baseline, diagnosis) = diagnosed_against(&inputs, folder.as_deref(), &mut doubts)?;
-    let mut predicted = diagnosis.answer(request.name.as_deref().unwrap_or(&inputs.machine.name));
-    let diagnosed = Diagnosed {
-        baseline: &baseline,
-        machine: &inputs.machine,
-        diagnosis: &diagnosis,
-        sim: &inputs.sim,
-        real: &inputs.real,
-    };
-    diagnosed.advise(&mut predicted, (arguments, &outputs))?;
-    decider.decide(&mut predicted, &inputs.machine, (&inputs.sim, &inputs.real))?;
+    let (baseline, diagnosis) = diagnosed_against(&case, folder.as_deref(), &mut doubts)?;
+    let mut predicted = diagnosis.answer(request.name.as_deref().unwrap_or(&case.machine.name));
+    let diagnosed = Diagnosed { case: &case, baseline: &baseline, diagnosis: &diagnosis };
+    follow_up::advise(&diagnosed, &mut predicted, (arguments, &outputs))?;
+    decider.decide(&mut predicted, &case.machine, (&case.sim.logs, &case.real.logs))?;
     outputs.write_json("prediction.json", &predicted)?;
 
     // From here on the prediction cannot change any more.
-    let verified = open_heldout(&request, &inputs, &baseline, &diagnosis, &mut doubts)?;
+    let verified = open_heldout(&request, &diagnosed, &mut doubts)?;
     let complete = |verification: &Verification| verification.complete(predicted.clone());
     let mut answer = verified.verification.as_ref().map_or_else(|| predicted.clone(), complete);
-    decider.verify(&mut answer, &inputs.machine, &verified.heldout)?;
+    decider.verify(&mut answer, &case.machine, &verified.heldout.logs)?;
     let n_runs = decider.finish();
-    diagnosed.bound(&mut answer, (arguments, &outputs), &verified.heldout)?;
+    follow_up::bound(&diagnosed, &mut answer, (arguments, &outputs), &verified.heldout.logs)?;
     answer.advice.extend(doubts.iter().map(|doubt| format!("check {doubt}")));
-    let report = Report {
-        request: &request,
-        inputs: &inputs,
-        answer: &answer,
+    let told = Told {
+        case: &case,
+        heldout: &verified.heldout,
+        verification: verified.verification.as_ref(),
         diagnosis: &diagnosis,
+        answer: &answer,
         doubts: &doubts,
-        n_runs,
     };
-    report.write(&outputs, &verified)?;
-    report.say(&outputs);
+    write(&told, &outputs)?;
+    say(&told, &outputs, n_runs);
     arguments.fail_above.map_or(Ok(()), |limit| held_to(limit, &answer))
 }
 
@@ -93,137 +77,74 @@ fn held_to(limit: f64, answer: &Answer) -> anyhow::Result<()> {
 
 /// Against the calibrated simulator; without nominal drives against the bare kinematic bicycle.
 fn diagnosed_against(
-    inputs: &Inputs,
+    case: &Case,
     folder: Option<&Path>,
     doubts: &mut Vec<String>,
 ) -> Result<(Baseline, Diagnosis), UsageError> {
-    let Inputs { machine, sim, real } = inputs;
-    if sim.is_empty() {
+    let Case { machine, sim, real } = case;
+    if sim.logs.is_empty() {
         let searching = Progress::search();
-        let found = diagnose_without_simulator(machine, real);
+        let found = diagnose_without_simulator(machine, &real.logs);
         searching.finish();
         let WithoutSimulator { baseline, diagnosis } = found.map_err(UsageError::from_input)?;
         return Ok((baseline, diagnosis));
     }
     let baseline =
-        baseline::load_or_calibrate(machine, sim, folder, doubts).map_err(UsageError::from_input)?;
+        baseline::load_or_calibrate(machine, &sim.logs, folder, doubts).map_err(UsageError::from_input)?;
     let searching = Progress::search();
-    let diagnosis = diagnose(&baseline, machine, real);
+    let diagnosis = diagnose(&baseline, machine, &real.logs);
     searching.finish();
     Ok((baseline, diagnosis.map_err(UsageError::from_input)?))
 }
 
-fn read(request: &Request, doubts: &mut Vec<String>) -> Result<Inputs, UsageError> {
+fn read(request: &Request, doubts: &mut Vec<String>) -> Result<Case, UsageError> {
     let names = &request.names;
     let (sim, real) =
         (drives::read(&request.sim, names, doubts)?, drives::read(&request.real, names, doubts)?);
-    let machine = machine::read(&request.vehicle, &[&sim[..], &real[..]].concat())?;
-    let sim = drives::screened(&machine, &request.sim, sim, doubts)?;
-    let real = drives::screened(&machine, &request.real, real, doubts)?;
-    drives::refuse_mixed_steering(&machine, &[(&sim, &request.sim), (&real, &request.real)])?;
-    drives::screen_together(&machine, &sim, &real, doubts)?;
-    Ok(Inputs { machine, sim, real })
+    let machine = machine::read(&request.vehicle, &[&sim.logs[..], &real.logs[..]].concat())?;
+    Case::screened(machine, sim, real, doubts).map_err(UsageError::from_input)
 }
 
 /// Opens the drives that nothing has looked at so far and judges the diagnosis on them.
 fn open_heldout(
     request: &Request,
-    inputs: &Inputs,
-    baseline: &Baseline,
-    diagnosis: &Diagnosis,
+    diagnosed: &Diagnosed<'_>,
     doubts: &mut Vec<String>,
 ) -> Result<Verified, UsageError> {
+    let Diagnosed { case, baseline, diagnosis } = *diagnosed;
     let heldout = drives::read(&request.heldout, &request.names, doubts)?;
-    let heldout = drives::screened(&inputs.machine, &request.heldout, heldout, doubts)?;
-    let of_both = [(&inputs.real[..], &request.real[..]), (&heldout[..], &request.heldout[..])];
-    drives::refuse_mixed_steering(&inputs.machine, &of_both)?;
-    let seen_paths: Vec<_> = request.sim.iter().chain(&request.real).collect();
-    let seen = [&inputs.sim[..], &inputs.real[..]].concat();
-    drives::refuse_seen(&heldout, &request.heldout, &seen, &seen_paths)?;
-    let judged = || verify(baseline, &inputs.machine, diagnosis, &heldout);
+    let heldout = case.heldout(heldout, doubts).map_err(UsageError::from_input)?;
+    let judged = || verify(baseline, &case.machine, diagnosis, &heldout.logs);
     let verification =
-        if heldout.is_empty() { None } else { Some(judged().map_err(UsageError::from_input)?) };
+        if heldout.logs.is_empty() { None } else { Some(judged().map_err(UsageError::from_input)?) };
     Ok(Verified { heldout, verification })
 }
 
-/// Everything that files and terminal tell.
-struct Report<'a> {
-    request: &'a Request,
-    inputs: &'a Inputs,
-    answer: &'a Answer,
-    diagnosis: &'a Diagnosis,
-    doubts: &'a [String],
-    /// Drives that the user's own simulator was sent through, if there is one.
-    n_runs: Option<usize>,
+fn write(told: &Told<'_>, outputs: &Outputs) -> anyhow::Result<()> {
+    outputs.write_json("answer.json", told.answer)?;
+    if let (Some(path), Some(csv)) = (&outputs.predictions, told.predictions_csv()) {
+        formats::write_bytes_atomic(path, csv.as_bytes())?;
+    }
+    let Some(folder) = &outputs.folder else { return Ok(()) };
+    let pictures = told.pictures()?;
+    for picture in &pictures {
+        formats::write_bytes_atomic(&folder.join(picture.file), &picture.png)?;
+    }
+    let page = told.page(&pictures, &summary::program());
+    Ok(formats::write_bytes_atomic(&folder.join("report.html"), page.as_bytes())?)
 }
 
-impl Report<'_> {
-    fn write(&self, outputs: &Outputs, verified: &Verified) -> anyhow::Result<()> {
-        outputs.write_json("answer.json", self.answer)?;
-        if let (Some(path), Some(verification)) = (&outputs.predictions, &verified.verification) {
-            let names = predictions::run_names(&verified.heldout, &self.request.heldout);
-            let csv = predictions::csv(&verification.predictions, &names);
-            formats::write_bytes_atomic(path, csv.as_bytes())?;
-        }
-        let Some(folder) = &outputs.folder else { return Ok(()) };
-        let pictures = self.pictures(verified)?;
-        for picture in &pictures {
-            formats::write_bytes_atomic(&folder.join(picture.file), &picture.png)?;
-        }
-        let page = report::gap::page(&Page {
-            answer: self.answer,
-            drives: &self.told_drives(),
-            doubts: self.doubts,
-            pictures: &pictures,
-            reference: self.reference(),
-            program: &format!("surefoot {}, revision {}", env!("CARGO_PKG_VERSION"), summary::revision()),
-        });
-        Ok(formats::write_bytes_atomic(&folder.join("report.html"), page.as_bytes())?)
+/// `n_runs` are the drives that the user's own simulator was sent through, if there is one.
+fn say(told: &Told<'_>, outputs: &Outputs, n_runs: Option<usize>) {
+    for doubt in told.doubts {
+        eprintln!("surefoot: {doubt}");
     }
-
-    fn pictures(&self, verified: &Verified) -> anyhow::Result<Vec<Picture>> {
-        let verification = verified.verification.as_ref();
-        let names = predictions::run_names(&verified.heldout, &self.request.heldout);
-        let strip = verification.and_then(|v| predictions::strip(&v.predictions, &verified.heldout, &names));
-        let shown = Pictures {
-            reference: self.reference(),
-            answer: self.answer,
-            findings: &self.diagnosis.findings,
-            heldout_residuals: verification.map_or(&[], |verification| &verification.residuals),
-            ground: self.inputs.machine.ground.as_ref(),
-            heldout: strip.as_ref(),
-        };
-        Ok(report::gap::pictures(&shown)?)
+    print!("{}", told.text());
+    if let Some(n_runs) = n_runs {
+        println!("  {n_runs} drives in the simulator");
     }
-
-    fn reference(&self) -> Reference {
-        if self.inputs.sim.is_empty() { Reference::Bicycle } else { Reference::Simulator }
-    }
-
-    fn say(&self, outputs: &Outputs) {
-        for doubt in self.doubts {
-            eprintln!("surefoot: {doubt}");
-        }
-        print!("{}", report::gap::text(self.answer, &self.told_drives()));
-        if let Some(n_runs) = self.n_runs {
-            println!("  {n_runs} drives in the simulator");
-        }
-        let report = outputs.in_folder("report.html");
-        for path in
-            [report.as_ref(), outputs.json.as_ref(), outputs.predictions.as_ref()].into_iter().flatten()
-        {
-            println!("  {}", path.display());
-        }
-    }
-
-    /// `veh_b: 4 nominal drives, 2 real drives, 1 held-out drive`.
-    fn told_drives(&self) -> String {
-        let request = self.request;
-        let kinds = [(&request.sim, "nominal"), (&request.real, "real"), (&request.heldout, "held-out")];
-        let counted = kinds.map(|(drives, what)| match drives.len() {
-            1 => format!("1 {what} drive"),
-            n => format!("{n} {what} drives"),
-        });
-        format!("{}: {}", self.inputs.machine.name, counted.join(", "))
+    let report = outputs.in_folder("report.html");
+    for path in [report.as_ref(), outputs.json.as_ref(), outputs.predictions.as_ref()].into_iter().flatten() {
+        println!("  {}", path.display());
     }
 }

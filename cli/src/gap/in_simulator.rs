@@ -1,14 +1,11 @@
 //! The last word of a diagnosis: the user's own simulator, before and after the held-out drives are opened.
 
 use bicycle::DriveLog;
-use sim_to_real::{Answer, InSimulatorDiagnosis, InSimulatorError, Machine, judge_in_simulator, own_runs};
+use sim_to_real::{Answer, InSimulatorDiagnosis, InSimulatorError, Machine, decide_in_simulator, own_runs};
 
 use super::simulator::Simulators;
 use crate::UsageError;
 use crate::arguments::GapSimulatorArguments;
-
-/// From here on a simulator does not drive its own recorded drives again, in their measurements' noise [-].
-const OTHER_DRIVES: f64 = 5.0;
 
 /// The simulator that decides, if one was asked for.
 pub(super) struct Decider {
@@ -47,17 +44,8 @@ impl Decider {
     ) -> anyhow::Result<()> {
         let Some(simulators) = &self.simulators else { return Ok(()) };
         let run = |runs: &[_]| simulators.run(runs);
-        let found = judge_in_simulator(&simulators.description, machine, &answer.ranking, drives, &run);
-        let diagnosis = found.map_err(told)?;
-        let error = diagnosis.answer.own_drives_error;
-        if error > OTHER_DRIVES {
-            answer.advice.push(format!(
-                "record the nominal drives again: {} misses those that were given by {error:.1} times their noise",
-                diagnosis.answer.simulator
-            ));
-        }
-        answer.in_simulator = Some(diagnosis.answer.clone());
-        self.diagnosis = Some(diagnosis);
+        let decided = decide_in_simulator(&simulators.description, machine, answer, drives, &run);
+        self.diagnosis = Some(decided.map_err(told)?);
         Ok(())
     }
 

@@ -1,16 +1,13 @@
-//! The user's own simulator: processes that are started, asked and ended here. Runs that were made once are not made
-//! again.
+//! The user's own simulator: processes that are started, asked and ended here.
 
 mod process;
 mod protocol;
 
-use std::collections::HashMap;
-use std::hash::{DefaultHasher, Hash, Hasher};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Duration;
 
-use sim_to_real::{Machine, Motion, SimulatorDescription, SimulatorRun};
+use sim_to_real::{Machine, Motion, RunMemory, SimulatorDescription, SimulatorRun};
 
 use super::progress::Progress;
 use super::workers::work;
@@ -23,7 +20,7 @@ pub(super) struct Simulators {
     pub description: SimulatorDescription,
     idle: Mutex<Vec<Instance>>,
     n_instances: usize,
-    known: Mutex<HashMap<u64, Motion>>,
+    known: Mutex<RunMemory>,
     n_runs: AtomicUsize,
     progress: Progress,
 }
@@ -62,27 +59,13 @@ impl Simulators {
     ///
     /// Errors: the first run that fails.
     pub(super) fn run(&self, runs: &[SimulatorRun]) -> anyhow::Result<Vec<Motion>> {
-        let bodies = runs.iter().map(protocol::run_body).collect::<Result<Vec<_>, _>>()?;
-        let keys: Vec<u64> = bodies.iter().map(|body| key(body)).collect();
-        let mut missing: Vec<usize> = Vec::new();
-        {
-            let known = self.known.lock().map_err(|_| a_thread_failed())?;
-            for run in 0..runs.len() {
-                let is_listed = missing.iter().any(|&other| keys[other] == keys[run]);
-                if !is_listed && !known.contains_key(&keys[run]) {
-                    missing.push(run);
-                }
-            }
-        }
-        let made = work(missing.len(), self.n_instances, |job| {
-            let run = missing[job];
-            let motion = self.run_one(&bodies[run], runs[run].n_rows())?;
-            Ok((keys[run], motion))
-        })?;
         let mut known = self.known.lock().map_err(|_| a_thread_failed())?;
-        known.extend(made);
-        let motion = |key: &u64| known.get(key).cloned().ok_or_else(|| a_thread_failed().into());
-        keys.iter().map(motion).collect()
+        known.recall(runs, |missing| {
+            work(missing.len(), self.n_instances, |job| {
+                let run = missing[job];
+                Ok(self.run_one(&protocol::run_body(run)?, run.n_rows())?)
+            })
+        })
     }
 
     /// Runs in whichever instance is idle: there are as many threads as instances.
@@ -105,10 +88,4 @@ impl Simulators {
 
 fn a_thread_failed() -> WorkFailed {
     WorkFailed("a thread that asks the simulator has failed".to_owned())
-}
-
-fn key(body: &str) -> u64 {
-    let mut hasher = DefaultHasher::new();
-    body.hash(&mut hasher);
-    hasher.finish()
 }

@@ -2,15 +2,14 @@
 
 use std::ffi::OsString;
 use std::net::{Ipv4Addr, SocketAddr};
-use std::path::Path;
-use std::process::{Child, Command, Stdio};
+use std::process::{Child, Stdio};
 
 use runtime::live;
 use rustix::process::{Signal, set_parent_process_death_signal};
 
 use super::roles;
 use crate::arguments::UpArguments;
-use crate::interrupt;
+use crate::{Program, interrupt};
 
 /// Serves the view until told to end.
 pub(super) fn run(arguments: &UpArguments) -> anyhow::Result<()> {
@@ -29,8 +28,9 @@ pub(super) fn run(arguments: &UpArguments) -> anyhow::Result<()> {
 pub(super) struct Viewer(Child);
 
 impl Viewer {
-    pub fn start(program: &Path, words: &[OsString]) -> std::io::Result<Self> {
-        let child = Command::new(program)
+    pub fn start(program: &Program, words: &[OsString]) -> std::io::Result<Self> {
+        let child = program
+            .again()
             .args(words)
             .args(["--role", "live", "--supervised"])
             .stdout(Stdio::null())

@@ -95,10 +95,6 @@ impl BeliefLayers {
     }
 
     fn learned_share(&self, prediction: &Prediction) -> [f32; 4] {
-        let n_prior = self.fusion.prior_evidence;
-        match (&prediction.evidence, self.fusion.prior) {
-            (Some(evidence), Prior::Physics | Prior::Uniform) => evidence.counts.map(|n| n / (n_prior + n)),
-            _ => [1.0; 4],
-        }
+        prediction.learned_share(self.fusion.prior, self.fusion.prior_evidence)
     }
 }

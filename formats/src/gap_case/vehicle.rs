@@ -2,11 +2,12 @@
 
 use std::path::{Path, PathBuf};
 
+use bicycle::Vehicle;
 use serde::Deserialize;
 
 use super::GapGround;
 use super::grid::{Grid, read_grid};
-use crate::{ConfigError, ConfigText};
+use crate::{ConfigError, ConfigText, read_vehicle, shipped_vehicle_names};
 
 /// A vehicle as a case describes it.
 #[derive(Clone, Debug, PartialEq)]
@@ -23,6 +24,28 @@ pub struct GapVehicle {
     pub noise: GapNoise,
     /// Ground, if mapped.
     pub ground: Option<GapGround>,
+}
+
+/// A vehicle, whichever file describes it.
+#[derive(Clone, Debug, PartialEq)]
+pub enum DescribedVehicle {
+    /// One of the planner's.
+    Planned(Vehicle),
+    /// One of a case.
+    Case(GapVehicle),
+}
+
+/// Reads the vehicle that ships under a name, or that a file describes: one with a table `geometry` is the planner's, any
+/// other a case's.
+///
+/// Errors: those of [`read_vehicle`] and [`read_gap_vehicle`].
+pub fn read_described_vehicle(name_or_path: &str) -> Result<DescribedVehicle, GapVehicleError> {
+    let is_shipped = shipped_vehicle_names().any(|shipped| shipped == name_or_path);
+    let path = Path::new(name_or_path);
+    if is_shipped || ConfigText::read(path)?.has_key("geometry") {
+        return Ok(DescribedVehicle::Planned(read_vehicle(name_or_path)?));
+    }
+    read_gap_vehicle(path).map(DescribedVehicle::Case)
 }
 
 /// Standard deviations of the measurements' noise, as far as stated.
@@ -100,11 +123,16 @@ const INDEX: &str = "row = x, column = y";
 /// Errors: a file that cannot be read, a key missing or mistyped, a value that no vehicle can have, poses of another
 /// point than the rear axle, grids of different shapes or in another order.
 pub fn read_gap_vehicle(path: &Path) -> Result<GapVehicle, GapVehicleError> {
-    let text = ConfigText::read(path)?;
+    parse_gap_vehicle(&ConfigText::read(path)?, path.parent().unwrap_or(Path::new("")))
+}
+
+/// The same from a text, whose grids lie in `folder`.
+///
+/// Errors: those of [`read_gap_vehicle`].
+pub fn parse_gap_vehicle(text: &ConfigText, folder: &Path) -> Result<GapVehicle, GapVehicleError> {
     let file: VehicleFile = text.parse()?;
-    check(&file, &text)?;
-    let folder = path.parent().unwrap_or(Path::new(""));
-    let ground = file.map.as_ref().map(|map| read_ground(map, folder, &text)).transpose()?;
+    check(&file, text)?;
+    let ground = file.map.as_ref().map(|map| read_ground(map, folder, text)).transpose()?;
     Ok(GapVehicle {
         name: file.name,
         wheelbase_m: file.wheelbase,

@@ -17,14 +17,18 @@ pub(super) fn elevation(at_ns: u64, map: &GridMap<SurfaceCell>) -> Grid {
         data.extend(cell.vegetation_height_m.to_le_bytes());
         data.extend([cell.class() as u8, cell.knowledge as u8]);
     }
-    let fields = fields(&[
+    grid(at_ns, map.geometry(), elevation_fields(), data)
+}
+
+/// The fields of such a cell.
+pub(super) fn elevation_fields() -> Vec<PackedElementField> {
+    fields(&[
         ("height_m", NumericType::Float32),
         ("height_variance_m2", NumericType::Float32),
         ("vegetation_height_m", NumericType::Float32),
         ("class", NumericType::Uint8),
         ("knowledge", NumericType::Uint8),
-    ]);
-    grid(at_ns, map.geometry(), fields, data)
+    ])
 }
 
 /// Cells of 18 bytes: the four worst expected values at one yaw, class, flags.
@@ -38,15 +42,19 @@ pub(super) fn risk(at_ns: u64, map: &RiskMapView<'_>, yaw_rad: f64) -> Grid {
         }
         data.extend([ground.class, ground.flags.0]);
     }
-    let fields = fields(&[
+    grid(at_ns, &map.geometry, risk_fields(), data)
+}
+
+/// The fields of such a cell.
+pub(super) fn risk_fields() -> Vec<PackedElementField> {
+    fields(&[
         ("linear_traction", NumericType::Float32),
         ("angular_traction", NumericType::Float32),
         ("roll_rad", NumericType::Float32),
         ("pitch_rad", NumericType::Float32),
         ("class", NumericType::Uint8),
         ("flags", NumericType::Uint8),
-    ]);
-    grid(at_ns, &map.geometry, fields, data)
+    ])
 }
 
 fn grid(at_ns: u64, geometry: &GridGeometry, fields: Vec<PackedElementField>, data: Vec<u8>) -> Grid {

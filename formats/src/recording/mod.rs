@@ -7,8 +7,10 @@ mod json;
 mod messages;
 mod raw;
 mod read;
+mod recorded;
 mod scene;
 mod syncer;
+mod table;
 mod topics;
 mod watched_file;
 
@@ -29,6 +31,8 @@ use syncer::Syncer;
 use watched_file::{Fault, WatchedFile};
 
 pub use messages::{RecordedChannel, RecordedMessage, RecordingError, RecordingMessages, open_recording};
+pub use recorded::{RecordedRisk, read_recorded_maps, recorded_elevation, recorded_risk, recorded_scan};
+pub use table::{RecordedCell, RecordedColumn, RecordedTable, json_row, read_recorded_table};
 pub use topics::DriveTopics;
 
 pub use read::{McapDriveLog, McapReadError, read_drive_log_mcap};

@@ -13,6 +13,8 @@ use super::open_recording;
 pub struct McapDriveLog {
     /// What could be read.
     pub log: DriveLog,
+    /// When each row was recorded [ns].
+    pub time_ns: Vec<u64>,
     /// Why reading ended early, e.g. because the recorder was killed; `None` when the recording is complete.
     pub ended_early: Option<String>,
 }
@@ -52,7 +54,7 @@ pub fn read_drive_log_mcap(path: &Path) -> Result<McapDriveLog, McapReadError> {
         Err(source) => return Err(McapReadError::Unreadable { file, source }),
     };
     let mut topics = BTreeSet::new();
-    let mut log = DriveLog::default();
+    let (mut log, mut time_ns) = (DriveLog::default(), Vec::new());
     let mut fields = None;
     let problem = messages.take_all(|message| {
         topics.insert(message.channel.topic.clone());
@@ -63,11 +65,13 @@ pub fn read_drive_log_mcap(path: &Path) -> Result<McapDriveLog, McapReadError> {
             let schema = Fields::of(&message.channel.schema_data);
             fields = Some(schema.ok_or("messages without a schema of a drive log")?);
         }
-        fields.as_ref().map_or(Ok(()), |fields| add_row(fields, &mut log, &message.data))
+        fields.as_ref().map_or(Ok(()), |fields| add_row(fields, &mut log, &message.data))?;
+        time_ns.push(message.log_time_ns);
+        Ok(())
     });
     let ended_early = problem.map(|problem| format!("after {} rows: {problem}", log.n_rows()));
     if log.n_rows() > 0 {
-        return Ok(McapDriveLog { log, ended_early });
+        return Ok(McapDriveLog { log, time_ns, ended_early });
     }
     let topics = Vec::from_iter(topics).join(", ");
     let found = ended_early.unwrap_or_else(|| format!("only topics: {topics}"));

@@ -75,9 +75,12 @@ pub(super) fn rollouts(at_ns: u64, best_first: &[Vec<[f64; 3]>]) -> SceneUpdate 
     SceneUpdate { deletions: Vec::new(), entities: vec![entity] }
 }
 
+/// Bytes of a point.
+pub(super) const POINT_BYTES: usize = 13;
+
 /// Points of 13 bytes: x, y, z [m] as f32 and the class as a byte.
 pub(super) fn point_cloud(at_ns: u64, scan: &Scan) -> PointCloud {
-    let mut data = Vec::with_capacity(13 * scan.points.len());
+    let mut data = Vec::with_capacity(POINT_BYTES * scan.points.len());
     for point in &scan.points {
         point.position_m.iter().for_each(|value| data.extend(value.to_le_bytes()));
         data.push(point.class as u8);
@@ -86,15 +89,20 @@ pub(super) fn point_cloud(at_ns: u64, scan: &Scan) -> PointCloud {
         timestamp: Some(timestamp(at_ns)),
         frame_id: BODY_FRAME.into(),
         pose: Some(pose_message(&Pose::default())),
-        point_stride: 13,
-        fields: fields(&[
-            ("x", NumericType::Float32),
-            ("y", NumericType::Float32),
-            ("z", NumericType::Float32),
-            ("class", NumericType::Uint8),
-        ]),
+        point_stride: POINT_BYTES as u32,
+        fields: point_fields(),
         data: data.into(),
     }
+}
+
+/// The fields of such a point.
+pub(super) fn point_fields() -> Vec<PackedElementField> {
+    fields(&[
+        ("x", NumericType::Float32),
+        ("y", NumericType::Float32),
+        ("z", NumericType::Float32),
+        ("class", NumericType::Uint8),
+    ])
 }
 
 /// Fields that follow one another without a gap.

@@ -11,6 +11,7 @@ use traversability::RiskMapView;
 
 use super::drive_row::{self, DriveLogRow};
 use super::json::JsonChannels;
+use super::recorded::ELEVATION;
 use super::{RecordError, grids, scene};
 
 /// The topics of a drive. What is told goes to every sink of their context. Times are the caller's, monotonic [ns].
@@ -105,7 +106,7 @@ impl Channels {
             goal: channel(context, "/goal"),
             path: channel(context, "/path"),
             rollouts: channel(context, "/rollouts"),
-            elevation: channel(context, "/elevation"),
+            elevation: channel(context, ELEVATION),
             risk: channel(context, "/risk"),
             scan: channel(context, "/scan"),
             drive_log: channel(context, drive_row::TOPIC),

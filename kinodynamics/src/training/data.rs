@@ -6,7 +6,7 @@ use rand::seq::SliceRandom;
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 use super::{History, Settings};
-use crate::architecture::{AXES, WINDOW};
+use crate::architecture::WINDOW;
 use crate::checkpoint::Standardisation;
 use crate::label::Example;
 use crate::model::{Desired, inputs};
@@ -14,7 +14,7 @@ use crate::split::Split;
 
 /// Half of the examples as tensors.
 pub(super) struct Half {
-    /// [examples, 600], standardised; [examples, 0] of a blind model.
+    /// [examples, 600], standardised; [examples, 0] of a blind model, and what one is told.
     pub(super) windows: Tensor,
     /// [examples, 2].
     pub(super) desired: Tensor,
@@ -55,12 +55,13 @@ impl Half {
         if settings.history == History::Shuffled {
             sources.shuffle(&mut Xoshiro256PlusPlus::seed_from_u64(settings.seed ^ (key << 32)));
         }
-        let n_window = if architecture.senses() { WINDOW * AXES } else { 0 };
+        let n_window = architecture.n_window();
         let mut windows = Vec::with_capacity(n * n_window);
         for place in &sources {
             for k in 0..n_window {
                 let value = examples[*place].window[k];
                 windows.push(match settings.history {
+                    _ if !architecture.senses() => value,
                     History::Constant => 0.0,
                     _ => (value - standardisation.mean[k / WINDOW]) / standardisation.deviation[k / WINDOW],
                 });

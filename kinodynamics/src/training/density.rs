@@ -73,9 +73,10 @@ fn standardised(
     let (windows, desired) =
         (data.training.windows.flatten_all()?.to_vec1::<f32>()?, data.training.desired.to_vec2::<f32>()?);
     let n_window = windows.len() / n;
+    let history = if width > n_features(false) { n_window } else { 0 };
     let mut rows = vec![0.0; n * width];
     for (k, row) in rows.chunks_exact_mut(width).enumerate() {
-        features(&windows[k * n_window..(k + 1) * n_window], [desired[k][0], desired[k][1]], row);
+        features(&windows[k * n_window..][..history], [desired[k][0], desired[k][1]], row);
     }
     let column = |feature: usize| rows.iter().skip(feature).step_by(width).map(|value| f64::from(*value));
     let means: Vec<f32> = (0..width).map(|k| (column(k).sum::<f64>() / n as f64) as f32).collect();

@@ -142,14 +142,12 @@ impl Network {
         desired: &Tensor,
         through: fn(&Layer, &Tensor) -> Result<Tensor>,
     ) -> Result<Tensor> {
-        let mut values = desired.clone();
-        if !self.encoder.is_empty() {
-            let mut embedding = windows.clone();
-            for layer in &self.encoder {
-                embedding = through(layer, &embedding)?;
-            }
-            values = Tensor::cat(&[desired, &embedding], 1)?;
+        let mut embedding = windows.clone();
+        for layer in &self.encoder {
+            embedding = through(layer, &embedding)?;
         }
+        let is_blind = embedding.dim(1)? == 0;
+        let mut values = if is_blind { desired.clone() } else { Tensor::cat(&[desired, &embedding], 1)? };
         for layer in &self.command {
             values = through(layer, &values)?;
         }

@@ -104,6 +104,41 @@ fn ground_that_only_the_unit_can_tell_is_learned() {
     assert!(shuffled > 0.8 * blind, "{shuffled} of {blind}");
 }
 
+/// Who is told which ground it is leaves off little of what the blind one cannot know, and answers from flat weights.
+#[test]
+fn ground_that_is_told_is_learned() {
+    let recording = two_grounds(3);
+    let latency_s = estimate_latency(&recording).unwrap().seconds;
+    let (mut examples, _) = label(&recording, &LabelConfig::paper(latency_s));
+    for example in &mut examples {
+        example.window = vec![if example.ground == Some(1) { 1.0 } else { 0.0 }];
+    }
+    let outcome = |sensing| {
+        train_without_history(&examples, &settings(sensing, 8), &mut |_| ControlFlow::Continue(())).unwrap()
+    };
+    let error = |outcome: &Outcome| {
+        outcome.curves.iter().map(|epoch| epoch.validation_rmse_per_m).fold(f64::INFINITY, f64::min)
+    };
+    let (blind, told) = (outcome(Sensing::Blind), outcome(Sensing::Told { numbers: 1 }));
+    println!("blind {:.4}, told {:.4} 1/m", error(&blind), error(&told));
+    assert!(error(&told) < 0.7 * error(&blind));
+    let mut model = InverseModel::new(&told.checkpoint, Instructions::widest()).unwrap();
+    let mut command = |ground: f32| {
+        model.tell(&[ground]);
+        model.command(Desired { speed_mps: 1.5, curvature_per_m: 0.6 }).curvature_per_m
+    };
+    // 0.6 / 0.95 = 0.632 and 0.6 / 0.8 = 0.75.
+    let (smooth, rough) = (command(0.0), command(1.0));
+    assert!((smooth - 0.632).abs() < 0.04 && (rough - 0.75).abs() < 0.04, "{smooth} {rough}");
+    let refused =
+        train(&recording, &settings(Sensing::Told { numbers: 1 }, 1), "", &mut |_| ControlFlow::Continue(()));
+    assert!(refused.unwrap_err().to_string().starts_with("numbers told: expected none"));
+    let refused = train_without_history(&examples, &settings(Sensing::Told { numbers: 2 }, 1), &mut |_| {
+        ControlFlow::Continue(())
+    });
+    assert!(refused.unwrap_err().to_string().ends_with("found 1"));
+}
+
 #[test]
 fn every_unit_answers_to_some_of_the_data() {
     let network = Network::new(&Architecture::PAPER, 3).unwrap();

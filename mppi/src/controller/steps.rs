@@ -1,17 +1,22 @@
 //! The steps of a cycle, in their order: start, samples, rollouts, weights, average.
 
 use super::{Controller, LONGEST_STEPS};
+use crate::chunk::Chunk;
 use crate::config::{Actuation, Config, Temperature};
 use crate::cost::{Frame, RolloutCost, StepCost};
 use crate::diagnostics::CostTerm;
 use crate::driven::Driven;
 use crate::kernel::CHUNK;
+use crate::kernel::workers::Workers;
 use crate::objective::{Input, Objective, ReferencePath, ReferenceStep, Terminal, TerminalField};
 use crate::recovery::Mode;
+use crate::rollout::together::RollTogether;
 use crate::rollout::{GoalTask, Grid, Job, MAX_SLOTS, Prices, Rest, Scene, Start, Task};
 use crate::sampling::{Control, Sample, Sampler};
 use crate::summary::Accumulate;
+use crate::trace::{Kept, Trace};
 use crate::weights::{Weigh, WeightSummary};
+use bicycle::lanes::Instructions;
 use bicycle::{MotionLimits, MotionState, MotionStepper};
 use std::f64::consts::TAU;
 use std::ops::Range;
@@ -187,12 +192,13 @@ impl<M: Driven, S: StepCost, R: RolloutCost> Controller<M, S, R> {
             frame,
             keeps_ends: !R::IS_NOTHING,
         };
-        let (instructions, n_used) = (self.instructions, self.n_used);
-        self.workers.run(&mut self.chunks, |index, chunk| {
-            if index < n_used {
-                S::roll_out::<M>(Job { instructions, scene: &scene, chunk });
-            }
-        });
+        let crew = Crew { workers: &mut self.workers, instructions: self.instructions, n_used: self.n_used };
+        if R::KEEPS_STEPS {
+            let kept = Kept(&self.step_cost);
+            crew.roll_out(&scene.with_cost(&kept), &mut self.chunks, |job| job.run());
+        } else {
+            crew.roll_out(&scene, &mut self.chunks, S::roll_out::<M>);
+        }
     }
 
     /// Where the reference is at the end of every step.
@@ -222,6 +228,10 @@ impl<M: Driven, S: StepCost, R: RolloutCost> Controller<M, S, R> {
         }
         added_s.fill(0.0);
         self.rollout_cost.add(futures, added_s);
+        if R::KEEPS_STEPS {
+            let trace = Trace { chunks: &self.chunks[..self.n_used], frame, start: self.start };
+            self.rollout_cost.add_traced(&trace, added_s);
+        }
         for (number, added_s) in added_s.iter().enumerate() {
             let (chunk, lane) = (&mut self.chunks[number / CHUNK], number % CHUNK);
             let term_s = &mut chunk.terms[CostTerm::Added as usize].0[lane];
@@ -271,6 +281,34 @@ impl<M: Driven, S: StepCost, R: RolloutCost> Controller<M, S, R> {
         }
         let share = 1.0 / summary.normalizer;
         self.plan.nominal.iter_mut().flatten().for_each(|value| *value *= share);
+    }
+}
+
+/// Who rolls out.
+struct Crew<'a> {
+    workers: &'a mut Workers,
+    instructions: Instructions,
+    n_used: usize,
+}
+
+impl Crew<'_> {
+    /// Chunk by chunk on all threads, or all of them a step at a time where the model asks for that.
+    fn roll_out<P: MotionStepper, C: StepCost>(
+        self,
+        scene: &Scene<'_, P, C>,
+        chunks: &mut [Chunk],
+        run: impl Fn(Job<'_, P, C>) + Sync,
+    ) {
+        let Self { workers, instructions, n_used } = self;
+        if P::GOES_TOGETHER {
+            RollTogether { scene, chunks: &mut chunks[..n_used] }.on(instructions);
+        } else {
+            workers.run(chunks, |index, chunk| {
+                if index < n_used {
+                    run(Job { instructions, scene, chunk });
+                }
+            });
+        }
     }
 }
 

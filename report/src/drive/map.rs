@@ -11,6 +11,12 @@ const PATH_RIM: f64 = 9.0;
 const PLANNED: Stroke = Stroke { colour: Rgb::INK, width: 2.5, dash: "10 7" };
 
 pub(super) fn draw(picture: &DrivePicture<'_>, axes: &Axes, canvas: &mut Canvas) {
+    draw_inside(picture, axes, canvas);
+    axes.draw_labelled(canvas, "east x [m]", "north y [m]");
+}
+
+/// All of it but the frame and its ticks.
+pub(super) fn draw_inside(picture: &DrivePicture<'_>, axes: &Axes, canvas: &mut Canvas) {
     canvas.image(axes.frame.x, axes.frame.y, &relief(picture, axes));
     canvas.clipped(axes.frame, |canvas| {
         draw_areas(picture, axes, canvas);
@@ -22,7 +28,6 @@ pub(super) fn draw(picture: &DrivePicture<'_>, axes: &Axes, canvas: &mut Canvas)
         draw_ends(picture, axes, canvas);
         draw_scale_bar(axes, canvas);
     });
-    axes.draw_labelled(canvas, "east x [m]", "north y [m]");
 }
 
 fn draw_areas(picture: &DrivePicture<'_>, axes: &Axes, canvas: &mut Canvas) {

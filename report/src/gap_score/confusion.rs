@@ -20,7 +20,7 @@ fn is_right(truth: &str, answer: &str) -> bool {
     truth == answer || mimics || (answer == "unknown" && truth.starts_with("unk_"))
 }
 
-pub(super) fn page(confusion: &Confusion, title: &str) -> Option<Canvas> {
+pub(crate) fn page(confusion: &Confusion, title: &str) -> Option<Canvas> {
     let (n_rows, n_columns) = (confusion.truths.len(), confusion.answers.len());
     if n_rows == 0 {
         return None;

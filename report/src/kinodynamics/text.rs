@@ -46,6 +46,10 @@ pub fn text(report: &Report) -> String {
         told.extend(track.rows.iter().map(|found| row(found, place)));
         told += &per_speed(track);
     }
+    if let Some(ratio) = report.oracle_over_ablation {
+        told +=
+            &format!("\n  outdoors who is told the ground fails {ratio} times as often as the ablation\n");
+    }
     told += "\n  rules\n";
     told.extend(report.verdicts.iter().map(verdict));
     told

@@ -1,6 +1,6 @@
 //! What a person wants to see of a run, beside the messages themselves: poses, the drive log, now and then a map.
 
-use bicycle::{Column, Decision, DriveRow};
+use bicycle::{Decision, DriveRow};
 use formats::{DriveRecorder, RecordError};
 use terrain::{Mount, Pose};
 
@@ -124,6 +124,4 @@ fn row(time_s: f64, record: &OdometryRecord, decision: &Decision) -> DriveRow {
         Decision::Hold(_) | Decision::Stop(_) => [0.0, record.steering_rad],
     };
     drive_row(time_s, &record.odometry(0), command)
-        .with(Column::WheelSpeed, record.wheel_speed_mps)
-        .with(Column::SteerMeas, record.steering_rad)
 }

@@ -1,6 +1,6 @@
 //! What really happened, cycle by cycle.
 
-use bicycle::{Column, Command, Decision, DriveLog, DriveLogError, DriveRow};
+use bicycle::{Column, Command, Decision, DriveLog, DriveLogError, DriveRow, Odometry};
 
 use crate::Motion;
 
@@ -50,5 +50,11 @@ impl TraceRow {
         ]
         .into_iter()
         .fold(DriveRow::new(self.time_s), |row, (column, value)| row.with(column, value))
+    }
+
+    /// The same with what the sensors said in place of what is true, as a robot's log would have it, with all their
+    /// faults. What the localisation does not measure, the specific force, is the true one.
+    pub fn measured_row(&self, odometry: &Odometry) -> DriveRow {
+        self.drive_row().with_odometry(odometry)
     }
 }

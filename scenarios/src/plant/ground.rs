@@ -99,6 +99,20 @@ impl Ground {
         self.world.patch(x_m, y_m)
     }
 
+    /// Whether any of it gives way under shear.
+    pub(crate) fn gives_way(&self) -> bool {
+        self.world.patches.values().iter().any(|patch| patch.shear_deformation_m > 0.0)
+    }
+
+    /// Place of the cell that holds a point, or of the nearest one, row-major from the south-west.
+    pub(crate) fn cell(&self, x_m: f64, y_m: f64) -> usize {
+        let place = |value_m: f64, first_m: f64, n: usize| {
+            (((value_m - first_m) * self.cells_per_m).round().max(0.0) as usize).min(n - 1)
+        };
+        place(y_m, self.first_centre_m[1], self.n_rows) * self.n_cols
+            + place(x_m, self.first_centre_m[0], self.n_cols)
+    }
+
     /// Whether the point lies between cell centres, where the surface is given and not continued.
     pub(crate) fn contains(&self, x_m: f64, y_m: f64) -> bool {
         let inside = |value_m: f64, first_m: f64, n: usize| {

@@ -9,6 +9,11 @@
 //! friction m of what slides, and s = |u| C / (3 m l) the force over the load is m (1 - (1 - s)^3), against u; from
 //! s = 1 on all slide. What slides, slides by the ground's law of the slip speed. Along and across are alike.
 //!
+//! Loose ground gives way below the tread. By Janosi and Hanamoto it holds m (1 - exp(-j / K)) where it was sheared by j, and
+//! under a wheel that slips by s it is sheared by s times the way into the contact (Wong, Theory of Ground Vehicles, section
+//! 2.5): for little slip, m l / (2 K) times the slip over a contact of length l. Bristles and ground are two springs in
+//! series, and the tyre is a brush of the stiffness of both; firm ground has K = 0.
+//!
 //! Source: Pacejka, Tire and Vehicle Dynamics (3rd edition), the brush model of section 3.2 on the single contact point
 //! of section 7.2, whose deflection is limited to that of full sliding.
 
@@ -29,6 +34,8 @@ const SETTLING_S: f64 = 3.0;
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Tyre {
     relaxation_length_m: f64,
+    /// Length of the contact over the root of the load [m/sqrt(N)].
+    contact_m_per_root_n: f64,
     load_sensitivity: f64,
     reference_load_n: f64,
     /// Force over load and slip, for little slip [-].
@@ -54,6 +61,8 @@ pub(crate) struct Footing {
     pub load_n: f64,
     /// The ground's friction.
     pub friction: Stribeck,
+    /// The ground's shear deformation modulus, zero where it is firm [m].
+    pub shear_deformation_m: f64,
 }
 
 /// Force of the ground on the tyre.
@@ -73,6 +82,9 @@ impl Tyre {
         let damping_ns_per_m = 2.0 * DAMPING * (standing_n_per_m * quarter_kg).sqrt();
         Self {
             relaxation_length_m: tyre.relaxation_length_m,
+            // A disc that is pressed in by load / stiffness touches over 2 sqrt(2 radius load / stiffness).
+            contact_m_per_root_n: 2.0
+                * (2.0 * vehicle.geometry.wheel_radius_m / tyre.radial_stiffness_n_per_m).sqrt(),
             load_sensitivity: tyre.load_sensitivity,
             reference_load_n,
             stiffness: tyre.slip_stiffness,
@@ -102,17 +114,28 @@ impl Tyre {
         let friction = self.friction(footing, slip_mps.norm());
         let rolling_mps = footing.rolling_mps.abs();
         let kept = 1.0 / (1.0 + step_s * rolling_mps / self.relaxation_length_m);
-        let sliding_m = 3.0 * friction * self.relaxation_length_m / self.stiffness;
+        let stiffness = self.stiffness_on(footing, friction);
+        let sliding_m = 3.0 * friction * self.relaxation_length_m / stiffness;
         bristles.0 = capped((bristles.0 + slip_mps * step_s) * kept, sliding_m);
 
         // m (1 - (1 - s)^3) over u.
         let s = if sliding_m > 0.0 { bristles.0.norm() / sliding_m } else { 1.0 };
-        let per_m = self.stiffness / self.relaxation_length_m * (1.0 - s + s * s / 3.0);
+        let per_m = stiffness / self.relaxation_length_m * (1.0 - s + s * s / 3.0);
         let standing = ROLLING_SPEED_MPS / (ROLLING_SPEED_MPS + rolling_mps);
         let damping_s_per_m = standing * self.damping_s_per_m;
         let over_load = capped(bristles.0 * per_m + slip_mps * damping_s_per_m, friction);
         let per_slip = step_s * kept * per_m + damping_s_per_m;
         Grip { force_n: -over_load * footing.load_n, stiffness_ns_per_m: per_slip * footing.load_n }
+    }
+
+    /// Stiffness of the bristles in series with the ground's [-].
+    fn stiffness_on(&self, footing: &Footing, friction: f64) -> f64 {
+        if footing.shear_deformation_m == 0.0 {
+            return self.stiffness;
+        }
+        let contact_m = self.contact_m_per_root_n * footing.load_n.sqrt();
+        let ground = friction * contact_m / (2.0 * footing.shear_deformation_m);
+        self.stiffness * ground / (self.stiffness + ground)
     }
 
     /// Friction over load where the tread slides [-].
@@ -137,7 +160,8 @@ pub fn steady_friction(
 ) -> [f64; 2] {
     let mass_kg = vehicle.body.mass_kg + 4.0 * vehicle.wheel.mass_kg;
     let load_n = 0.25 * mass_kg * super::GRAVITY_MPS2;
-    let footing = Footing { slip_mps: slip_mps.into(), rolling_mps, load_n, friction: ground };
+    let slip_mps = slip_mps.into();
+    let footing = Footing { slip_mps, rolling_mps, load_n, friction: ground, shear_deformation_m: 0.0 };
     settled(&Tyre::new(vehicle, load_n), &footing).into()
 }
 

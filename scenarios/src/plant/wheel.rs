@@ -43,9 +43,11 @@ pub(crate) struct Wheel {
     /// Inertia that the wheel opposed to torques in the last step, the ground's hold on it included [kg m2].
     pub inertia_kgm2: f64,
     /// Along the axle.
-    left: Vector3<f64>,
+    pub left: Vector3<f64>,
     touches: [Option<Touch>; CONTACTS],
     stems: Stems,
+    /// How much firmer than loose the ground under it is, by what went over it before [-].
+    pub firmness: f64,
     /// Normal force of the ground [N].
     pub load_n: f64,
     /// Normal and friction force of the ground in map coordinates [N].
@@ -93,6 +95,8 @@ struct Slide {
     slip_mps: Vector2<f64>,
     rolling_radius_m: f64,
     load_n: f64,
+    /// Of the ground [-].
+    firmness: f64,
 }
 
 /// What the ground does to a wheel.
@@ -124,6 +128,7 @@ impl Wheel {
             left: Vector3::y(),
             touches: [None; CONTACTS],
             stems: Stems::default(),
+            firmness: 1.0,
             load_n: 0.0,
             force_n: Vector3::zeros(),
         }
@@ -262,7 +267,7 @@ impl RunningGear {
         let slip_mps = Vector2::new(carried_mps.dot(&forward) - tread_mps, carried_mps.dot(&left));
         let damping_ns_per_m = self.radial_ns_per_m * (contact.force_n / self.reference_load_n).min(1.0);
         let load_n = (contact.force_n - damping_ns_per_m * hub_mps.dot(&contact.normal)).max(0.0);
-        Slide { forward, left, slip_mps, rolling_radius_m, load_n }
+        Slide { forward, left, slip_mps, rolling_radius_m, load_n, firmness: wheel.firmness }
     }
 
     /// What the ground does in all places.
@@ -301,6 +306,7 @@ impl RunningGear {
             rolling_mps: spin_radps * slide.rolling_radius_m,
             load_n: slide.load_n,
             friction: soil.friction,
+            shear_deformation_m: f64::from(soil.shear_deformation_m) / slide.firmness,
         };
         let grip = self.tyre.grip(&mut touch.bristles, &footing, self.step_s);
         touch.force_n =

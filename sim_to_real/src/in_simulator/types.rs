@@ -141,6 +141,22 @@ pub struct Motion {
 }
 
 impl Motion {
+    /// The motion of a run of so many rows.
+    ///
+    /// # Errors
+    /// What was expected and found: another number of rows, or a number that is not finite.
+    pub fn checked(self, n_rows: usize) -> Result<Self, String> {
+        for (name, values) in self.quantities() {
+            if values.len() != n_rows {
+                return Err(format!("{name}: expected {n_rows} values, found {}", values.len()));
+            }
+            if let Some(other) = values.iter().find(|value| !value.is_finite()) {
+                return Err(format!("{name}: expected finite numbers, found {other}"));
+            }
+        }
+        Ok(self)
+    }
+
     /// The quantities with their names.
     pub fn quantities(&self) -> [(&'static str, &[f64]); 5] {
         [

@@ -1,11 +1,11 @@
 //! Processes that keep dying, and processes that refuse their input.
 
-use std::cell::RefCell;
+use std::cell::{Cell, RefCell};
 use std::process::Command;
 
 use bus::channel::Bus;
 use bus::clock::now_ns;
-use bus::status::Role;
+use bus::status::{Meter, Role};
 use runtime::supervisor::{RestartPolicy, RunEnd, Start, Supervisor};
 
 use crate::fixture::Run;
@@ -62,6 +62,33 @@ fn what_refuses_its_input_is_not_started_again_and_takes_the_others_along() {
     let (end, starts) = supervise(&[Role::Learning, Role::Mapping], script);
     assert_eq!(end, RunEnd::GaveUp { role: Role::Mapping, why: "it refused its input".to_owned() });
     assert_eq!(starts.iter().map(|(role, _)| *role).collect::<Vec<_>>(), [Role::Learning, Role::Mapping]);
+}
+
+#[test]
+fn the_others_start_once_the_recorder_hears_them_or_has_died() {
+    let run = Run::new();
+    let bus = Bus::join(&run.name).unwrap();
+    let (starts, meter, n_looks) = (RefCell::new(Vec::new()), RefCell::new(None), Cell::new(0));
+    let command = |role: Role, _| {
+        starts.borrow_mut().push(role);
+        let mut command = Command::new("sleep");
+        command.arg("30");
+        command
+    };
+    let roles = [Role::Control, Role::Recorder];
+    let mut supervisor = Supervisor::new(&bus, &roles, POLICY, &command).unwrap();
+    let is_over = || {
+        n_looks.set(n_looks.get() + 1);
+        if n_looks.get() == 10 {
+            assert_eq!(*starts.borrow(), [Role::Recorder], "nobody was to speak before it listens");
+            meter.replace(Some(Meter::new(&bus, Role::Recorder).unwrap()));
+        }
+        starts.borrow().len() == 2 || n_looks.get() > 200
+    };
+    assert_eq!(supervisor.run(&is_over, &mut |_, _| ()), RunEnd::Interrupted);
+    assert_eq!(starts.into_inner(), [Role::Recorder, Role::Control]);
+    let (_, starts) = supervise(&roles, "[ $0 = recorder ] && exit 1; exit 2");
+    assert_eq!([starts[0].0, starts[1].0], [Role::Recorder, Role::Control], "without a recording");
 }
 
 #[test]

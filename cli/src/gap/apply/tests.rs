@@ -1,7 +1,7 @@
-use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-use sim_to_real::{Estimate, Shrink, Steering};
+use bicycle::Effect;
+use sim_to_real::{Estimate, NamedEffect, Shrink, Steering};
 
 use super::*;
 
@@ -88,23 +88,6 @@ fn a_part_that_is_unknown_is_applied_only_when_forced() {
 }
 
 #[test]
-fn none_leaves_the_model_and_unknown_is_refused() {
-    assert_eq!(effects(&answer(Verdict::None, Vec::new())), Ok(Vec::new()));
-    assert!(effects(&answer(Verdict::Unknown, Vec::new())).unwrap_err().contains("found 'unknown'"));
-}
-
-#[test]
-fn effects_that_no_model_can_hold_are_refused_by_name() {
-    let refused = |named: NamedEffect| effects(&answer(Verdict::Effects, vec![named])).unwrap_err();
-    let told = refused(named("steer_magic", &[]));
-    assert!(told.contains("expected one of ") && told.contains("found 'steer_magic'"), "{told}");
-    let told = refused(NamedEffect { id: "steer_lag".to_owned(), form: None, parameters: BTreeMap::new() });
-    assert_eq!(told, "effects: steer_lag: expected parameter time_constant_s, found none");
-    let told = refused(named("steer_lag", &[("time_constant_s", 1e6)]));
-    assert!(told.starts_with("effect steer_lag: time_constant_s: expected "), "{told}");
-}
-
-#[test]
 fn a_vehicle_stands_for_its_model() {
     let shipped = read_model(Path::new("sedan")).unwrap();
     let folder = tempfile::tempdir().unwrap();
@@ -118,28 +101,4 @@ fn a_vehicle_stands_for_its_model() {
             .0
             .contains("none.toml: expected a readable")
     );
-}
-
-/// Its steering effects mean yaw rates, which no angle can follow.
-#[test]
-fn a_skid_steered_machine_is_not_for_a_controller_that_steers_by_an_angle() {
-    let gain = named("steer_gain", &[("ratio", 0.38)]);
-    let skid = Answer { steering: Steering::YawRate, ..answer(Verdict::Effects, vec![gain.clone()]) };
-    let told = effects(&skid).unwrap_err();
-    assert!(told.contains("found one that is skid-steered"), "{told}");
-    assert_eq!(effects(&answer(Verdict::Effects, vec![gain])).unwrap().len(), 1);
-    // Where the file does not say, it is an angle; what a skid-steered diagnosis writes, it reads again.
-    let text = serde_json::to_string(&skid).unwrap();
-    assert_eq!(serde_json::from_str::<Answer>(&text).unwrap().steering, Steering::YawRate);
-    let text = serde_json::to_string(&answer(Verdict::None, Vec::new())).unwrap();
-    assert!(!text.contains("steering") && serde_json::from_str::<Answer>(&text).is_ok(), "{text}");
-}
-
-#[test]
-fn a_motors_lag_needs_a_speed_loop_to_act_in() {
-    let lag = Effect::from_values("drive_lag", [0.3, 0.0, 0.0, 0.0]).unwrap();
-    let mut model = Model::of(&formats::read_vehicle("rc_car").unwrap());
-    assert_eq!(fitting(lag, &model), Effect::from_values("speed_lag", [0.3, 0.0, 0.0, 0.0]).unwrap());
-    model.effects.push(Effect::from_values("speed_loop", [0.4, 0.0, 0.0, 0.0]).unwrap());
-    assert_eq!(fitting(lag, &model), lag);
 }

@@ -44,7 +44,7 @@ impl Unfinished {
     ///
     /// Errors: labels or program that cannot be read.
     pub fn resume(arguments: &GapScoreArguments, folder: PathBuf) -> anyhow::Result<Self> {
-        let program = std::fs::metadata(std::env::current_exe()?)?;
+        let program = std::fs::metadata(crate::Program::current()?.file())?;
         let changed = program.modified()?.duration_since(UNIX_EPOCH).unwrap_or_default();
         let labels_sha256 = formats::config_hash(&std::fs::read_to_string(&arguments.labels)?)?;
         let asked = Asked {

@@ -82,7 +82,7 @@ impl Instance {
             Reply::Motion { id, .. } if id != asked => {
                 Err(format!("expected the motion of this run, found that of run {id}"))
             }
-            Reply::Motion { motion, .. } => protocol::checked(motion, n_rows),
+            Reply::Motion { motion, .. } => motion.checked(n_rows),
             Reply::Error { message } => Err(format!("expected a motion, found the error '{message}'")),
             Reply::Hello { .. } => Err("expected a motion, found another hello".to_owned()),
         }

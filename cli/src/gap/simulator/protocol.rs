@@ -77,16 +77,3 @@ fn shown(line: &str) -> String {
     let start: String = line.trim().chars().take(SHOWN).collect();
     if start.len() < line.trim().len() { format!("{start}...") } else { start }
 }
-
-/// The motion of a run. Errors: it has another number of rows, or a number that is none.
-pub(super) fn checked(motion: Motion, n_rows: usize) -> Result<Motion, String> {
-    for (name, values) in motion.quantities() {
-        if values.len() != n_rows {
-            return Err(format!("{name}: expected {n_rows} values, found {}", values.len()));
-        }
-        if let Some(other) = values.iter().find(|value| !value.is_finite()) {
-            return Err(format!("{name}: expected finite numbers, found {other}"));
-        }
-    }
-    Ok(motion)
-}

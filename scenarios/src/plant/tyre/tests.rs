@@ -11,6 +11,8 @@ const LENGTH_M: f64 = 0.3;
 fn tyre() -> Tyre {
     Tyre {
         relaxation_length_m: LENGTH_M,
+        // 0.2 m under the reference load.
+        contact_m_per_root_n: 0.2 / LOAD_N.sqrt(),
         load_sensitivity: 0.2,
         reference_load_n: LOAD_N,
         stiffness: STIFFNESS,
@@ -20,7 +22,8 @@ fn tyre() -> Tyre {
 }
 
 fn rolling(slip_mps: Vector2<f64>, rolling_mps: f64) -> Footing {
-    Footing { slip_mps, rolling_mps, load_n: LOAD_N, friction: Stribeck::ASPHALT }
+    let friction = Stribeck::ASPHALT;
+    Footing { slip_mps, rolling_mps, load_n: LOAD_N, friction, shear_deformation_m: 0.0 }
 }
 
 /// Friction over load after `duration_s` of the same slip, from loose bristles.
@@ -173,6 +176,52 @@ fn soft_tyres_answer_small_slip_less_and_slide_with_the_same_friction() {
             assert!((little - expected).abs() < 3e-3, "{index}: {little}");
             let sliding = cornering(&other, 0.6, 2.0);
             assert!((sliding - 0.98).abs() < 1e-6, "{sliding}");
+        }
+    }
+}
+
+/// Lateral friction at a slip angle on ground that gives way, under a load.
+fn cornering_on(shear_deformation_m: f64, angle_rad: f64, load_n: f64) -> f64 {
+    let slip_mps = Vector2::new(0.0, angle_rad.tan() * 5.0);
+    -settled(&tyre(), &Footing { shear_deformation_m, load_n, ..rolling(slip_mps, 5.0) }).y
+}
+
+#[test]
+fn loose_ground_is_a_spring_in_series_with_the_bristles() {
+    // Janosi and Hanamoto, summed up over 0.2 m of contact: 0.98 0.2 / 2 K.
+    for (shear_deformation_m, ground) in [(0.002, 49.0), (0.01, 9.8), (0.025, 3.92)] {
+        let expected = 1.0 / (1.0 / STIFFNESS + 1.0 / ground);
+        let found = cornering_on(shear_deformation_m, 1e-4, LOAD_N) / 1e-4;
+        println!("K = {shear_deformation_m} m: {found:.3}, expected {expected:.3}");
+        // The standing tread's damping adds 1 s/m 0.03 m/s at the most.
+        assert!((found - expected).abs() < 0.04, "{shear_deformation_m}: {found} {expected}");
+    }
+    // Four times the load touches over twice the length; friction is 0.98 (1 - 0.2 3) = 0.392 there.
+    let expected = 1.0 / (1.0 / STIFFNESS + 0.01 * 2.0 / (0.4 * 0.98 * 0.4));
+    let found = cornering_on(0.01, 1e-4, 4.0 * LOAD_N) / 1e-4;
+    assert!((found - expected).abs() < 0.04, "{found} {expected}");
+}
+
+#[test]
+fn ground_that_hardly_gives_way_is_firm_ground_and_loose_ground_slides_as_hard() {
+    for angle_rad in [1e-3, 0.05, 0.2] {
+        let [firm, nearly] = [0.0, 1e-9].map(|loose_m| cornering_on(loose_m, angle_rad, LOAD_N));
+        assert!((nearly / firm - 1.0).abs() < 1e-5, "{angle_rad}: {nearly} {firm}");
+    }
+    let [firm, loose] = [0.0, 0.01].map(|loose_m| cornering_on(loose_m, 0.6, LOAD_N));
+    assert!((loose - firm).abs() < 1e-6, "{loose} {firm}");
+}
+
+#[test]
+fn a_wheel_that_the_ground_hardly_carries_stays_finite_on_loose_ground() {
+    let mut bristles = Bristles::default();
+    for load_n in [0.0, 1e-9, LOAD_N, 0.0, LOAD_N] {
+        let slip_mps = Vector2::new(0.3, 0.5);
+        let footing = Footing { load_n, shear_deformation_m: 0.01, ..rolling(slip_mps, 0.0) };
+        for _ in 0..50 {
+            let grip = tyre().grip(&mut bristles, &footing, 1e-3);
+            assert!(grip.force_n.iter().all(|v| v.is_finite()) && grip.stiffness_ns_per_m.is_finite());
+            assert!(grip.force_n.norm() <= 0.98 * 1.2 * load_n + 1e-9, "{load_n}: {}", grip.force_n);
         }
     }
 }

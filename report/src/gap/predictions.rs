@@ -1,25 +1,27 @@
 //! Predictions of held-out measurements: as CSV, and as the strip of one drive.
 
-use std::path::PathBuf;
+use std::path::Path;
 
 use bicycle::{Column, DriveLog, Run};
-use report::gap::{HeldOutSample, HeldOutStrip};
-use sim_to_real::{Prediction, PredictionModel};
+use sim_to_real::{Drives, Prediction, PredictionModel};
+
+use super::{HeldOutSample, HeldOutStrip};
 
 /// The horizon that the strip shows [s].
 const STRIP_HORIZON_S: f64 = 1.2;
 
-/// Names of all runs of all drives, in order: the drive's file without its folder, and the run if it has a name.
-pub(super) fn run_names(logs: &[DriveLog], paths: &[PathBuf]) -> Vec<String> {
-    let of_log = |(log, path): (&DriveLog, &PathBuf)| {
-        let file = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
+/// Names of all runs of all drives, in order: the drive's without its folder, and the run if it has a name.
+pub(super) fn run_names(drives: &Drives) -> Vec<String> {
+    let of_log = |(log, name): (&DriveLog, &String)| {
+        let file =
+            Path::new(name).file_name().map_or(name.clone(), |file| file.to_string_lossy().into_owned());
         let name = move |run: Run<'_>| match run.name() {
             "" => file.clone(),
             run => format!("{file} {run}"),
         };
         log.runs().map(name).collect::<Vec<_>>()
     };
-    logs.iter().zip(paths).flat_map(of_log).collect()
+    drives.logs.iter().zip(&drives.names).flat_map(of_log).collect()
 }
 
 /// `log,t0,horizon_s,model,x,y,yaw,vx,wz`: every prediction, numbers as they come back bit by bit.

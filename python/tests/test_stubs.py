@@ -1,0 +1,30 @@
+"""The stubs are those of the module, and what uses it is typed."""
+
+import pathlib
+import subprocess
+import sys
+
+PYTHON = pathlib.Path(__file__).resolve().parent.parent
+
+
+def succeeds(*words, cwd=PYTHON):
+    done = subprocess.run([sys.executable, *map(str, words)], capture_output=True, text=True, cwd=cwd, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_every_name_has_a_stub_with_the_docstring_of_the_module():
+    succeeds(PYTHON / "stubs/write_docstrings.py", "--check", cwd="/")
+
+
+def test_signatures_are_those_of_the_module(tmp_path):
+    allowed = tmp_path / "allowed"
+    # Only builds for tests have the one, and so the list of all differs.
+    allowed.write_text("surefoot._native.provoke_defect\nsurefoot._native.__all__\n")
+    succeeds("-m", "mypy.stubtest", "surefoot._native", "--allowlist", allowed, "--ignore-disjoint-bases", cwd=tmp_path)
+
+
+def test_the_package_and_the_examples_are_typed():
+    config = PYTHON / "pyproject.toml"
+    drivers = [PYTHON.parent / "examples/python" / name for name in ("drive_robot.py", "replay_log.py")]
+    succeeds("-m", "mypy", "--strict", "--config-file", config, "-p", "surefoot", cwd="/")
+    succeeds("-m", "mypy", "--strict", "--config-file", config, PYTHON / "examples", *drivers, cwd="/")
