@@ -137,7 +137,11 @@ pub fn measure(request: &Request, after_run: impl Fn(&Crossing) + Sync) -> Resul
         return Err(SweepError::NoDrives { expected });
     }
     let settings = settings(request)?;
-    let runs = sweep(&jobs, request.n_threads, |job| job.drive(&settings), after_run)?;
+    let after = |run: &Crossing| {
+        after_run(run);
+        Ok(())
+    };
+    let runs = sweep(&jobs, request.n_threads, |job| job.drive(&settings), after)?;
     Ok(Report {
         vehicle: VEHICLE,
         seed: request.seed,

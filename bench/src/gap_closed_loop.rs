@@ -28,7 +28,7 @@ use belief::Simulator;
 pub use drive::{DriveResult, End, Ground, Job};
 pub use gap::Gap;
 use rocks::Rocks;
-pub use row::{Differences, Mean, Row};
+pub use row::{Differences, Row};
 use track::Track;
 
 /// Name of the machine around which the one that drives is drawn.

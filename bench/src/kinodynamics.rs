@@ -45,7 +45,7 @@ pub use row::Row;
 pub use surfaces::{Layout, SURFACES};
 pub use teleoperation::{Teleoperation, teleoperate};
 pub use track::Track;
-pub use verdict::{Ratio, Verdict};
+pub use verdict::Ratio;
 
 /// From the middle line to the walls [m]: tuned once, with the nominal model alone, to the paper's 52 % of turns (seed 1: see
 /// docs/kinodynamics.md), then frozen.
@@ -105,7 +105,7 @@ pub struct Report {
     /// wheels can bring at most.
     pub oracle_over_ablation: Option<Ratio>,
     /// The rules, and whether they hold.
-    pub verdicts: Vec<Verdict>,
+    pub verdicts: Vec<crate::Verdict>,
 }
 
 /// Why there is no report.

@@ -26,7 +26,6 @@ pub use report::{
 pub use row::Row;
 pub use tally::Domain;
 pub use testbed::{Request, Stage, Testbed, TestbedReport};
-pub use verdict::Verdict;
 
 use evidential::{DatasetError, PredictorError, SettingError, TrainError};
 

@@ -25,9 +25,12 @@ pub mod plant;
 pub mod prior_map;
 pub mod scaling;
 mod spread;
+pub mod statistics;
 mod stopwatch;
 pub mod sweep;
 pub mod traction_map;
+mod verdict;
 
 pub use error::BenchError;
 pub use spread::Spread;
+pub use verdict::Verdict;

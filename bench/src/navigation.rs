@@ -1,206 +1,149 @@
-//! The navigation table: the same drives over the default rock field with every method and risk tolerance.
+//! The navigation benchmark: the same drives over the same rock fields with every method and risk tolerance
+//! (PIETRA, section V-D and figure 7).
 //!
-//! Drives run beside each other, each with a controller of one thread, so that the table depends neither on the number
-//! of threads nor on the order in which drives end. Drives of the same seed share world, start, goal and sensor noise:
-//! their results are paired.
+//! A [`Plan`] says which drives there are, in what order; [`Plan::drive`] does those of a part of the work that are not
+//! known yet, [`Plan::report`] makes the table of whatever drives there are. Drives run beside each other, each with a
+//! controller of one thread, so that the table depends neither on the number of threads nor on the order in which drives
+//! end, nor on how often the work was broken off or in how many parts it was done. Drives of one map and pair share
+//! world, start, goal and sensor noise whatever the method: their results are paired.
 
+mod comparison;
 mod drive;
+mod plan;
 mod row;
+mod rules;
 
-use bicycle::Vehicle;
-use mppi::Isa;
-use navigator::Config;
-use scenarios::{EpisodeConfig, RockFieldConfig};
 use serde::Serialize;
 use traversability::CvarLevel;
 
-use crate::closed_loop::Method;
-use crate::sweep::{SweepError, hash_of, sweep};
+use crate::Verdict;
+pub use comparison::Comparison;
 pub use drive::{DriveResult, name_of_outcome};
-use drive::{Finished, Job};
-pub use row::{Row, WILSON_Z, wilson_interval};
+pub use plan::{Plan, Request, Shard, ShardError, VEHICLE};
+pub use row::Row;
 
-/// Name of the machine that drives.
-pub const VEHICLE: &str = "pietra_full_size";
-
-/// Which drives to do, and how.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Request {
-    /// What the controller knows of the ground; a row each, for every level where there are levels.
-    pub methods: Vec<Method>,
-    /// Risk tolerances of the methods that know distributions, see [`Method::has_level`].
-    pub levels: Vec<CvarLevel>,
-    /// Seeds 1 to this.
-    pub n_seeds: u64,
-    /// Longest drive, simulated [s].
-    pub time_limit_s: f64,
-    /// Drives at a time.
-    pub n_threads: usize,
-    /// Instruction set of the controller.
-    pub isa: Isa,
-}
-
-impl Request {
-    /// How many drives that are.
-    pub fn n_drives(&self) -> u64 {
-        jobs(self).len() as u64
-    }
-}
-
-/// All drives and what they add up to.
+/// Drives and what they add up to.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Report {
-    /// Kind of world.
-    pub world: &'static str,
-    /// Name of the machine.
-    pub vehicle: &'static str,
-    /// Seeds were 1 to this.
-    pub n_seeds: u64,
-    /// Longest drive, simulated [s].
-    pub time_limit_s: f64,
-    /// Instruction set that the controller used; another one may differ in the last bits, and then in a drive's course.
-    pub isa: Isa,
-    /// [`formats::config_hash`] of the pipeline's configuration.
-    pub config_hash: String,
-    /// One row for each method and level.
+    /// Which drives there are in all.
+    #[serde(flatten)]
+    pub plan: Plan,
+    /// Drives of the plan that are not among [`Report::drives`].
+    pub n_missing: usize,
+    /// One row for each method and level that was driven.
     pub rows: Vec<Row>,
-    /// Drives row by row, each row by ascending seed.
+    /// Rows against one another.
+    pub comparisons: Vec<Comparison>,
+    /// The rules that the rows allow to judge.
+    pub verdicts: Vec<Verdict>,
+    /// Drives row by row, each row by ascending map and pair.
     pub drives: Vec<DriveResult>,
 }
 
+impl Plan {
+    /// The table of drives of this plan, given in any order; a drive that is given twice counts once.
+    pub fn report(&self, drives: &[DriveResult]) -> Report {
+        let jobs = self.jobs(Shard::WHOLE);
+        let drives: Vec<DriveResult> =
+            jobs.filter_map(|job| drives.iter().find(|drive| job.is_of(drive)).cloned()).collect();
+        let mut report = Report {
+            plan: self.clone(),
+            n_missing: self.n_drives(Shard::WHOLE) - drives.len(),
+            rows: self.rows().filter_map(|row| Row::of(of_row(&drives, row))).collect(),
+            comparisons: Vec::new(),
+            verdicts: Vec::new(),
+            drives,
+        };
+        let rows: Vec<_> = report.rows_with_drives().collect();
+        let (comparisons, verdicts) = (Comparison::all(&rows), rules::verdicts(&rows));
+        (report.comparisons, report.verdicts) = (comparisons, verdicts);
+        report
+    }
+}
+
 impl Report {
-    /// Every row with its drives, by ascending seed.
+    /// Every row with its drives, by ascending map and pair.
     pub fn rows_with_drives(&self) -> impl Iterator<Item = (&Row, &[DriveResult])> {
-        self.rows.iter().zip(self.drives.chunks(self.n_seeds.max(1) as usize))
-    }
-}
-
-/// What all drives have in common.
-struct Settings {
-    field: RockFieldConfig,
-    vehicle: Vehicle,
-    config: Config,
-    episode: EpisodeConfig,
-}
-
-/// Does all drives; `after_drive` sees each one as it ends, in any order and on any thread.
-///
-/// # Errors
-/// Nothing to drive, no threads to be had, or a drive that could not begin or go on.
-pub fn measure(request: &Request, after_drive: impl Fn(&DriveResult) + Sync) -> Result<Report, SweepError> {
-    let jobs = jobs(request);
-    if jobs.is_empty() {
-        return Err(SweepError::NoDrives {
-            expected: "at least one seed, one method and, for physics, one alpha",
+        let ends = self.rows.iter().scan(0, |end, row| {
+            *end += row.n;
+            Some(*end)
         });
+        self.rows.iter().zip(ends).map(|(row, end)| (row, &self.drives[end - row.n..end]))
     }
-    let settings = settings(request)?;
-    let after = |finished: &Finished| after_drive(&finished.result);
-    let finished = sweep(&jobs, request.n_threads, |job| job.drive(&settings), after)?;
-    let isa = finished.first().map_or(request.isa, |finished| finished.isa);
-    let drives: Vec<DriveResult> = finished.into_iter().map(|finished| finished.result).collect();
-    Ok(Report {
-        world: "rocks",
-        vehicle: VEHICLE,
-        n_seeds: request.n_seeds,
-        time_limit_s: request.time_limit_s,
-        isa,
-        config_hash: hash_of(&settings.config)?,
-        rows: drives.chunks(request.n_seeds as usize).filter_map(Row::of).collect(),
-        drives,
-    })
 }
 
-/// Row by row, each row by ascending seed.
-fn jobs(request: &Request) -> Vec<Job> {
-    let rows = request.methods.iter().flat_map(|&method| match method.has_level() {
-        true => request.levels.iter().map(|&level| (method, Some(level))).collect(),
-        false => vec![(method, None)],
-    });
-    rows.flat_map(|(method, level)| (1..=request.n_seeds).map(move |seed| Job { method, level, seed }))
-        .collect()
-}
-
-fn settings(request: &Request) -> Result<Settings, SweepError> {
-    let vehicle = formats::read_vehicle(VEHICLE)?;
-    let mut config = Config::for_vehicle(&vehicle);
-    config.controller.n_threads = 1;
-    config.controller.isa = request.isa;
-    let mut episode = EpisodeConfig::for_vehicle(&vehicle);
-    episode.rules.time_limit_s = request.time_limit_s;
-    Ok(Settings { field: RockFieldConfig::default(), vehicle, config, episode })
+/// The stretch of sorted drives that belongs to a method and level.
+fn of_row(drives: &[DriveResult], (method, level): (crate::closed_loop::Method, Option<CvarLevel>)) -> &[DriveResult] {
+    let is_of = |drive: &DriveResult| (drive.method, drive.alpha) == (method, level.map(CvarLevel::get));
+    let first = drives.iter().position(is_of).unwrap_or(0);
+    let n = drives[first..].iter().take_while(|drive| is_of(drive)).count();
+    &drives[first..first + n]
 }
 
 #[cfg(test)]
 mod tests {
-    use std::sync::atomic::{AtomicUsize, Ordering};
+    use std::sync::Mutex;
 
     use super::*;
-    use scenarios::Outcome;
+    use crate::closed_loop::Method;
+    use crate::sweep::SweepError;
+    use mppi::Isa;
+    use scenarios::{Outcome, RockFieldConfig};
 
-    fn request(methods: &[Method], levels: &[f64], n_seeds: u64) -> Request {
-        Request {
-            methods: methods.to_vec(),
-            levels: levels.iter().map(|&level| CvarLevel::new(level).unwrap()).collect(),
-            n_seeds,
-            time_limit_s: 1.0,
-            n_threads: 1,
+    fn plan(time_limit_s: f64) -> Plan {
+        let request = Request {
+            methods: vec![Method::Nominal, Method::Physics],
+            levels: vec![CvarLevel::new(0.5).unwrap()],
+            field: RockFieldConfig::default(),
+            seed: 1,
+            n_maps: 2,
+            n_pairs: 1,
+            time_limit_s,
             isa: Isa::Portable,
-        }
+        };
+        Plan::new(&request).unwrap()
+    }
+
+    fn nothing(_: &DriveResult) -> Result<(), SweepError> {
+        Ok(())
     }
 
     #[test]
-    fn only_physics_is_driven_once_for_each_level() {
-        let all = request(&[Method::Truth, Method::Physics, Method::Nominal], &[0.4, 0.8], 3);
-        let told: Vec<String> = jobs(&all).iter().step_by(3).map(ToString::to_string).collect();
-        assert_eq!(
-            told,
-            ["truth, seed 1", "physics, alpha 0.4, seed 1", "physics, alpha 0.8, seed 1", "nominal, seed 1"]
-        );
-        assert_eq!(jobs(&all).iter().map(|job| job.seed).collect::<Vec<_>>(), [1, 2, 3].repeat(4));
-    }
-
-    #[test]
-    fn nothing_to_drive_is_told() {
-        for nothing in [
-            request(&[], &[0.4], 1),
-            request(&[Method::Physics], &[], 1),
-            request(&[Method::Physics], &[0.4], 0),
-        ] {
-            assert!(matches!(measure(&nothing, |_| ()), Err(SweepError::NoDrives { .. })));
-        }
-    }
-
-    #[test]
-    fn table_does_not_depend_on_threads_and_its_drives_obey_the_rules() {
-        let alone = request(&[Method::Nominal], &[], 2);
-        let n_seen = AtomicUsize::new(0);
-        let report = measure(&alone, |_| {
-            n_seen.fetch_add(1, Ordering::Relaxed);
-        })
-        .unwrap();
-        assert_eq!(n_seen.into_inner(), 2);
-        assert_eq!(report.isa, Isa::Portable);
-        assert_eq!(report.rows.len(), 1);
-        for (drive, seed) in report.drives.iter().zip(1..) {
-            assert_eq!((drive.seed, drive.outcome), (seed, Outcome::Timeout));
+    fn table_depends_on_neither_threads_nor_parts_nor_breaks() {
+        let plan = plan(1.0);
+        let seen = Mutex::new(Vec::new());
+        let alone = plan.drive(Shard::WHOLE, &[], 1, |drive| {
+            seen.lock().unwrap().push(drive.clone());
+            Ok(())
+        });
+        let alone = alone.unwrap();
+        assert_eq!(seen.into_inner().unwrap(), alone);
+        let report = plan.report(&alone);
+        assert_eq!((report.n_missing, report.rows.len(), report.drives.len()), (0, 2, 4));
+        for drive in &report.drives {
+            assert_eq!(drive.outcome, Outcome::Timeout);
             assert!((drive.time_s - 1.0).abs() < 0.01, "{}", drive.time_s);
-            // 40 m as the crow flies, 1 m of tolerance, at most 1.5 m/s for one second.
+            // 40 m as the crow flies, at most 1.5 m/s for one second.
             assert!((38.0..=40.01).contains(&drive.distance_to_goal_m), "{}", drive.distance_to_goal_m);
             assert!(drive.path_length_m < 1.5, "{}", drive.path_length_m);
-            let [x_m, y_m] = drive.failed_at_m.unwrap();
-            // The start lies 20 m from the middle of a field of 50 m.
-            assert!(((x_m - 25.0).hypot(y_m - 25.0) - 20.0).abs() < 1.5, "{x_m}, {y_m}");
         }
-        let shared = measure(&Request { n_threads: 2, ..alone }, |_| ()).unwrap();
-        assert_eq!(shared, report);
+
+        let halves = ["2/2", "1/2"].map(|half| plan.drive(half.parse().unwrap(), &[], 2, nothing).unwrap());
+        assert_eq!(halves[0].len(), 2);
+        let half = plan.report(&halves[0]);
+        assert_eq!((half.n_missing, half.rows[0].n, half.rows[1].n), (2, 1, 1));
+        assert_eq!(plan.report(&halves.concat()), report);
+
+        // Broken off after three drives, and taken up again.
+        let rest = plan.drive(Shard::WHOLE, &alone[..3], 1, nothing).unwrap();
+        assert_eq!(rest, alone[3..]);
+        let twice = [rest, alone].concat();
+        assert_eq!(plan.report(&twice), report);
     }
 
     #[test]
     fn drive_that_cannot_be_is_told_by_name() {
-        let mut never = request(&[Method::Nominal], &[], 1);
-        never.time_limit_s = -1.0;
-        let told = measure(&never, |_| ()).unwrap_err().to_string();
-        assert!(told.starts_with("nominal, seed 1: ") && told.contains("time_limit_s"), "{told}");
+        let told = plan(-1.0).drive(Shard::WHOLE, &[], 1, nothing).unwrap_err().to_string();
+        assert!(told.starts_with("nominal, map 1, pair 1: ") && told.contains("time_limit_s"), "{told}");
     }
 }

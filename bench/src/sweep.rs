@@ -25,6 +25,15 @@ pub enum SweepError {
         /// What stands against it.
         reason: String,
     },
+    /// There is no such rock field.
+    #[error(transparent)]
+    Field(#[from] RockFieldError),
+    /// The machine lacks the instructions that were asked for.
+    #[error(transparent)]
+    Isa(#[from] bicycle::lanes::IsaAbsent),
+    /// What came of a drive could not be kept.
+    #[error(transparent)]
+    Kept(#[from] formats::OutputError),
     /// The system refused the threads.
     #[error("threads: {0}")]
     Threads(#[from] rayon::ThreadPoolBuildError),
@@ -52,19 +61,20 @@ pub enum BrokenDrive {
     Loop(#[from] DriveError),
 }
 
-/// Drives all that is to be driven; `after` sees what comes of each as it ends, in any order and on any thread.
+/// Drives all that is to be driven; `after` sees what comes of each as it ends, in any order and on any thread, and ends
+/// the work with an error of its own.
 pub(crate) fn sweep<J: Display + Sync, T: Send>(
     jobs: &[J],
     n_threads: usize,
     drive: impl Fn(&J) -> Result<T, BrokenDrive> + Sync,
-    after: impl Fn(&T) + Sync,
+    after: impl Fn(&T) -> Result<(), SweepError> + Sync,
 ) -> Result<Vec<T>, SweepError> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(n_threads).build()?;
     in_turns(&pool, jobs.len(), |index| {
         let job = &jobs[index];
         let told = |source| SweepError::Drive { drive: job.to_string(), source: Box::new(source) };
         let driven = drive(job).map_err(told)?;
-        after(&driven);
+        after(&driven)?;
         Ok(driven)
     })
 }

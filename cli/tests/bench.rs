@@ -2,10 +2,13 @@
 
 #![allow(clippy::expect_used, reason = "helpers of tests may fail as tests do")]
 
+use std::path::Path;
+use std::process::Output;
+
 use assert_cmd::Command;
 use serde_json::Value;
 
-fn surefoot(words: &[&str]) -> std::process::Output {
+fn surefoot(words: &[&str]) -> Output {
     let mut command = Command::cargo_bin("surefoot").expect("the binary is built with its tests");
     command.args(words).output().expect("the binary starts")
 }
@@ -110,33 +113,96 @@ fn scaling_writes_curves_and_picture() {
     assert!(told.contains("height") && told.contains("rollouts"), "{told}");
 }
 
+/// A benchmark of two methods over two pairs for one second, into a folder.
+fn navigation(out: &Path, more: &[&str]) -> Output {
+    let mut words = vec!["bench", "navigation", "--methods", "physics,nominal", "--alpha", "0.4", "--maps", "1"];
+    words.extend(["--pairs", "2", "--time-limit", "1", "--isa", "portable"]);
+    words.extend(["--out", out.to_str().expect("UTF-8")]);
+    surefoot(&[words.as_slice(), more].concat())
+}
+
+fn merged(folders: &[&Path], out: &Path) -> Output {
+    let folders: Vec<&str> = folders.iter().map(|folder| folder.to_str().expect("UTF-8")).collect();
+    let words = ["bench", "navigation", "--merge", &folders.join(","), "--out", out.to_str().expect("UTF-8")];
+    surefoot(&words)
+}
+
+fn read(out: &Path, name: &str) -> Vec<u8> {
+    std::fs::read(out.join(name)).expect("a result")
+}
+
 #[test]
-fn navigation_writes_table_and_picture() {
+fn navigation_writes_table_page_and_picture() {
     let folder = tempfile::tempdir().expect("a temporary folder");
-    let path = |name: &str| folder.path().join(name);
-    let (out, copy) = (path("out"), path("copy.json"));
-    let words =
-        ["bench", "navigation", "--methods", "physics", "--alpha", "0.4", "--seeds", "1", "--threads", "1"];
-    let mut words = words.to_vec();
-    words.extend(["--time-limit", "1", "--isa", "portable"]);
-    words.extend(["--out", out.to_str().expect("UTF-8"), "--json", copy.to_str().expect("UTF-8")]);
-    let output = surefoot(&words);
+    let (out, copy) = (folder.path().join("out"), folder.path().join("copy.json"));
+    let output = navigation(&out, &["--threads", "1", "--json", copy.to_str().expect("UTF-8")]);
     assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
     assert!(output.stderr.is_empty(), "no bar without a terminal");
     let told = String::from_utf8_lossy(&output.stdout);
-    assert!(told.contains("0 of 1") && told.contains("time limit passed after 1.0 s"), "{told}");
+    for part in ["0 of 2", "core-seconds a drive", "pair 2   time limit passed after 1.0 s"] {
+        assert!(told.contains(part), "{part} in {told}");
+    }
 
-    let bytes = std::fs::read(out.join("navigation.json")).expect("the table");
+    let bytes = read(&out, "navigation.json");
     assert_eq!(bytes, std::fs::read(&copy).expect("the copy"));
     let table: Value = serde_json::from_slice(&bytes).expect("JSON");
     let (row, drive) = (&table["rows"][0], &table["drives"][0]);
-    assert_eq!((&table["n_seeds"], &table["isa"], &row["n"]), (&1.into(), &"portable".into(), &1.into()));
-    assert_eq!((&row["outcomes"]["timeout"], &row["median_time_to_goal_s"]), (&1.into(), &Value::Null));
-    // z^2 / (n + z^2) with z = 1.96 and n = 1.
-    assert!((row["wilson_high"].as_f64().expect("a number") - 0.7935).abs() < 1e-4, "{row}");
+    assert_eq!((&table["n_pairs"], &table["isa"], &row["n"]), (&2.into(), &"portable".into(), &2.into()));
+    assert_eq!((&row["outcomes"]["timeout"], &row["median_time_to_goal_s"]), (&2.into(), &Value::Null));
+    // z^2 / (n + z^2) with z = 1.96 and n = 2.
+    assert!((row["wilson_high"].as_f64().expect("a number") - 0.6576).abs() < 1e-4, "{row}");
     assert_eq!((&drive["method"], &drive["alpha"]), (&"physics".into(), &0.4.into()));
     assert!(drive["failed_at_m"][1].is_number() && table["revision"].is_string(), "{table}");
-    assert_eq!(&std::fs::read(out.join("navigation.png")).expect("the picture")[..8], b"\x89PNG\r\n\x1a\n");
+    assert_eq!(&read(&out, "navigation.png")[..8], b"\x89PNG\r\n\x1a\n");
+    let page = String::from_utf8(read(&out, "navigation.html")).expect("a page");
+    assert!(page.contains("physics") && page.contains("data:image/png;base64,") && !page.contains("http"));
+}
+
+#[test]
+fn navigation_goes_on_where_it_was_broken_off_and_parts_make_the_same_table() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let [whole, one, two, table] = ["whole", "one", "two", "table"].map(|name| folder.path().join(name));
+    let code = |output: Output| {
+        assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+    };
+    code(navigation(&whole, &[]));
+    code(navigation(&one, &["--shard", "1/2", "--threads", "1"]));
+    code(navigation(&two, &["--shard", "2/2"]));
+    code(merged(&[&two, &one], &table));
+    for name in ["navigation.json", "navigation.png", "navigation.html"] {
+        assert!(read(&table, name) == read(&whole, name), "{name}");
+    }
+
+    // Torn within the second drive, as by a kill.
+    let journal = read(&whole, "navigation.jsonl");
+    let ends: Vec<usize> = (0..journal.len()).filter(|&place| journal[place] == b'\n').collect();
+    assert_eq!(ends.len(), 5, "the plan and four drives");
+    std::fs::write(whole.join("navigation.jsonl"), &journal[..ends[1] + 20]).expect("a torn journal");
+    code(navigation(&whole, &["--resume"]));
+    assert!(read(&whole, "navigation.json") == read(&table, "navigation.json"));
+    assert_eq!(read(&whole, "navigation.jsonl").iter().filter(|&&byte| byte == b'\n').count(), 5);
+    // All is done: nothing is driven, and the table is the same.
+    let again = navigation(&whole, &["--resume"]);
+    assert!(!String::from_utf8_lossy(&again.stdout).contains("core-seconds"));
+    assert!(read(&whole, "navigation.json") == read(&table, "navigation.json"));
+
+    for (output, part) in [
+        (
+            navigation(&whole, &["--resume", "--seed", "2"]),
+            "navigation.jsonl: expected drives with seed 2, found 1; they do not go together",
+        ),
+        (merged(&[folder.path()], &table), "navigation.jsonl: expected a journal of drives, found none"),
+    ] {
+        let told = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{told}");
+        assert!(told.contains(part) && told.lines().count() == 1, "{told}");
+    }
+    let other = String::from_utf8(journal).expect("UTF-8").replace("\"time_s\":1", "\"time_s\":2");
+    std::fs::write(one.join("navigation.jsonl"), other).expect("a journal of another course");
+    let output = merged(&[&two, &one], &table);
+    let told = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{told}");
+    assert!(told.contains("one/navigation.jsonl: another folder has another end of physics"), "{told}");
 }
 
 #[test]
@@ -174,7 +240,10 @@ fn crossings_write_table_and_picture_and_refuse_what_cannot_be_driven() {
 #[test]
 fn navigation_refuses_what_cannot_be_driven() {
     for (words, part) in [
-        (["--seeds", "0"], "--seeds: expected a number of seeds from 1 to 1000, found \"0\""),
+        (["--pairs", "0"], "--pairs: expected a number of pairs from 1 to 1000, found \"0\""),
+        (["--maps", "1001"], "--maps: expected a number of maps from 1 to 1000, found \"1001\""),
+        (["--shard", "3/2"], "--shard: expected I/N, the I-th of N parts, 1 <= I <= N <= 10000, found \"3/2\""),
+        (["--field", "/dev/null/none"], "/dev/null/none: "),
         (["--alpha", "0.4,2"], "--alpha: expected a number above 0 and at most 1, found \"2\""),
         (
             ["--methods", "physics,luck"],

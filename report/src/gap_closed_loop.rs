@@ -2,7 +2,8 @@
 
 mod text;
 
-use bench::gap_closed_loop::{Belief, Ground, Mean, Report, Row};
+use bench::gap_closed_loop::{Belief, Ground, Report, Row};
+use bench::statistics::Mean;
 
 use crate::axes::{Axes, Range, number};
 use crate::canvas::{Anchor, Canvas, Rect, Stroke, TextStyle};

@@ -41,6 +41,7 @@ pub mod scaling;
 mod table;
 pub mod traction_map;
 pub mod training;
+mod verdict;
 mod view;
 
 pub use canvas::EncodeError;

@@ -1,5 +1,7 @@
 //! The navigation table as a picture: how every drive ended, and what each row adds up to.
 
+mod page;
+mod tables;
 mod text;
 
 use bench::navigation::{DriveResult, Report, Row, name_of_outcome};
@@ -8,7 +10,9 @@ use scenarios::Outcome;
 use crate::axes::{Axes, Range, number};
 use crate::canvas::{Anchor, Canvas, Point, Rect, Stroke, TextStyle};
 use crate::canvas::{EncodeError, MARGIN};
+use crate::Picture;
 use crate::colour::Rgb;
+pub use page::page;
 pub use text::{drive_text, text};
 
 const ROW_HEIGHT: f64 = 48.0;
@@ -63,14 +67,15 @@ fn look(outcome: Outcome) -> (Rgb, Rgb, &'static str) {
 ///
 /// # Errors
 /// The encoder refuses.
-pub fn picture(report: &Report) -> Result<Vec<u8>, EncodeError> {
-    page(report).png()
+pub fn picture(report: &Report) -> Result<Picture, EncodeError> {
+    let caption = "How every drive ended, and how often each row reached the goal".to_owned();
+    Ok(Picture { file: "navigation.png", caption, png: drawn(report).png()? })
 }
 
-fn page(report: &Report) -> Canvas {
+fn drawn(report: &Report) -> Canvas {
     let height = ROW_HEIGHT * report.rows.len() as f64;
     let rows = Range { low: -(report.rows.len() as f64), high: 0.0 };
-    let n = report.n_seeds.max(1) as f64;
+    let n = f64::from(report.plan.n_maps * report.plan.n_pairs).max(1.0);
     let width = (WIDEST_CELL * n).clamp(GRID_WIDTHS[0], GRID_WIDTHS[1]);
     let frame = Rect { x: GRID_X, y: GRID_TOP, width, height };
     let grid = Axes { frame, x: Range { low: 0.5, high: n + 0.5 }, y: rows };
@@ -78,8 +83,12 @@ fn page(report: &Report) -> Canvas {
     let shares = Axes { frame, x: Range { low: 0.0, high: 100.0 }, y: rows };
 
     let told = format!(
-        "{}, 40 m · {} · seeds 1 to {} in every row · time limit {} s · numbers in cells: seconds to the goal",
-        report.world, report.vehicle, report.n_seeds, report.time_limit_s
+        "rocks, 40 m · {} · {} maps with {} pairs of start and goal in every row · time limit {} s{}",
+        report.plan.vehicle,
+        report.plan.n_maps,
+        report.plan.n_pairs,
+        report.plan.time_limit_s,
+        if width / n < NARROWEST_WITH_TEXT { "" } else { " · numbers in cells: seconds to the goal" }
     );
     let height_px = GRID_TOP + height + BELOW_GRID + LEGEND_HEIGHT;
     let mut canvas = Canvas::titled(height_px, "How often the goal is reached", &[&told]);
@@ -110,17 +119,23 @@ fn draw_grid(report: &Report, axes: &Axes, canvas: &mut Canvas) {
         let name = TextStyle::new(18, Anchor::End);
         canvas.text((axes.frame.x - 14.0, y + 6.0), &row_name(sum), name);
         for drive in drives {
-            let x = axes.place(drive.seed as f64, 0.0).0;
+            let x = axes.place(f64::from(column(report, drive)), 0.0).0;
             draw_cell(drive, (x, y), cell_width, canvas);
         }
     }
-    let every = (NUMBER_SPACING / cell_width).ceil() as u64;
+    let every = (NUMBER_SPACING / cell_width).ceil() as u32;
     let every = if every > 1 { every.next_multiple_of(5) } else { 1 };
-    for seed in (1..=report.n_seeds).filter(|seed| seed.is_multiple_of(every)) {
-        let place = (axes.place(seed as f64, 0.0).0, axes.frame.bottom() + 24.0);
-        canvas.text(place, &seed.to_string(), SOFT);
+    let columns = 1..=report.plan.n_maps * report.plan.n_pairs;
+    for column in columns.filter(|column| column.is_multiple_of(every)) {
+        let place = (axes.place(f64::from(column), 0.0).0, axes.frame.bottom() + 24.0);
+        canvas.text(place, &column.to_string(), SOFT);
     }
-    axes.draw_x_label(canvas, "seed");
+    axes.draw_x_label(canvas, "start and goal, map by map");
+}
+
+/// Drives of one start and goal stand below each other, map by map, from 1.
+fn column(report: &Report, drive: &DriveResult) -> u32 {
+    drive.map * report.plan.n_pairs + drive.pair + 1
 }
 
 fn draw_cell(drive: &DriveResult, (x, y): Point, width: f64, canvas: &mut Canvas) {

@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use bench::closed_loop::Method;
-use bench::navigation::{DriveResult, Report, Row};
+use bench::navigation::{DriveResult, Plan, Report, Request};
 use bicycle::Vehicle;
 use navigator::Areas;
 use report::drive::{DrivePicture, PathSample, RiskLayer};
@@ -16,6 +16,7 @@ use scenarios::{
     rock_field,
 };
 use terrain::GridMap;
+use traversability::CvarLevel;
 
 fn vehicle(name: &str) -> Vehicle {
     formats::read_vehicle(name).expect("the vehicle ships")
@@ -204,7 +205,7 @@ fn drive_that_never_moved_still_has_a_map() {
 }
 
 /// A table in which every way to fail occurs, the more often the further down.
-fn made_up_table(n_seeds: u64) -> Report {
+fn made_up_table(n_maps: u32) -> Report {
     let failures = [
         Outcome::Stuck,
         Outcome::Timeout,
@@ -220,15 +221,16 @@ fn made_up_table(n_seeds: u64) -> Report {
         (Method::Physics, Some(0.8)),
         (Method::Nominal, None),
     ];
-    let drive = |row: usize, seed: u64| {
-        let draw = (seed * 7 + row as u64 * 3) % 11;
-        let outcome = if draw < 1 + 2 * row as u64 { failures[(draw % 6) as usize] } else { Outcome::Goal };
+    let drive = |row: usize, map: u32| {
+        let draw = (map * 7 + row as u32 * 3) % 11;
+        let outcome = if draw < 1 + 2 * row as u32 { failures[(draw % 6) as usize] } else { Outcome::Goal };
         DriveResult {
             method: rows[row].0,
             alpha: rows[row].1,
-            seed,
+            map,
+            pair: 0,
             outcome,
-            time_s: 41.0 + draw as f64,
+            time_s: 41.0 + f64::from(draw),
             path_length_m: 44.0,
             distance_to_goal_m: 1.0,
             largest_roll_deg: 14.0,
@@ -237,24 +239,25 @@ fn made_up_table(n_seeds: u64) -> Report {
             stops: BTreeMap::new(),
         }
     };
-    let drives: Vec<_> = (0..5).flat_map(|row| (1..=n_seeds).map(move |seed| drive(row, seed))).collect();
-    Report {
-        world: "rocks",
-        vehicle: "pietra_full_size",
-        n_seeds,
+    let drives: Vec<_> = (0..5).flat_map(|row| (0..n_maps).map(move |map| drive(row, map))).collect();
+    let request = Request {
+        methods: vec![Method::Truth, Method::Physics, Method::Nominal],
+        levels: [0.4, 0.6, 0.8].map(|level| CvarLevel::new(level).expect("a level")).into(),
+        field: scenarios::RockFieldConfig::default(),
+        seed: 1,
+        n_maps,
+        n_pairs: 1,
         time_limit_s: 120.0,
         isa: mppi::Isa::Portable,
-        config_hash: String::new(),
-        rows: drives.chunks(n_seeds as usize).filter_map(Row::of).collect(),
-        drives,
-    }
+    };
+    Plan::new(&request).expect("a plan").report(&drives)
 }
 
 #[test]
-fn navigation_table_of_one_and_many_seeds() {
-    for n_seeds in [1, 20, 200] {
-        let png = report::navigation::picture(&made_up_table(n_seeds)).expect("a page");
-        let size = kept(&format!("navigation_{n_seeds}.png"), &png);
+fn navigation_table_of_one_and_many_maps() {
+    for n_maps in [1, 20, 200] {
+        let png = report::navigation::picture(&made_up_table(n_maps)).expect("a page").png;
+        let size = kept(&format!("navigation_{n_maps}.png"), &png);
         assert_eq!(size[0], 1600);
     }
 }

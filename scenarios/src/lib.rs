@@ -52,7 +52,7 @@ pub use sealed::{
 pub use sensor_imu::{IMU_PERIOD_NS, Imu, ImuConfig};
 pub use sensor_odometry::{OdometryConfig, OdometrySensor};
 pub use sensor_range::{RangeSensor, RangeSensorConfig};
-pub use task::{LayersTaskError, ROCK_FIELD_DISTANCE_M, Task};
+pub use task::{BORDER_M, LayersTaskError, ROCK_FIELD_DISTANCE_M, Task};
 pub use truth::{Traversability, Truth, TruthField};
 pub use walker::{Stride, Walker};
 pub use world::{Bounds, Patch, World, WorldError};

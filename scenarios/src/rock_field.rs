@@ -140,6 +140,12 @@ impl RockFieldConfig {
         }
     }
 
+    /// The field of the navigation benchmark: to tell methods apart, what believes in level ground fails on it in two
+    /// drives of five or more, what knows the truth hardly ever.
+    pub fn navigation() -> Self {
+        Self::default()
+    }
+
     /// Refuses settings that no field can have.
     pub fn validate(&self) -> Result<(), RockFieldError> {
         let positive = "a finite number > 0";

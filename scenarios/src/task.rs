@@ -16,6 +16,9 @@ use crate::{
 /// Between start and goal of the rock field's drive [m] (PIETRA, section V-D).
 pub const ROCK_FIELD_DISTANCE_M: f64 = 40.0;
 
+/// Between the border of a rock field and the starts and goals of [`Task::on_rock_map`] [m].
+pub const BORDER_M: f64 = 4.0;
+
 /// Maps up to so many cells a side are built whole.
 const WHOLE_MAP_CELLS: f64 = 3500.0;
 /// What of a larger map is built around its start and goal, beyond the distance between them [m].
@@ -60,6 +63,36 @@ impl Task {
         let start = [middle_m - east_m, middle_m - north_m, yaw_rad];
         let goal_m = [middle_m + east_m, middle_m + north_m];
         let map = RockMap { seed, split: Split::Test, index: 0 };
+        let world = rock_field(config, map, &[[start[0], start[1]], goal_m])?;
+        Ok(Self::in_world(Arc::new(world), start, goal_m, 1.0))
+    }
+
+    /// One of the drives over a map of the testbed: [`ROCK_FIELD_DISTANCE_M`] between two cleared pads that lie, with the
+    /// direction, anywhere in the map but within [`BORDER_M`] of its border (PIETRA, section V-D, where the pairs are not
+    /// published).
+    ///
+    /// # Errors
+    /// A field that cannot be, or that has no room for such a drive.
+    pub fn on_rock_map(config: &RockFieldConfig, map: RockMap, pair: u32) -> Result<Self, RockFieldError> {
+        config.validate()?;
+        let free_m = config.side_m - 2.0 * BORDER_M;
+        if free_m < ROCK_FIELD_DISTANCE_M {
+            let expected = "room for a drive of 40 m between borders of 4 m";
+            return Err(RockFieldError::Setting { field: "side_m".to_owned(), expected, found: config.side_m });
+        }
+        let key = [0x9A12, map.split as u64, u64::from(map.index), u64::from(pair)];
+        let mut rng = stream(map.seed, &key);
+        let (start, goal_m) = loop {
+            let start_m = [(); 2].map(|()| BORDER_M + free_m * rng.random::<f64>());
+            let yaw_rad: f64 = rng.random_range(0.0..TAU);
+            let goal_m = [
+                start_m[0] + ROCK_FIELD_DISTANCE_M * yaw_rad.cos(),
+                start_m[1] + ROCK_FIELD_DISTANCE_M * yaw_rad.sin(),
+            ];
+            if goal_m.iter().all(|at_m| (BORDER_M..=BORDER_M + free_m).contains(at_m)) {
+                break ([start_m[0], start_m[1], yaw_rad], goal_m);
+            }
+        };
         let world = rock_field(config, map, &[[start[0], start[1]], goal_m])?;
         Ok(Self::in_world(Arc::new(world), start, goal_m, 1.0))
     }

@@ -9,8 +9,8 @@ use std::sync::Arc;
 use bicycle::{Column, Command, Decision, HoldReason, StopReason, Vehicle};
 use machines::rc_car;
 use scenarios::{
-    ArenaConfig, Episode, EpisodeConfig, Fault, Observation, OdometryConfig, Outcome, Patch, RockFieldConfig,
-    SensorFault, Stribeck, Task, World, drive_log,
+    ArenaConfig, BORDER_M, Episode, EpisodeConfig, Fault, Observation, OdometryConfig, Outcome, Patch,
+    ROCK_FIELD_DISTANCE_M, RockFieldConfig, RockMap, SensorFault, Split, Stribeck, Task, World, drive_log,
 };
 use terrain::GridGeometry;
 
@@ -49,6 +49,37 @@ fn straight_over_flat_ground_reaches_the_goal_in_distance_over_speed() {
     assert!((15.8..17.0).contains(&episode.time_s()), "{}", episode.time_s());
     assert!((episode.path_length_m() - 15.8).abs() < 0.1, "{}", episode.path_length_m());
     assert_eq!(episode.trace().len() as u64, episode.n_cycles());
+}
+
+#[test]
+fn pairs_of_a_rock_map_differ_and_lie_within_its_borders() {
+    let field = RockFieldConfig::default();
+    let map = RockMap { seed: 3, split: Split::Test, index: 2 };
+    let pairs: Vec<Task> = (0..6).map(|pair| Task::on_rock_map(&field, map, pair).unwrap()).collect();
+    for (index, task) in pairs.iter().enumerate() {
+        let [x_m, y_m, yaw_rad] = task.start;
+        assert!((task.distance_to_goal_m(x_m, y_m) - ROCK_FIELD_DISTANCE_M).abs() < 1e-9);
+        let ahead_m = [x_m + 40.0 * yaw_rad.cos(), y_m + 40.0 * yaw_rad.sin()];
+        assert!((ahead_m[0] - task.goal_m[0]).hypot(ahead_m[1] - task.goal_m[1]) < 1e-9, "it faces the goal");
+        for at_m in [x_m, y_m].into_iter().chain(task.goal_m) {
+            assert!((BORDER_M..=field.side_m - BORDER_M).contains(&at_m), "{at_m}");
+        }
+        for other in &pairs[..index] {
+            assert!((other.start[0] - x_m).hypot(other.start[1] - y_m) > 0.1);
+        }
+        // The rocks are those of the map; only the pads differ.
+        let elsewhere = |task: &Task| task.world.height_m(25.3, 24.1);
+        let clear_m = [&pairs[0], task].map(|task| {
+            let [x_m, y_m, _] = task.start;
+            (x_m - 25.3).hypot(y_m - 24.1).min((task.goal_m[0] - 25.3).hypot(task.goal_m[1] - 24.1))
+        });
+        assert!(clear_m[0].min(clear_m[1]) < 12.0 || elsewhere(task) == elsewhere(&pairs[0]));
+    }
+    let again = Task::on_rock_map(&field, map, 4).unwrap();
+    assert_eq!((again.start, again.goal_m), (pairs[4].start, pairs[4].goal_m));
+    let small = RockFieldConfig { side_m: 47.0, ..field };
+    let told = Task::on_rock_map(&small, map, 0).unwrap_err().to_string();
+    assert!(told.contains("side_m") && told.contains("47"), "{told}");
 }
 
 #[test]

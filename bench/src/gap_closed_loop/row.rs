@@ -1,44 +1,11 @@
 //! What the drives of one ground, gap and belief add up to.
 
-use rand::{RngExt, SeedableRng};
-use rand_xoshiro::Xoshiro256PlusPlus;
 use serde::Serialize;
 
 use super::belief::Belief;
 use super::drive::{DriveResult, End, Ground};
 use super::gap::Gap;
-use crate::navigation::wilson_interval;
-
-/// How often the drives are drawn again for an interval.
-const N_DRAWS: usize = 2000;
-const SEED: u64 = 17;
-
-/// A mean over drives with the ends of its 95 % interval (percentile bootstrap over the seeds).
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Mean {
-    /// The mean.
-    pub value: f64,
-    /// Lower end.
-    pub low: f64,
-    /// Upper end.
-    pub high: f64,
-}
-
-impl Mean {
-    /// Of at least one value.
-    pub(super) fn of(values: &[f64]) -> Option<Self> {
-        if values.is_empty() {
-            return None;
-        }
-        let mut rng = Xoshiro256PlusPlus::seed_from_u64(SEED);
-        let n = values.len();
-        let mut draw = || (0..n).map(|_| values[rng.random_range(0..n)]).sum::<f64>() / n as f64;
-        let mut means: Vec<f64> = (0..N_DRAWS).map(|_| draw()).collect();
-        means.sort_by(f64::total_cmp);
-        let at = |share: f64| means[(share * (N_DRAWS - 1) as f64).round() as usize];
-        Some(Self { value: values.iter().sum::<f64>() / n as f64, low: at(0.025), high: at(0.975) })
-    }
-}
+use crate::statistics::{Mean, wilson_interval};
 
 /// One row of the table.
 #[derive(Clone, Debug, PartialEq, Serialize)]

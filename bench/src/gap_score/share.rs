@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use super::{Hit, truth};
-use crate::navigation::wilson_interval;
+use crate::statistics::wilson_interval;
 
 /// How many of how many.
 #[derive(Clone, Debug, PartialEq, Serialize)]

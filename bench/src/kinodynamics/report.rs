@@ -5,7 +5,7 @@ use serde::Serialize;
 use super::Row;
 use super::lap::DrivenLap;
 use super::track::Track;
-use crate::navigation::wilson_interval;
+use crate::statistics::wilson_interval;
 
 /// The laps on one track.
 #[derive(Clone, Debug, Serialize)]

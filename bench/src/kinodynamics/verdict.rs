@@ -7,6 +7,7 @@ use serde::Serialize;
 use super::Row;
 use super::probe::Probe;
 use super::report::{RowReport, TrackReport};
+use crate::Verdict;
 
 /// Draws of the bootstrap.
 const DRAWS: usize = 2000;
@@ -20,17 +21,6 @@ pub struct Ratio {
     pub low: f64,
     /// Upper end.
     pub high: f64,
-}
-
-/// A rule.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Verdict {
-    /// What it asks for.
-    pub rule: String,
-    /// What was found.
-    pub found: String,
-    /// Whether it holds.
-    pub holds: bool,
 }
 
 impl Ratio {
@@ -69,8 +59,8 @@ pub(super) fn verdicts(
     seed: u64,
 ) -> Vec<Verdict> {
     let mut verdicts = Vec::new();
-    let mut rule = |rule: &str, found: String, holds: bool| {
-        verdicts.push(Verdict { rule: rule.to_owned(), found, holds });
+    let mut rule = |rule: &str, found: String, is_passed: bool| {
+        verdicts.push(Verdict { rule: rule.to_owned(), found, is_passed });
     };
     if let [Some(base), Some(ablation), Some(learned)] = Row::PAPER.map(|row| outdoor.row(row)) {
         let success = [base, ablation, learned].map(|row| row.success);

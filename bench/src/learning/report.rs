@@ -5,7 +5,8 @@ use serde::Serialize;
 
 use super::metric::N_GROUPS;
 use super::tally::{Domain, N_UNEVENNESS, Tally};
-use super::{Chosen, EvidenceReport, Row, TestbedReport, Verdict};
+use super::{Chosen, EvidenceReport, Row, TestbedReport};
+use crate::Verdict;
 
 const N_HEADS: usize = Architecture::N_HEADS;
 

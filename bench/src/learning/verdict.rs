@@ -1,19 +1,8 @@
 //! The rules that were fixed before anything was trained, and whether they hold.
 
-use serde::Serialize;
+use crate::Verdict;
 
 use super::{Absurd, DomainReport, Ground, Report, Row, UnevennessBin};
-
-/// One rule.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Verdict {
-    /// What shall hold.
-    pub rule: String,
-    /// What was found.
-    pub found: String,
-    /// Whether it holds. What was not measured does not.
-    pub is_passed: bool,
-}
 
 /// Out of distribution every row is below the next, by more than the seeds vary.
 const ORDER: [[Row; 2]; 7] = [

@@ -4,24 +4,25 @@ use std::collections::BTreeMap;
 use std::fmt;
 
 use bicycle::{Decision, Model, StopReason};
-use mppi::Isa;
-use scenarios::{Outcome, Task};
-use serde::Serialize;
+use scenarios::{Outcome, RockMap, Split, Task, seed_of};
+use serde::{Deserialize, Serialize};
 use traversability::CvarLevel;
 
-use super::Settings;
+use super::plan::Settings;
 use crate::closed_loop::{ClosedLoop, Drive, MapSource, Method};
 use crate::sweep::BrokenDrive;
 
 /// One drive in numbers. Positions are those of the rear axle's centre in the map frame.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct DriveResult {
     /// What the controller knew of the ground.
     pub method: Method,
     /// Risk tolerance (CVaR level); null where the method knows no distribution.
     pub alpha: Option<f64>,
-    /// Decides world, start, goal, sensor noise and samples.
-    pub seed: u64,
+    /// Map, from 0.
+    pub map: u32,
+    /// Start and goal on it, from 0.
+    pub pair: u32,
     /// How it ended.
     pub outcome: Outcome,
     /// Simulated time until the end [s].
@@ -46,14 +47,8 @@ pub(super) struct Job {
     pub method: Method,
     /// `None` where the method knows no distribution.
     pub level: Option<CvarLevel>,
-    pub seed: u64,
-}
-
-/// A drive that is done.
-pub(super) struct Finished {
-    pub result: DriveResult,
-    /// Instruction set that the controller used.
-    pub isa: Isa,
+    pub map: u32,
+    pub pair: u32,
 }
 
 /// How a drive ended, in a word or two.
@@ -78,12 +73,18 @@ impl fmt::Display for Job {
         if let Some(level) = self.level {
             write!(formatter, ", alpha {}", level.get())?;
         }
-        write!(formatter, ", seed {}", self.seed)
+        write!(formatter, ", map {}, pair {}", self.map + 1, self.pair + 1)
     }
 }
 
 impl Job {
-    pub(super) fn drive(&self, settings: &Settings) -> Result<Finished, BrokenDrive> {
+    /// Whether this drive gave that result.
+    pub(super) fn is_of(&self, drive: &DriveResult) -> bool {
+        (self.method, self.level.map(CvarLevel::get), self.map, self.pair)
+            == (drive.method, drive.alpha, drive.map, drive.pair)
+    }
+
+    pub(super) fn drive(&self, settings: &Settings) -> Result<DriveResult, BrokenDrive> {
         let mut closed_loop = self.begin(settings)?;
         let mut stops = BTreeMap::new();
         let outcome = loop {
@@ -94,13 +95,13 @@ impl Job {
                 *stops.entry(reason).or_default() += 1;
             }
         };
-        let isa = closed_loop.navigator.controller().diagnostics().isa;
-        Ok(Finished { result: self.result(&closed_loop, outcome, stops), isa })
+        Ok(self.result(&closed_loop, outcome, stops))
     }
 
     fn begin(&self, settings: &Settings) -> Result<ClosedLoop, BrokenDrive> {
+        let map = RockMap { seed: settings.seed, split: Split::Test, index: self.map };
         Ok(ClosedLoop::new(Drive {
-            task: Task::rock_field(&settings.field, self.seed)?,
+            task: Task::on_rock_map(&settings.field, map, self.pair)?,
             vehicle: &settings.vehicle,
             model: Model::of(&settings.vehicle),
             config: settings.config.clone(),
@@ -110,7 +111,7 @@ impl Job {
             corrector: None,
             map_source: MapSource::Sensed,
             level: self.level.unwrap_or(CvarLevel::MEAN),
-            seed: self.seed,
+            seed: seed_of(settings.seed, &[0xD21E, self.map.into(), self.pair.into()]),
         })?)
     }
 
@@ -125,7 +126,8 @@ impl Job {
         DriveResult {
             method: self.method,
             alpha: self.level.map(CvarLevel::get),
-            seed: self.seed,
+            map: self.map,
+            pair: self.pair,
             outcome,
             time_s: episode.time_s(),
             path_length_m: episode.path_length_m(),
@@ -135,5 +137,30 @@ impl Job {
             failed_at_m: (outcome != Outcome::Goal).then_some([pose.x_m, pose.y_m]),
             stops,
         }
+    }
+}
+
+/// A drive that ended so, for tests of what is made of drives.
+#[cfg(test)]
+pub(super) fn driven(
+    method: Method,
+    alpha: Option<f64>,
+    pair: u32,
+    outcome: Outcome,
+    time_s: f64,
+) -> DriveResult {
+    DriveResult {
+        method,
+        alpha,
+        map: 0,
+        pair,
+        outcome,
+        time_s,
+        path_length_m: 44.0,
+        distance_to_goal_m: 1.0,
+        largest_roll_deg: 10.0,
+        largest_pitch_deg: 12.0,
+        failed_at_m: (outcome != Outcome::Goal).then_some([20.0, 31.26]),
+        stops: BTreeMap::new(),
     }
 }

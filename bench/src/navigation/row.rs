@@ -7,9 +7,7 @@ use serde::Serialize;
 
 use super::DriveResult;
 use crate::closed_loop::Method;
-
-/// Standard normal quantile of 97.5 %: intervals cover 95 %.
-pub const WILSON_Z: f64 = 1.959_963_984_540_054;
+use crate::statistics::wilson_interval;
 
 /// One row of the table.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -61,17 +59,6 @@ impl Row {
     }
 }
 
-/// Where 95 % of such intervals hold the true probability of what came `n_hit` times in `n` > 0 trials
-/// (Wilson 1927): all probabilities that a score test at 5 % would not reject.
-pub fn wilson_interval(n_hit: usize, n: usize) -> [f64; 2] {
-    let (n, share) = (n as f64, n_hit as f64 / n as f64);
-    let z_squared_over_n = WILSON_Z * WILSON_Z / n;
-    let centre = share + 0.5 * z_squared_over_n;
-    let half_width = (z_squared_over_n * (share * (1.0 - share) + 0.25 * z_squared_over_n)).sqrt();
-    // At no hit or no miss one end is the bound itself, up to rounding.
-    [centre - half_width, centre + half_width].map(|end| (end / (1.0 + z_squared_over_n)).clamp(0.0, 1.0))
-}
-
 /// The middle value, or the mean of the two in the middle.
 fn median(mut values: Vec<f64>) -> Option<f64> {
     values.sort_by(f64::total_cmp);
@@ -82,46 +69,8 @@ fn median(mut values: Vec<f64>) -> Option<f64> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::drive::driven;
     use super::*;
-
-    #[test]
-    fn interval_is_the_published_one() {
-        // Newcombe, Statistics in Medicine 17 (1998) 857, table I, method 3; and 8 of 10.
-        let published = [
-            (81, 263, [0.2553, 0.3662]),
-            (15, 148, [0.0624, 0.1605]),
-            (0, 20, [0.0, 0.1611]),
-            (1, 29, [0.0061, 0.1718]),
-            (8, 10, [0.4902, 0.9433]),
-        ];
-        for (n_hit, n, expected) in published {
-            let found = wilson_interval(n_hit, n);
-            for end in 0..2 {
-                assert!((found[end] - expected[end]).abs() < 5.1e-5, "{n_hit} of {n}: {found:?}");
-            }
-        }
-    }
-
-    #[test]
-    fn ends_are_where_the_score_test_just_rejects() {
-        for (n_hit, n) in [(1, 20), (8, 10), (13, 20), (19, 20)] {
-            for end in wilson_interval(n_hit, n) {
-                let off = n_hit as f64 - n as f64 * end;
-                let score = off / (n as f64 * end * (1.0 - end)).sqrt();
-                assert!((score.abs() - WILSON_Z).abs() < 1e-9, "{n_hit} of {n}: {score}");
-            }
-        }
-    }
-
-    #[test]
-    fn hits_and_misses_mirror_each_other() {
-        for n_hit in 0..=20 {
-            let [low, high] = wilson_interval(n_hit, 20);
-            let [mirrored_high, mirrored_low] = wilson_interval(20 - n_hit, 20).map(|end| 1.0 - end);
-            assert!((low - mirrored_low).abs() < 1e-12 && (high - mirrored_high).abs() < 1e-12);
-            assert!(0.0 <= low && low <= n_hit as f64 / 20.0 && n_hit as f64 / 20.0 <= high && high <= 1.0);
-        }
-    }
 
     #[test]
     fn median_is_the_middle() {
@@ -133,19 +82,7 @@ mod tests {
 
     #[test]
     fn row_counts_outcomes_and_times_only_those_that_arrived() {
-        let drive = |seed, outcome, time_s| DriveResult {
-            method: Method::Physics,
-            alpha: Some(0.6),
-            seed,
-            outcome,
-            time_s,
-            path_length_m: 44.0,
-            distance_to_goal_m: 1.0,
-            largest_roll_deg: 10.0,
-            largest_pitch_deg: 12.0,
-            failed_at_m: None,
-            stops: BTreeMap::new(),
-        };
+        let drive = |pair, outcome, time_s| driven(Method::Physics, Some(0.6), pair, outcome, time_s);
         let row = Row::of(&[
             drive(1, Outcome::Goal, 50.0),
             drive(2, Outcome::Stuck, 9.0),

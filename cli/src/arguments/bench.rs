@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use ::bench::navigation::Shard;
 use clap::{Args, Subcommand, ValueEnum};
 
 use super::{Method, values};
@@ -21,7 +22,7 @@ pub enum BenchCommand {
     /// How the cost of an update and of a map grows: rollouts, steps, threads, cells, yaws, changed share
     #[command(long_about = super::scaling::LONG_ABOUT)]
     Scaling(super::BenchScalingArguments),
-    /// Drives over the default rock field, with every method and risk tolerance
+    /// Drives over the same rock fields with every method and risk tolerance
     #[command(long_about = NAVIGATION_ABOUT)]
     Navigation(BenchNavigationArguments),
     /// Drives among people who cross the way
@@ -107,24 +108,51 @@ pub struct BenchNavigationArguments {
         value_enum,
         value_name = "METHOD,..",
         value_delimiter = ',',
-        default_value = "truth,physics,nominal"
+        default_value = "pietra,pietra-avoid,evora,physics-informed,vanilla,physics,nominal,truth"
     )]
     pub methods: Vec<Method>,
 
-    /// Risk tolerances of physics in (0, 1], separated by commas; truth and nominal know none and are driven once
+    /// Risk tolerances in (0, 1], separated by commas; truth and nominal know none and are driven once
     #[arg(long, value_name = "LEVEL,..", value_delimiter = ',', value_parser = values::cvar_level,
           default_value = "0.4,0.6,0.8", allow_hyphen_values = true)]
     pub alpha: Vec<f64>,
 
-    /// Drive with the seeds 1 to N, at most 1000
-    #[arg(long, value_name = "N", value_parser = values::seed_count, default_value = "20",
+    /// Maps, 1 to 1000
+    #[arg(long, value_name = "N", value_parser = values::map_count, default_value = "10",
           allow_hyphen_values = true)]
-    pub seeds: u64,
+    pub maps: u32,
+
+    /// Starts with their goals on each map, 1 to 1000
+    #[arg(long, value_name = "N", value_parser = pair_count, default_value = "10", allow_hyphen_values = true)]
+    pub pairs: u32,
+
+    /// Seed of the maps, starts, goals, sensor noise and samples
+    #[arg(long, value_name = "N", value_parser = values::seed, default_value = "1", allow_hyphen_values = true)]
+    pub seed: u64,
+
+    /// Drive over rock fields of your own: a TOML file of what differs from the benchmark's, such as
+    /// boulders.density_per_m2 = 0.01
+    #[arg(long, value_name = "FILE")]
+    pub field: Option<PathBuf>,
 
     /// Give up a drive after this much simulated time [s]
     #[arg(long, value_name = "SECONDS", value_parser = values::duration_s, default_value = "120",
           allow_hyphen_values = true)]
     pub time_limit: f64,
+
+    /// Do only the I-th of N parts of the work: every method over the same starts and goals
+    #[arg(long, value_name = "I/N", help_heading = "Long work")]
+    pub shard: Option<Shard>,
+
+    /// Go on with the drives that --out holds already
+    #[arg(long, help_heading = "Long work")]
+    pub resume: bool,
+
+    /// Drive nothing and make the table of the drives in these folders, separated by commas
+    #[arg(long, value_name = "DIR,..", value_delimiter = ',', help_heading = "Long work",
+          conflicts_with_all = ["methods", "alpha", "maps", "pairs", "seed", "field", "time_limit", "shard", "resume",
+                                "threads", "isa"])]
+    pub merge: Vec<PathBuf>,
 
     /// How maps and controller compute.
     #[command(flatten)]
@@ -178,6 +206,10 @@ pub struct BenchLearningArguments {
     pub results: super::ResultArguments,
 }
 
+fn pair_count(word: &str) -> Result<u32, String> {
+    values::count(word, 1000, "pairs").map(|n| n as u32)
+}
+
 fn pass_count(word: &str) -> Result<usize, String> {
     values::count(word, 65_536, "passes")
 }
@@ -191,20 +223,30 @@ Measures the risk map of the physics prior over 81 x 96 cells and 13 yaws: built
 after one contiguous block of 2 % of the cells has changed.";
 
 const NAVIGATION_ABOUT: &str = "\
-Drives 40 m over the default rock field again and again: every method, every risk tolerance, the same seeds. Says how \
-often the goal was reached, with the 95 % Wilson interval, how long that took, and how every other drive failed. \
-The exit code is 0 once all drives are done, however they ended.";
+Drives 40 m over rock fields again and again: every method, every risk tolerance, over the same maps, starts and goals \
+(PIETRA, figure 7). Says how often the goal was reached, with the 95 % Wilson interval, how long that took, how every \
+other drive failed, what the methods are worth against one another on the same starts, and whether the rules that were \
+fixed beforehand hold. The exit code is 0 once all drives are done, however they ended and whether the rules hold or \
+not.";
 
 const NAVIGATION_AFTER_HELP: &str = "\
-Writes navigation.png, and navigation.json with
-  rows    of each method and alpha: n, n_goal, success, wilson_low, wilson_high, median_time_to_goal_s, outcomes
-  drives  of each seed too: outcome, time_s, path_length_m, distance_to_goal_m, largest_roll_deg,
-          largest_pitch_deg, failed_at_m, stops
+Writes navigation.png, navigation.html, every drive as it ends into navigation.jsonl, and navigation.json with
+  rows         of each method and alpha: n, n_goal, success, wilson_low, wilson_high, median_time_to_goal_s, outcomes
+  comparisons  of two rows on the same starts: n, n_only_one, n_only_other, p_value (exact McNemar),
+               time_difference_s where both arrived (mean, low, high: bootstrap)
+  verdicts     rule, found, is_passed
+  drives       of each map and pair, from 0: outcome, time_s, path_length_m, distance_to_goal_m, largest_roll_deg,
+               largest_pitch_deg, failed_at_m, stops
+What is broken off goes on with --resume. Parts that --shard did on several machines become one table with --merge; it
+is the table of one run to the byte, for any number of threads.
 
-Example, minutes to half an hour:
-  surefoot bench navigation
-Example, a few seconds:
-  surefoot bench navigation --methods physics --alpha 0.6 --seeds 2 --time-limit 5";
+Example, half a minute:
+  surefoot bench navigation --methods physics,nominal --alpha 0.6 --maps 1 --pairs 1
+Example, days in pieces:
+  surefoot bench navigation --out table; surefoot bench navigation --out table --resume
+Example, one of 40 jobs of an array, and what its last one does:
+  surefoot bench navigation --shard 7/40 --out part7
+  surefoot bench navigation --merge part1,part2,part3 --out table";
 
 const LEARNING_ABOUT: &str = "\
 Repeats PIETRA's learning benchmark: drives a testbed of rock fields, trains six methods on its even ground with every \

@@ -1,42 +1,109 @@
-//! `surefoot bench navigation`: the drives, a bar meanwhile, and the table as text, JSON and picture.
+//! `surefoot bench navigation`: the drives, a bar meanwhile, and the table as text, JSON, picture and page.
 
-use ::bench::navigation::{Report, Request, measure};
+mod kept;
+
+use std::sync::{Mutex, PoisonError};
+
+use ::bench::navigation::{DriveResult, Plan, Report, Request, Shard};
+use ::bench::sweep::SweepError;
+use formats::{ConfigText, Journal, overlay};
+use rustix::time::{ClockId, clock_gettime};
+use scenarios::RockFieldConfig;
 use traversability::CvarLevel;
 
 use super::sweep::told;
 use crate::arguments::BenchNavigationArguments;
 use crate::output::WithRevision;
-use crate::{UsageError, progress};
+use crate::{UsageError, progress, summary};
+use kept::{Header, JOURNAL};
 
 pub(crate) fn run_navigation(arguments: &BenchNavigationArguments) -> anyhow::Result<()> {
-    let request = request(arguments)?;
+    if !arguments.merge.is_empty() {
+        let (plan, drives) = kept::merged(&arguments.merge)?;
+        arguments.results.prepare()?;
+        return finish(&plan.report(&drives), arguments);
+    }
+    let plan = Plan::new(&request(arguments)?).map_err(told_request)?;
     arguments.results.prepare()?;
-    let bar = progress::bar(request.n_drives(), "{pos}/{len} drives, {eta} left   {msg}");
-    let measured = measure(&request, |drive| {
+    let header = Header::of(&plan);
+    let path = arguments.results.file(JOURNAL);
+    let (journal, mut drives) = match arguments.resume {
+        true => kept::resumed(&path, &header)?,
+        false => (Journal::create(&path, &header)?, Vec::new()),
+    };
+    drives.extend(drive(&plan, &drives, journal, arguments)?);
+    finish(&plan.report(&drives), arguments)
+}
+
+fn drive(
+    plan: &Plan,
+    known: &[DriveResult],
+    journal: Journal,
+    arguments: &BenchNavigationArguments,
+) -> anyhow::Result<Vec<DriveResult>> {
+    let shard = arguments.shard.unwrap_or(Shard::WHOLE);
+    let bar = progress::bar(plan.n_drives(shard) as u64, "{pos}/{len} drives, {eta} left   {msg}");
+    bar.inc(known.len() as u64);
+    let journal = Mutex::new(journal);
+    let began_s = cpu_s();
+    let driven = plan.drive(shard, known, arguments.kernels.threads.count(), |drive| {
         bar.set_message(report::navigation::drive_text(drive));
         bar.inc(1);
+        // What a panic elsewhere left is still a file open for more.
+        let mut journal = journal.lock().unwrap_or_else(PoisonError::into_inner);
+        journal.append(drive).map_err(SweepError::from)
     });
     bar.finish_and_clear();
-    let report = measured.map_err(told)?;
-    print!("{}", report::navigation::text(&report));
-    write(&report, arguments)
+    let driven = driven.map_err(told)?;
+    if !driven.is_empty() {
+        println!("  {:.1} core-seconds a drive\n", (cpu_s() - began_s) / driven.len() as f64);
+    }
+    Ok(driven)
+}
+
+/// What all threads of the process have computed so far [s].
+fn cpu_s() -> f64 {
+    let time = clock_gettime(ClockId::ProcessCPUTime);
+    time.tv_sec as f64 + 1e-9 * time.tv_nsec as f64
 }
 
 fn request(arguments: &BenchNavigationArguments) -> Result<Request, UsageError> {
     let levels = arguments.alpha.iter().map(|&alpha| CvarLevel::new(alpha));
+    let mut field = RockFieldConfig::navigation();
+    if let Some(path) = &arguments.field {
+        let text = ConfigText::read(path).map_err(UsageError::from_input)?;
+        field = overlay(&text, &field).map_err(UsageError::from_input)?;
+    }
     Ok(Request {
         methods: arguments.methods.iter().map(|&method| method.into()).collect(),
         levels: levels.collect::<Result<_, _>>().map_err(UsageError::from_input)?,
-        n_seeds: arguments.seeds,
+        field,
+        seed: arguments.seed,
+        n_maps: arguments.maps,
+        n_pairs: arguments.pairs,
         time_limit_s: arguments.time_limit,
-        n_threads: arguments.kernels.threads.count(),
         isa: arguments.kernels.isa.into(),
     })
 }
 
-fn write(report: &Report, arguments: &BenchNavigationArguments) -> anyhow::Result<()> {
-    arguments.results.write_json("navigation.json", &WithRevision::of(report))?;
-    arguments.results.write("navigation.png", &report::navigation::picture(report)?)?;
-    println!("\n  navigation.json and navigation.png in {}", arguments.results.out.display());
+/// A field or an instruction set that cannot be is the user's choice.
+fn told_request(error: SweepError) -> anyhow::Error {
+    match error {
+        SweepError::Field(_) | SweepError::Isa(_) | SweepError::NoDrives { .. } => {
+            UsageError::from_input(error).into()
+        }
+        other => told(other),
+    }
+}
+
+fn finish(report: &Report, arguments: &BenchNavigationArguments) -> anyhow::Result<()> {
+    print!("{}", report::navigation::text(report));
+    let results = &arguments.results;
+    results.write_json("navigation.json", &WithRevision::of(report))?;
+    let picture = report::navigation::picture(report)?;
+    results.write(picture.file, &picture.png)?;
+    let page = report::navigation::page(report, &picture, summary::revision());
+    results.write("navigation.html", page.as_bytes())?;
+    println!("\n  navigation.json, navigation.html and navigation.png in {}", results.out.display());
     Ok(())
 }

@@ -1,6 +1,7 @@
 //! The closed-loop table for a terminal.
 
-use bench::gap_closed_loop::{DriveResult, Mean, Report, Row};
+use bench::gap_closed_loop::{DriveResult, Report, Row};
+use bench::statistics::Mean;
 
 /// A drive in a line.
 pub fn drive_text(drive: &DriveResult) -> String {

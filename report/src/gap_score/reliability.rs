@@ -30,7 +30,7 @@ pub(super) fn page(calibration: &Calibration, title: &str) -> Option<Canvas> {
     let points: Vec<_> = calibration.bins.iter().map(|bin| axes.place(bin.mean_score, bin.share)).collect();
     for (bin, &point) in calibration.bins.iter().zip(&points) {
         let n_true = (bin.share * bin.n as f64).round() as usize;
-        let [low, high] = bench::navigation::wilson_interval(n_true, bin.n);
+        let [low, high] = bench::statistics::wilson_interval(n_true, bin.n);
         let ends = [low, high].map(|share| axes.place(bin.mean_score, share));
         canvas.line(ends[0], ends[1], Stroke::solid(Rgb::ROLL, 2.0));
         canvas.circle(point, 8.0, Rgb::ROLL, Stroke::solid(Rgb::WHITE, 1.5));

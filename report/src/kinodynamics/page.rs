@@ -3,7 +3,7 @@
 use bench::kinodynamics::{Report, RowReport, TrackReport};
 
 use super::text::published;
-use crate::{Picture, html};
+use crate::{Picture, html, verdict};
 
 /// The page; the pictures are those of the outdoor and of the indoor track.
 pub fn page(report: &Report, pictures: &[Picture; 2], revision: &str) -> String {
@@ -17,10 +17,7 @@ pub fn page(report: &Report, pictures: &[Picture; 2], revision: &str) -> String 
         let content = table(track, place) + &html::figure(&pictures[place]);
         body += &html::section(&format!("The {} track", track.track), &content);
     }
-    let verdicts = report.verdicts.iter();
-    let rows: String =
-        verdicts.map(|verdict| html::verdict(&verdict.rule, verdict.holds, &verdict.found)).collect();
-    body += &html::section("Rules", &html::table(&["rule", "", "found"], &rows));
+    body += &verdict::section(&report.verdicts);
     html::page("Inverse kinodynamics", &body)
 }
 

@@ -1,6 +1,8 @@
 //! The report as text.
 
-use bench::kinodynamics::{DataPoint, Report, Row, RowReport, TrackReport, TrainingReport, Verdict};
+use bench::kinodynamics::{DataPoint, Report, Row, RowReport, TrackReport, TrainingReport};
+
+use crate::verdict;
 
 /// What the paper's tables and its published counts give: success outdoors and indoors [%].
 pub(super) fn published(row: Row) -> [Option<f64>; 2] {
@@ -50,8 +52,7 @@ pub fn text(report: &Report) -> String {
         told +=
             &format!("\n  outdoors who is told the ground fails {ratio} times as often as the ablation\n");
     }
-    told += "\n  rules\n";
-    told.extend(report.verdicts.iter().map(verdict));
+    told += &format!("\n{}", verdict::text(&report.verdicts));
     told
 }
 
@@ -116,9 +117,4 @@ fn per_speed(track: &TrackReport) -> String {
         told.push('\n');
     }
     told
-}
-
-fn verdict(verdict: &Verdict) -> String {
-    let mark = if verdict.holds { "holds" } else { "FAILS" };
-    format!("  {mark}  {}: {}\n", verdict.rule, verdict.found)
 }

@@ -1,10 +1,10 @@
 //! The report as a page that needs nothing else.
 
-use bench::learning::{Report, Verdict};
+use bench::learning::Report;
 
 use super::{drawn, tables, text};
-use crate::html;
 use crate::table::Table;
+use crate::{html, verdict};
 
 /// The page; `took` says how long everything took.
 pub fn page(report: &Report, took: &str) -> String {
@@ -15,16 +15,10 @@ pub fn page(report: &Report, took: &str) -> String {
     let driven = text::testbed(report) + took;
     let mut body = "<h1>Learning benchmark</h1>\n".to_owned();
     body.extend(driven.lines().map(|line| html::soft(line.trim())));
-    body += &verdicts(report);
+    body += &verdict::section(&report.verdicts);
     body += inline(&drawn(report).svg());
     body.extend(others.iter().map(Table::html));
     html::page("Learning benchmark", &body)
-}
-
-fn verdicts(report: &Report) -> String {
-    let row = |verdict: &Verdict| html::verdict(&verdict.rule, verdict.is_passed, &verdict.found);
-    let rows: String = report.verdicts.iter().map(row).collect();
-    html::section(&text::rules(report), &html::table(&["rule", "", "found"], &rows))
 }
 
 /// SVG without what only a file of its own may begin with.

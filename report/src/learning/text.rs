@@ -1,8 +1,9 @@
 //! The report for a terminal.
 
-use bench::learning::{Report, Row, Verdict};
+use bench::learning::{Report, Row};
 
 use super::tables;
+use crate::verdict;
 
 /// What was driven, in lines.
 pub(super) fn testbed(report: &Report) -> String {
@@ -32,23 +33,7 @@ pub fn text(report: &Report) -> String {
     tables.extend(report.evidence_of(Row::Pietra).map(|evidence| tables::evidence(report, evidence)));
     tables.push(tables::calibration(report));
     let tables: Vec<String> = tables.iter().map(|table| table.text()).collect();
-    format!("\n{}\n{}\n{}", testbed(report), tables.join("\n"), verdicts(report))
-}
-
-/// How many rules hold.
-pub(super) fn rules(report: &Report) -> String {
-    let n_passed = report.verdicts.iter().filter(|verdict| verdict.is_passed).count();
-    format!("Rules: {n_passed} of {} hold", report.verdicts.len())
-}
-
-fn verdicts(report: &Report) -> String {
-    let width = report.verdicts.iter().map(|verdict| verdict.rule.chars().count()).max().unwrap_or(0);
-    let line = |verdict: &Verdict| {
-        let passed = if verdict.is_passed { "passed" } else { "FAILED" };
-        format!("  {passed}  {:<width$}  {}\n", verdict.rule, verdict.found)
-    };
-    let lines: String = report.verdicts.iter().map(line).collect();
-    format!("  {}\n{lines}", rules(report))
+    format!("\n{}\n{}\n{}", testbed(report), tables.join("\n"), verdict::text(&report.verdicts))
 }
 
 /// A duration for people.

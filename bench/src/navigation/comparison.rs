@@ -1,0 +1,138 @@
+//! Two rows of the table on the same starts and goals.
+
+use scenarios::Outcome;
+use serde::Serialize;
+
+use super::{DriveResult, Row};
+use crate::closed_loop::Method;
+use crate::statistics::{Mean, mcnemar_p_value};
+
+/// What is compared, where both are in the table: at every alpha, or once where neither knows one.
+const COMPARED: [[Method; 2]; 8] = [
+    [Method::Pietra, Method::PietraAvoid],
+    [Method::PietraAvoid, Method::Evora],
+    [Method::Pietra, Method::Physics],
+    [Method::Physics, Method::PhysicsInformed],
+    [Method::PhysicsInformed, Method::Vanilla],
+    [Method::Pietra, Method::Nominal],
+    [Method::Truth, Method::Pietra],
+    [Method::Truth, Method::Nominal],
+];
+
+/// Two rows, paired by map, start and goal.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Comparison {
+    /// What the controller of the one row knew.
+    pub method: Method,
+    /// Its risk tolerance.
+    pub alpha: Option<f64>,
+    /// What the controller of the other knew.
+    pub other: Method,
+    /// Its risk tolerance.
+    pub other_alpha: Option<f64>,
+    /// Pairs that both drove.
+    pub n: usize,
+    /// Pairs in which only the one reached the goal.
+    pub n_only_one: usize,
+    /// Pairs in which only the other did.
+    pub n_only_other: usize,
+    /// Probability of a split at least as uneven by chance, two-sided and exact (McNemar).
+    pub p_value: f64,
+    /// Time to the goal of the one less that of the other, over the pairs in which both reached it [s]; bootstrap over
+    /// those pairs.
+    pub time_difference_s: Option<Mean>,
+}
+
+impl Comparison {
+    /// Of two rows' drives.
+    pub(super) fn of((row, drives): (&Row, &[DriveResult]), (other, others): (&Row, &[DriveResult])) -> Self {
+        let of_same_pair = |drive: &DriveResult| {
+            others.iter().find(|other| (other.map, other.pair) == (drive.map, drive.pair))
+        };
+        let pairs: Vec<(&DriveResult, &DriveResult)> =
+            drives.iter().filter_map(|drive| Some((drive, of_same_pair(drive)?))).collect();
+        let arrived = |drive: &DriveResult| drive.outcome == Outcome::Goal;
+        let n_arrived = |one: bool, other: bool| {
+            pairs.iter().filter(|(a, b)| (arrived(a), arrived(b)) == (one, other)).count()
+        };
+        let (n_only_one, n_only_other) = (n_arrived(true, false), n_arrived(false, true));
+        let both = pairs.iter().filter(|(one, other)| arrived(one) && arrived(other));
+        let differences_s: Vec<f64> = both.map(|(one, other)| one.time_s - other.time_s).collect();
+        Self {
+            method: row.method,
+            alpha: row.alpha,
+            other: other.method,
+            other_alpha: other.alpha,
+            n: pairs.len(),
+            n_only_one,
+            n_only_other,
+            p_value: mcnemar_p_value(n_only_one, n_only_other),
+            time_difference_s: Mean::of(&differences_s),
+        }
+    }
+
+    /// Of all rows that are compared.
+    pub(super) fn all(rows: &[(&Row, &[DriveResult])]) -> Vec<Self> {
+        let with = |method: Method| rows.iter().filter(move |(row, _)| row.method == method);
+        let at_one_level = |one: &Row, other: &Row| match (one.alpha, other.alpha) {
+            (Some(one), Some(other)) => one == other,
+            _ => true,
+        };
+        let mut all = Vec::new();
+        for [method, other] in COMPARED {
+            for &one in with(method) {
+                let others = with(other).filter(|(row, _)| at_one_level(one.0, row));
+                all.extend(others.map(|&other| Self::of(one, other)));
+            }
+        }
+        all
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::drive::driven;
+    use super::*;
+
+    fn drives(method: Method, alpha: Option<f64>, ended: &[(Outcome, f64)]) -> Vec<DriveResult> {
+        let drives = ended.iter().zip(0..);
+        let drives = drives.map(|(&(outcome, time_s), pair)| driven(method, alpha, pair, outcome, time_s));
+        drives.collect()
+    }
+
+    #[test]
+    fn pairs_are_compared_start_by_start() {
+        use Outcome::{Goal, Stuck};
+        let one = drives(
+            Method::Pietra,
+            Some(0.6),
+            &[(Goal, 40.0), (Goal, 41.0), (Goal, 42.0), (Stuck, 9.0), (Stuck, 8.0)],
+        );
+        let mut other =
+            drives(Method::Nominal, None, &[(Goal, 43.0), (Goal, 44.0), (Stuck, 5.0), (Goal, 50.0)]);
+        other.reverse();
+        let rows = [Row::of(&one).unwrap(), Row::of(&other).unwrap()];
+        let all = Comparison::all(&[(&rows[0], &one), (&rows[1], &other)]);
+        assert_eq!(all.len(), 1);
+        let found = &all[0];
+        assert_eq!((found.method, found.alpha), (Method::Pietra, Some(0.6)));
+        assert_eq!((found.other, found.other_alpha), (Method::Nominal, None));
+        // The fifth start was driven by one of them alone.
+        assert_eq!((found.n, found.n_only_one, found.n_only_other), (4, 1, 1));
+        assert_eq!(found.p_value, 1.0);
+        assert_eq!(found.time_difference_s, Some(Mean { value: -3.0, low: -3.0, high: -3.0 }));
+    }
+
+    #[test]
+    fn levels_are_compared_with_their_like() {
+        let one = [0.4, 0.8].map(|alpha| drives(Method::Pietra, Some(alpha), &[(Outcome::Goal, 40.0)]));
+        let other = [0.4, 0.8].map(|alpha| drives(Method::Physics, Some(alpha), &[(Outcome::Goal, 40.0)]));
+        let all: Vec<(Row, Vec<DriveResult>)> =
+            one.into_iter().chain(other).map(|drives| (Row::of(&drives).unwrap(), drives)).collect();
+        let rows: Vec<(&Row, &[DriveResult])> =
+            all.iter().map(|(row, drives)| (row, drives.as_slice())).collect();
+        let compared = Comparison::all(&rows);
+        let levels: Vec<_> = compared.iter().map(|found| [found.alpha, found.other_alpha]).collect();
+        assert_eq!(levels, [[Some(0.4); 2], [Some(0.8); 2]]);
+    }
+}

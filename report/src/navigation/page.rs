@@ -1,0 +1,25 @@
+//! The navigation benchmark as a page that needs nothing else.
+
+use bench::navigation::Report;
+
+use super::tables;
+use crate::{Picture, html, verdict};
+
+/// The page.
+pub fn page(report: &Report, picture: &Picture, revision: &str) -> String {
+    let plan = &report.plan;
+    let line = format!(
+        "{}, {} maps of seed {} with {} pairs of start and goal each, 40 m apart, time limit {} s, {:?}, revision {revision}.",
+        plan.vehicle, plan.n_maps, plan.seed, plan.n_pairs, plan.time_limit_s, plan.isa
+    );
+    let mut body = html::heading("Navigation benchmark", &line);
+    if !report.verdicts.is_empty() {
+        body += &verdict::section(&report.verdicts);
+    }
+    body += &html::figure(picture);
+    body += &tables::rows(report).html();
+    if !report.comparisons.is_empty() {
+        body += &tables::comparisons(report).html();
+    }
+    html::page("Navigation benchmark", &body)
+}
