@@ -73,7 +73,10 @@ impl Report {
 }
 
 /// The stretch of sorted drives that belongs to a method and level.
-fn of_row(drives: &[DriveResult], (method, level): (crate::closed_loop::Method, Option<CvarLevel>)) -> &[DriveResult] {
+fn of_row(
+    drives: &[DriveResult],
+    (method, level): (crate::closed_loop::Method, Option<CvarLevel>),
+) -> &[DriveResult] {
     let is_of = |drive: &DriveResult| (drive.method, drive.alpha) == (method, level.map(CvarLevel::get));
     let first = drives.iter().position(is_of).unwrap_or(0);
     let n = drives[first..].iter().take_while(|drive| is_of(drive)).count();

@@ -115,7 +115,8 @@ fn scaling_writes_curves_and_picture() {
 
 /// A benchmark of two methods over two pairs for one second, into a folder.
 fn navigation(out: &Path, more: &[&str]) -> Output {
-    let mut words = vec!["bench", "navigation", "--methods", "physics,nominal", "--alpha", "0.4", "--maps", "1"];
+    let mut words =
+        vec!["bench", "navigation", "--methods", "physics,nominal", "--alpha", "0.4", "--maps", "1"];
     words.extend(["--pairs", "2", "--time-limit", "1", "--isa", "portable"]);
     words.extend(["--out", out.to_str().expect("UTF-8")]);
     surefoot(&[words.as_slice(), more].concat())
@@ -242,7 +243,10 @@ fn navigation_refuses_what_cannot_be_driven() {
     for (words, part) in [
         (["--pairs", "0"], "--pairs: expected a number of pairs from 1 to 1000, found \"0\""),
         (["--maps", "1001"], "--maps: expected a number of maps from 1 to 1000, found \"1001\""),
-        (["--shard", "3/2"], "--shard: expected I/N, the I-th of N parts, 1 <= I <= N <= 10000, found \"3/2\""),
+        (
+            ["--shard", "3/2"],
+            "--shard: expected I/N, the I-th of N parts, 1 <= I <= N <= 10000, found \"3/2\"",
+        ),
         (["--field", "/dev/null/none"], "/dev/null/none: "),
         (["--alpha", "0.4,2"], "--alpha: expected a number above 0 and at most 1, found \"2\""),
         (

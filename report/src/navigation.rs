@@ -7,10 +7,10 @@ mod text;
 use bench::navigation::{DriveResult, Report, Row, name_of_outcome};
 use scenarios::Outcome;
 
+use crate::Picture;
 use crate::axes::{Axes, Range, number};
 use crate::canvas::{Anchor, Canvas, Point, Rect, Stroke, TextStyle};
 use crate::canvas::{EncodeError, MARGIN};
-use crate::Picture;
 use crate::colour::Rgb;
 pub use page::page;
 pub use text::{drive_text, text};

@@ -78,7 +78,11 @@ impl Task {
         let free_m = config.side_m - 2.0 * BORDER_M;
         if free_m < ROCK_FIELD_DISTANCE_M {
             let expected = "room for a drive of 40 m between borders of 4 m";
-            return Err(RockFieldError::Setting { field: "side_m".to_owned(), expected, found: config.side_m });
+            return Err(RockFieldError::Setting {
+                field: "side_m".to_owned(),
+                expected,
+                found: config.side_m,
+            });
         }
         let key = [0x9A12, map.split as u64, u64::from(map.index), u64::from(pair)];
         let mut rng = stream(map.seed, &key);

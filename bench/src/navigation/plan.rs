@@ -228,9 +228,8 @@ mod tests {
     fn parts_hold_every_drive_once_and_every_method_of_a_pair_together() {
         let plan = plan(&[Method::Physics, Method::Nominal], &[0.4, 0.8], 3, 5).unwrap();
         for n in [1, 2, 7, 15, 40] {
-            let parts: Vec<Vec<Job>> = (1..=n)
-                .map(|index| plan.jobs(format!("{index}/{n}").parse().unwrap()).collect())
-                .collect();
+            let parts: Vec<Vec<Job>> =
+                (1..=n).map(|index| plan.jobs(format!("{index}/{n}").parse().unwrap()).collect()).collect();
             let mut together: Vec<Job> = parts.concat();
             assert_eq!(together.len(), plan.n_drives(Shard::WHOLE));
             together.sort_by_key(|job| plan.jobs(Shard::WHOLE).position(|other| other == *job));

@@ -136,18 +136,21 @@ fn shortest(rows: &[Driven<'_>], best: Driven<'_>) -> Verdict {
 fn alpha_matters(rows: &[Driven<'_>]) -> Option<Verdict> {
     let pietra: Vec<Driven<'_>> =
         rows.iter().filter(|(row, _)| row.method == Method::Pietra).copied().collect();
-    let pairs = pietra.iter().enumerate().flat_map(|(k, one)| pietra[k + 1..].iter().map(move |two| (*one, *two)));
+    let pairs =
+        pietra.iter().enumerate().flat_map(|(k, one)| pietra[k + 1..].iter().map(move |two| (*one, *two)));
     let found: Vec<(bool, String)> = pairs
         .map(|(one, two)| {
             let compared = Comparison::of(one, two);
             let apart = one.0.wilson_high < two.0.wilson_low || two.0.wilson_high < one.0.wilson_low;
-            let differs =
-                compared.time_difference_s.is_some_and(|time| time.low > 0.0 || time.high < 0.0);
+            let differs = compared.time_difference_s.is_some_and(|time| time.low > 0.0 || time.high < 0.0);
             let time = compared.time_difference_s.map_or("no common success".to_owned(), |time| {
                 format!("{:.1} s [{:.1}, {:.1}]", time.value, time.low, time.high)
             });
             let alphas = [one, two].map(|(row, _)| row.alpha.unwrap_or(f64::NAN).to_string()).join(" and ");
-            (apart || differs, format!("{alphas}: {}, {}, {time}", percent(one.0.success), percent(two.0.success)))
+            (
+                apart || differs,
+                format!("{alphas}: {}, {}, {time}", percent(one.0.success), percent(two.0.success)),
+            )
         })
         .collect();
     (!found.is_empty()).then(|| Verdict {
@@ -174,8 +177,7 @@ mod tests {
 
     /// A table in which all rules hold.
     fn held() -> Vec<(Row, Vec<DriveResult>)> {
-        let mut rows =
-            vec![row(Method::Truth, None, 98, 41.0), row(Method::Nominal, None, 55, 40.0)];
+        let mut rows = vec![row(Method::Truth, None, 98, 41.0), row(Method::Nominal, None, 55, 40.0)];
         for (alpha, time_s) in [(0.4, 46.0), (0.8, 44.0)] {
             for (method, n_goal) in [
                 (Method::Pietra, 95),
@@ -218,7 +220,8 @@ mod tests {
         assert_eq!(with(&[(5, physics[0].clone()), (11, physics[1].clone())]), [3]);
         assert_eq!(with(&[(6, row(Method::PhysicsInformed, Some(0.4), 90, 49.0))]), [4]);
         assert_eq!(with(&[(7, row(Method::Vanilla, Some(0.4), 85, 49.0))]), [5]);
-        let pietra = [(0.4, 46.0), (0.8, 44.0)].map(|(alpha, time_s)| row(Method::Pietra, Some(alpha), 89, time_s));
+        let pietra =
+            [(0.4, 46.0), (0.8, 44.0)].map(|(alpha, time_s)| row(Method::Pietra, Some(alpha), 89, time_s));
         assert_eq!(with(&[(2, pietra[0].clone()), (8, pietra[1].clone())]), [1, 2, 6]);
         assert_eq!(with(&[(9, row(Method::PietraAvoid, Some(0.8), 93, 43.0))]), [7]);
         assert_eq!(with(&[(2, row(Method::Pietra, Some(0.4), 95, 44.0))]), [8]);

@@ -16,7 +16,9 @@ pub(super) fn rows(report: &Report) -> Table {
     Table {
         title: "Goals reached".to_owned(),
         note,
-        header: ["method", "alpha", "goal", "success [95 % Wilson]", "median time", "failures"].map(str::to_owned).into(),
+        header: ["method", "alpha", "goal", "success [95 % Wilson]", "median time", "failures"]
+            .map(str::to_owned)
+            .into(),
         rows: report.rows.iter().map(row).collect(),
     }
 }

@@ -101,6 +101,9 @@ mod tests {
         assert!(!told.contains("failed") && told.contains("9 of 10 drives are missing"), "{told}");
         // Nobody reached anything: there is no median.
         let told = text(&report(&[Outcome::Stuck; 10]));
-        assert!(!told.contains("missing") && told.lines().nth(2).expect("a row").contains(" -  10 stuck"), "{told}");
+        assert!(
+            !told.contains("missing") && told.lines().nth(2).expect("a row").contains(" -  10 stuck"),
+            "{told}"
+        );
     }
 }

@@ -65,7 +65,8 @@ pub(super) fn merged(folders: &[PathBuf]) -> anyhow::Result<(Plan, Vec<DriveResu
         }
     }
     let plan = first.map(|header| header.plan);
-    let plan = plan.ok_or_else(|| UsageError("--merge: expected at least one folder, found none".to_owned()))?;
+    let plan =
+        plan.ok_or_else(|| UsageError("--merge: expected at least one folder, found none".to_owned()))?;
     Ok((plan, drives))
 }
 
