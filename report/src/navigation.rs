@@ -17,9 +17,9 @@ pub use text::{drive_text, text};
 
 const ROW_HEIGHT: f64 = 48.0;
 const GRID_TOP: f64 = 150.0;
-const GRID_X: f64 = 200.0;
+const GRID_X: f64 = 270.0;
 /// Narrowest and widest grid.
-const GRID_WIDTHS: [f64; 2] = [110.0, 840.0];
+const GRID_WIDTHS: [f64; 2] = [110.0, 770.0];
 const WIDEST_CELL: f64 = 48.0;
 /// Cells narrower than this hold no text.
 const NARROWEST_WITH_TEXT: f64 = 28.0;

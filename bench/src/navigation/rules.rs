@@ -7,7 +7,7 @@ use super::comparison::Comparison;
 use super::{DriveResult, Row};
 use crate::Verdict;
 use crate::closed_loop::Method;
-use crate::statistics::wilson_interval;
+use crate::statistics::{Mean, wilson_interval};
 
 /// The field tells methods apart: what believes in level ground fails often enough, what knows the truth hardly ever.
 const NOMINAL_MOST: f64 = 0.60;
@@ -34,7 +34,7 @@ pub(super) fn verdicts(rows: &[Driven<'_>]) -> Vec<Verdict> {
     verdicts.extend(ORDER.iter().filter_map(|&rule| order(rows, rule)));
     if let Some(best) = best(rows) {
         verdicts.push(best_success(best.0));
-        verdicts.push(shortest(rows, best));
+        verdicts.extend(shortest(rows, best));
     }
     verdicts.extend(alpha_matters(rows));
     verdicts
@@ -108,29 +108,27 @@ fn best_success(best: &Row) -> Verdict {
     }
 }
 
-fn shortest(rows: &[Driven<'_>], best: Driven<'_>) -> Verdict {
+/// Nothing where there is none to be compared with.
+fn shortest(rows: &[Driven<'_>], best: Driven<'_>) -> Option<Verdict> {
     let is_rival = |row: &Row| {
         !matches!(row.method, Method::Pietra | Method::Truth) && row.success >= best.0.success - POINTS_BELOW
     };
     let rivals = rows.iter().filter(|(row, _)| is_rival(row));
-    let behind: Vec<String> = rivals
-        .filter_map(|&rival| {
-            let difference_s = Comparison::of(best, rival).time_difference_s?;
-            (difference_s.value > 0.0).then(|| {
-                let name = rival.0.method.name();
-                format!(
-                    "{name} is {:.1} s [{:.1}, {:.1}] faster",
-                    difference_s.value, difference_s.low, difference_s.high
-                )
-            })
+    let compared: Vec<(Method, Mean)> = rivals
+        .filter_map(|&rival| Some((rival.0.method, Comparison::of(best, rival).time_difference_s?)))
+        .collect();
+    let faster = compared.iter().filter(|(_, difference_s)| difference_s.value > 0.0);
+    let behind: Vec<String> = faster
+        .map(|(method, Mean { value, low, high })| {
+            format!("{} is {value:.1} s [{low:.1}, {high:.1}] faster", method.name())
         })
         .collect();
-    Verdict {
+    (!compared.is_empty()).then(|| Verdict {
         rule: "pietra is fastest, on common successes, of the methods within 5 points of it (truth aside)"
             .to_owned(),
         found: if behind.is_empty() { "none is faster".to_owned() } else { behind.join("; ") },
         is_passed: behind.is_empty(),
-    }
+    })
 }
 
 fn alpha_matters(rows: &[Driven<'_>]) -> Option<Verdict> {

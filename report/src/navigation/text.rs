@@ -5,7 +5,10 @@ use bench::navigation::{DriveResult, Report, name_of_outcome};
 use super::tables;
 use crate::verdict;
 
-/// The table, rows against one another, the rules, and below them every failure.
+/// Failures that are told; all of them are in the JSON.
+const FAILURES_TOLD: usize = 40;
+
+/// The table, rows against one another, the rules, and below them how drives failed.
 pub fn text(report: &Report) -> String {
     let mut told = tables::rows(report).text();
     if !report.comparisons.is_empty() {
@@ -14,11 +17,15 @@ pub fn text(report: &Report) -> String {
     if !report.verdicts.is_empty() {
         told += &format!("\n{}", verdict::text(&report.verdicts));
     }
-    let mut failed = report.drives.iter().filter(|drive| drive.failed_at_m.is_some()).peekable();
-    if failed.peek().is_some() {
+    let failed: Vec<&DriveResult> =
+        report.drives.iter().filter(|drive| drive.failed_at_m.is_some()).collect();
+    if !failed.is_empty() {
         told += "\n  failed\n";
     }
-    told.extend(failed.map(|drive| format!("  {}\n", drive_text(drive))));
+    told.extend(failed.iter().take(FAILURES_TOLD).map(|drive| format!("  {}\n", drive_text(drive))));
+    if failed.len() > FAILURES_TOLD {
+        told += &format!("  and {} more\n", failed.len() - FAILURES_TOLD);
+    }
     told
 }
 
