@@ -9,6 +9,7 @@ mod learned_map;
 mod learning;
 mod navigation;
 mod plant;
+mod risk;
 mod scaling;
 mod sweep;
 
@@ -26,6 +27,7 @@ pub(crate) use learned_map::run_learned_map;
 pub(crate) use learning::run_learning;
 pub(crate) use navigation::run_navigation;
 pub(crate) use plant::run_plant;
+pub(crate) use risk::run_risk;
 pub(crate) use scaling::run_scaling;
 
 pub(crate) fn run_control(arguments: &BenchControlArguments) -> anyhow::Result<()> {

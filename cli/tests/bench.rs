@@ -239,6 +239,43 @@ fn crossings_write_table_and_picture_and_refuse_what_cannot_be_driven() {
 }
 
 #[test]
+fn risk_writes_table_and_picture_and_refuses_what_cannot_be_driven() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let out = folder.path().join("out");
+    let mut words =
+        vec!["bench", "risk", "--densities", "0,1", "--alpha", "0.6", "--runs", "2", "--seed", "1001"];
+    words.extend(["--threads", "1", "--isa", "portable", "--out", out.to_str().expect("UTF-8")]);
+    let output = surefoot(&words);
+    assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+    assert!(output.stderr.is_empty(), "no bar without a terminal");
+    let told = String::from_utf8_lossy(&output.stdout);
+    assert!(told.contains("seeds 1001 to 1002") && told.contains("22.5 (11.8)"), "{told}");
+    let table: Value =
+        serde_json::from_slice(&std::fs::read(out.join("risk.json")).expect("the table")).expect("JSON");
+    assert!(table["revision"].is_string() && table["isa"] == "portable", "{table}");
+    let [dirt, bushes] = [0, 1].map(|cell| &table["cells"][cell]);
+    // Nothing is published of bare dirt, and nothing stops anybody there.
+    assert_eq!((&dirt["density"], &dirt["published"]), (&0.0.into(), &Value::Null));
+    for method in ["whole_bin", "exact"] {
+        assert_eq!((&dirt[method]["n_hit"], &dirt[method]["n"]), (&2.into(), &2.into()), "{dirt}");
+        assert_eq!(bushes[method]["times_to_goal_s"].as_array().map(Vec::len), Some(2), "{bushes}");
+    }
+    assert_eq!((&bushes["alpha"], &bushes["published"]["n_hit"]), (&0.6.into(), &45.into()));
+    assert!(std::fs::read(out.join("risk.png")).expect("the picture").starts_with(b"\x89PNG"));
+    for (words, part) in [
+        (["--runs", "0"], "--runs: expected a number of runs from 1 to 1000, found \"0\""),
+        (["--densities", "0.4,1.1"], "--densities: expected a number from 0 to 1, found \"1.1\""),
+        (["--alpha", "0"], "--alpha: expected a number above 0 and at most 1, found \"0\""),
+        (["--out", "/dev/null"], "--out: "),
+    ] {
+        let output = surefoot(&[["bench", "risk"].as_slice(), &words].concat());
+        let told = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{told}");
+        assert!(told.contains(part) && told.lines().count() == 1, "{told}");
+    }
+}
+
+#[test]
 fn navigation_refuses_what_cannot_be_driven() {
     for (words, part) in [
         (["--pairs", "0"], "--pairs: expected a number of pairs from 1 to 1000, found \"0\""),

@@ -80,6 +80,7 @@ fn every_command_has_help() {
         &["bench", "prior-map", "--help"],
         &["bench", "crossings", "--help"],
         &["bench", "scaling", "--help"],
+        &["bench", "risk", "--help"],
     ] {
         let output = surefoot(words);
         assert_eq!(output.status.code(), Some(0), "{words:?}");

@@ -25,6 +25,9 @@ pub enum BenchCommand {
     /// Drives over the same rock fields with every method and risk tolerance
     #[command(long_about = NAVIGATION_ABOUT)]
     Navigation(BenchNavigationArguments),
+    /// How the risk tolerance decides between a way through bushes and one around them: EVORA's grid
+    #[command(long_about = super::risk::LONG_ABOUT)]
+    Risk(super::BenchRiskArguments),
     /// Drives among people who cross the way
     #[command(long_about = super::crossings::LONG_ABOUT)]
     Crossings(super::BenchCrossingsArguments),
