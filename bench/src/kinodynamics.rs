@@ -9,6 +9,7 @@ mod data_curve;
 mod ground;
 mod lap;
 mod machine;
+mod mixed_ground;
 mod models;
 mod probe;
 mod recorded;
@@ -36,6 +37,9 @@ pub use ground::GroundReport;
 pub use lap::{DrivenLap, Failure};
 use lap::{Driver, Lap, drive_lap};
 pub use machine::{DEVIATIONS, TICK_S, VEHICLE};
+pub use mixed_ground::{
+    MIXED_MPS, Method, MixedGroundReport, MixedRow, MixedRun, Paired, SpeedReport, mixed_ground,
+};
 use models::Lessons;
 pub use models::TrainingReport;
 pub use probe::Probe;
@@ -140,6 +144,9 @@ pub enum KinodynamicsError {
         /// Runs with these.
         found: usize,
     },
+    /// A controller that cannot be.
+    #[error(transparent)]
+    Controller(#[from] mppi::ConfigError),
     /// The latency cannot be told.
     #[error(transparent)]
     Latency(#[from] kinodynamics::LatencyError),
@@ -174,15 +181,9 @@ pub trait Watch: Sync {
 /// # Errors
 /// See [`KinodynamicsError`].
 pub fn measure(request: &Request, revision: &str, watch: &dyn Watch) -> Result<Report, KinodynamicsError> {
-    watch.stage(Stage::Driving(u64::from(request.minutes)));
-    let asked = Teleoperation { minutes: request.minutes, only: None, seed: request.seed };
-    let (recording, coefficients) =
-        teleoperation::teleoperate_knowing(&request.vehicle, &asked, &|| watch.step())?;
-    let latency = kinodynamics::estimate_latency(&recording)?;
-    let (examples, _) = label(&recording, &LabelConfig::unfiltered(latency.seconds));
-    let probe = probe::probe(&examples, SURFACES.len(), request.seed)?;
-    let grounds = ground::grounds(&recording, &examples);
-    let lessons = Lessons { recording, coefficients, latency, examples };
+    let lessons = lessons(request, watch)?;
+    let probe = probe::probe(&lessons.examples, SURFACES.len(), request.seed)?;
+    let grounds = ground::grounds(&lessons.recording, &lessons.examples);
     let (mut drivers, mut trainings) = (Vec::new(), Vec::new());
     for &row in &request.rows {
         let (driver, training) = models::prepare(request, row, &lessons, (revision, watch))?;
@@ -213,6 +214,17 @@ pub fn measure(request: &Request, revision: &str, watch: &dyn Watch) -> Result<R
         oracle_over_ablation,
         verdicts,
     })
+}
+
+/// Drives at random.
+fn lessons(request: &Request, watch: &dyn Watch) -> Result<Lessons, KinodynamicsError> {
+    watch.stage(Stage::Driving(u64::from(request.minutes)));
+    let asked = Teleoperation { minutes: request.minutes, only: None, seed: request.seed };
+    let (recording, coefficients) =
+        teleoperation::teleoperate_knowing(&request.vehicle, &asked, &|| watch.step())?;
+    let latency = kinodynamics::estimate_latency(&recording)?;
+    let (examples, _) = label(&recording, &LabelConfig::unfiltered(latency.seconds));
+    Ok(Lessons { recording, coefficients, latency, examples })
 }
 
 /// Drives the outdoor track with the nominal model between walls of these half-widths, to tune them: the share of turns that

@@ -3,6 +3,7 @@
 mod bench;
 mod bench_gap;
 mod collect;
+mod correction;
 mod crossings;
 mod deviation;
 mod drive;
@@ -33,6 +34,7 @@ pub use bench::{
 };
 pub use bench_gap::BenchGapArguments;
 pub use collect::{CollectArguments, CollectMap, CollectSplit, CollectWorld};
+pub use correction::{BenchCorrectionArguments, CorrectionMethod};
 pub use crossings::{BenchCrossingsArguments, CrossingHandling};
 pub use deviation::AskedDeviation;
 pub use drive::{Correct, DriveArguments, MapSource, Method, Pace};

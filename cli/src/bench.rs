@@ -1,5 +1,6 @@
 //! `surefoot bench`: what was asked, handed to the benchmarks, and their result shown and written.
 
+mod correction;
 mod crossings;
 mod friction;
 mod gap;
@@ -18,6 +19,7 @@ use serde::Serialize;
 
 use crate::UsageError;
 use crate::arguments::{BenchControlArguments, BenchPriorMapArguments, BenchWork, JsonArguments};
+pub(crate) use correction::run_correction;
 pub(crate) use crossings::run_crossings;
 pub(crate) use friction::run_friction;
 pub(crate) use gap::run_gap;

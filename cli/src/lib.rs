@@ -190,6 +190,9 @@ fn dispatch(command: Command) -> anyhow::Result<()> {
         }
         Command::Bench { command: BenchCommand::Crossings(crossings) } => bench::run_crossings(&crossings),
         Command::Bench { command: BenchCommand::Risk(risk) } => bench::run_risk(&risk),
+        Command::Bench { command: BenchCommand::Correction(correction) } => {
+            bench::run_correction(&correction)
+        }
         Command::Bench { command: BenchCommand::Plant(plant) } => bench::run_plant(&plant),
         Command::Bench { command: BenchCommand::Scaling(scaling) } => bench::run_scaling(&scaling),
         Command::Bench { command: BenchCommand::Ground(ground) } => bench::run_ground(&ground),

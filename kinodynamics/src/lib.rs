@@ -8,9 +8,11 @@
 //! A [`Recording`] is a drive with random commands. [`label`] turns it into examples, [`train`] fits a model and leaves a
 //! [`Checkpoint`]. In the control process an [`InverseModel`] answers from flat weights, without Candle and without
 //! allocation; a [`Corrector`] stands between planner and vehicle, keeps the [`ImuHistory`], bounds what the model may change
-//! and fades it out where the unit is silent or the moment unlike the training. `examples/learn_understeer.rs` trains a
+//! and fades it out where the unit is silent or the moment unlike the training. [`Adaptation`] learns inside the controller's
+//! own model instead, from odometry alone. `examples/learn_understeer.rs` trains a
 //! model and asks it.
 
+mod adaptation;
 mod agreement;
 mod architecture;
 mod checkpoint;
@@ -25,6 +27,7 @@ mod recording;
 mod split;
 mod training;
 
+pub use adaptation::Adaptation;
 pub use architecture::{AXES, Answer, Architecture, CURVATURE_MAX_PER_M, SPEED_MAX_MPS, Sensing, WINDOW};
 pub use checkpoint::{Checkpoint, Sidecar, Standardisation};
 pub use correction::{Corrected, CorrectionConfig, CorrectionCounts, Corrector, Effect, Reason, Uncorrected};

@@ -15,13 +15,14 @@
 //! | a belief about the ground | `surefoot gap ground` | [text](ground::text()), [picture](ground::picture()), [page](ground::page()) |
 //! | the score of diagnoses | `surefoot gap score` | [text](gap_score::text()), [pictures](gap_score::pictures), [page](gap_score::page()) |
 //! | the catalogue of effects | `surefoot gap effects` | [text](effects::text()), [picture](effects::picture), [Markdown](effects::page()) |
-//! | benchmarks | `surefoot bench` | [`crossings`], [`mod@friction`], [`gap_closed_loop`], [`ground_score`], [`kinodynamics`], [`learning`], [`navigation`], [`plant`], [`risk`], [`scaling`], [`traction_map`] |
+//! | benchmarks | `surefoot bench` | [`correction`], [`crossings`], [`mod@friction`], [`gap_closed_loop`], [`ground_score`], [`kinodynamics`], [`learning`], [`navigation`], [`plant`], [`risk`], [`scaling`], [`traction_map`] |
 
 mod axes;
 mod canvas;
 pub mod collection;
 mod colour;
 mod colour_bar;
+pub mod correction;
 pub mod crossings;
 pub mod drive;
 pub mod effects;

@@ -49,6 +49,9 @@ pub enum BenchCommand {
     /// Laps of a small car with and without learned inverse kinodynamics
     #[command(long_about = super::kinodynamics::BENCH_LONG_ABOUT)]
     Kinodynamics(super::BenchKinodynamicsArguments),
+    /// Inverse kinodynamics behind the controller beside a model that adapts inside it, on mixed ground
+    #[command(long_about = super::correction::LONG_ABOUT)]
+    Correction(super::BenchCorrectionArguments),
 }
 
 /// How to measure the controller.

@@ -166,7 +166,7 @@ fn embedding(word: &str) -> Result<usize, String> {
     values::count(word, 64, "numbers")
 }
 
-fn epochs(word: &str) -> Result<usize, String> {
+pub(super) fn epochs(word: &str) -> Result<usize, String> {
     values::count(word, 65_536, "passes")
 }
 

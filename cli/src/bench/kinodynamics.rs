@@ -89,7 +89,7 @@ fn rows(asked: &[KinodynamicsRows]) -> Vec<Row> {
 }
 
 /// Too little data is the user's choice; all else is not.
-fn told_error(error: KinodynamicsError) -> anyhow::Error {
+pub(super) fn told_error(error: KinodynamicsError) -> anyhow::Error {
     match error {
         KinodynamicsError::Train(::kinodynamics::TrainError::TooFew { .. })
         | KinodynamicsError::NothingToProbe { .. } => UsageError::from_input(error).into(),
@@ -115,7 +115,7 @@ fn write(arguments: &BenchKinodynamicsArguments, report: &Report, took_s: f64) -
 }
 
 /// A bar for a terminal.
-struct Progress(ProgressBar);
+pub(super) struct Progress(pub(super) ProgressBar);
 
 impl Watch for Progress {
     fn stage(&self, stage: Stage) {

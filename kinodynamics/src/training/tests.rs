@@ -257,7 +257,7 @@ fn what_cannot_be_learned_from_is_told() {
     short.runs[0].ticks.truncate(400);
     short.runs[0].imu.truncate(4000);
     let told = refuse(&short, &settings(sensing, 1));
-    assert!(told.contains("at least 500 examples"), "{told}");
+    assert!(told.contains("at least 320 examples"), "{told}");
     let mut swapped = two_grounds(1);
     for sample in &mut swapped.runs[0].imu {
         sample.acceleration_mps2.rotate_left(1);
