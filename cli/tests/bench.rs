@@ -276,6 +276,42 @@ fn risk_writes_table_and_picture_and_refuses_what_cannot_be_driven() {
 }
 
 #[test]
+fn correction_writes_table_and_picture_and_refuses_what_cannot_be_driven() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let out = folder.path().join("out");
+    let mut words = vec!["bench", "correction", "--methods", "plain,adapted,plain", "--runs", "1"];
+    words.extend(["--seed", "1001", "--out", out.to_str().expect("UTF-8")]);
+    let output = surefoot(&words);
+    assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+    assert!(output.stderr.is_empty(), "no bar without a terminal");
+    let told = String::from_utf8_lossy(&output.stdout);
+    assert!(told.contains("adapted model") && told.contains("leaves"), "{told}");
+    let table: Value =
+        serde_json::from_slice(&std::fs::read(out.join("correction.json")).expect("the table"))
+            .expect("JSON");
+    assert!(table["revision"].is_string(), "{table}");
+    let slow = &table["speeds"][0]["rows"];
+    assert_eq!(slow.as_array().map(Vec::len), Some(2), "named twice, driven once: {slow}");
+    assert_eq!(slow[0]["less_plain"], Value::Null);
+    assert_eq!(slow[1]["less_plain"]["n"], 1, "{slow}");
+    assert_eq!(slow[1]["runs"][0]["strengths"].as_array().map(Vec::len), Some(3), "{slow}");
+    assert!(std::fs::read(out.join("correction.png")).expect("the picture").starts_with(b"\x89PNG"));
+    for (words, part) in [
+        (["--runs", "0"], "--runs: expected a number of trials from 1 to 1000, found \"0\""),
+        (
+            ["--methods", "luck"],
+            "--methods: expected plain, corrected-blind, corrected, adapted, found \"luck\"",
+        ),
+        (["--out", "/dev/null"], "--out: "),
+    ] {
+        let output = surefoot(&[["bench", "correction"].as_slice(), &words].concat());
+        let told = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{told}");
+        assert!(told.contains(part) && told.lines().count() == 1, "{told}");
+    }
+}
+
+#[test]
 fn navigation_refuses_what_cannot_be_driven() {
     for (words, part) in [
         (["--pairs", "0"], "--pairs: expected a number of pairs from 1 to 1000, found \"0\""),

@@ -81,6 +81,7 @@ fn every_command_has_help() {
         &["bench", "crossings", "--help"],
         &["bench", "scaling", "--help"],
         &["bench", "risk", "--help"],
+        &["bench", "correction", "--help"],
     ] {
         let output = surefoot(words);
         assert_eq!(output.status.code(), Some(0), "{words:?}");

@@ -13,7 +13,7 @@ const LEFT: f64 = 100.0;
 const GAP: f64 = 80.0;
 const RUNS_HEIGHT: f64 = 420.0;
 const SURFACES_HEIGHT: f64 = 300.0;
-const BETWEEN: f64 = 120.0;
+const BETWEEN: f64 = 140.0;
 const BELOW: f64 = 90.0;
 /// Runs of a method lie so far to both sides of its place, and marks on one surface so far apart.
 const SPREAD: f64 = 0.25;
@@ -106,7 +106,7 @@ fn told(mean: Option<Mean>, scale: f64, decimals: usize) -> String {
 /// The encoder refuses.
 pub fn picture(report: &MixedGroundReport) -> Result<Vec<u8>, EncodeError> {
     let told = format!(
-        "{} runs of a method and speed, seed {}; a dot is a run, bars are means with 95 % intervals; walls stand at {:.0} cm",
+        "{} runs of a method and speed, seed {}; a dot is a run, with a red rim one that did not come around; bars are 95 % intervals of means; walls at {:.0} cm",
         report.runs,
         report.seed,
         100.0 * report.half_width_m
@@ -175,10 +175,16 @@ fn draw_runs(speed: &SpeedReport, axes: &Axes, canvas: &mut Canvas) {
         let within = format!("{} of {}", row.n_within_walls, row.n);
         let style = TextStyle::new(16, Anchor::Middle);
         canvas.text((x, axes.frame.bottom() + 24.0), &within, style.coloured(Rgb::INK_SOFT));
+        let time = row.time_s.map_or("-".to_owned(), |mean| format!("{:.1} s", mean.value));
+        canvas.text((x, axes.frame.bottom() + 46.0), &time, style.coloured(Rgb::INK_SOFT));
     }
     let style = TextStyle::new(16, Anchor::Middle);
     let middle = axes.frame.x + 0.5 * axes.frame.width;
-    canvas.text((middle, axes.frame.bottom() + 48.0), "runs between the walls all the way", style);
+    canvas.text(
+        (middle, axes.frame.bottom() + 70.0),
+        "runs between the walls all the way; mean time around",
+        style,
+    );
 }
 
 fn draw_surfaces(report: &MixedGroundReport, speed: &SpeedReport, axes: &Axes, canvas: &mut Canvas) {

@@ -1,5 +1,6 @@
 //! The navigation table as a picture: how every drive ended, and what each row adds up to.
 
+mod levels;
 mod page;
 mod tables;
 mod text;
@@ -12,6 +13,7 @@ use crate::axes::{Axes, Range, number};
 use crate::canvas::{Anchor, Canvas, Point, Rect, Stroke, TextStyle};
 use crate::canvas::{EncodeError, MARGIN};
 use crate::colour::Rgb;
+pub use levels::picture as picture_of_levels;
 pub use page::page;
 pub use text::{drive_text, text};
 

@@ -261,3 +261,12 @@ fn navigation_table_of_one_and_many_maps() {
         assert_eq!(size[0], 1600);
     }
 }
+
+#[test]
+fn navigation_over_the_risk_tolerance_needs_two_of_them() {
+    let mut table = made_up_table(20);
+    let picture = report::navigation::picture_of_levels(&table).expect("a page").expect("three levels");
+    assert_eq!(kept(picture.file, &picture.png)[0], 1600);
+    table.rows.retain(|row| row.alpha.is_none_or(|alpha| alpha == 0.6));
+    assert!(report::navigation::picture_of_levels(&table).expect("no page").is_none());
+}

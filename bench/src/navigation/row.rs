@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use super::DriveResult;
 use crate::closed_loop::Method;
-use crate::statistics::wilson_interval;
+use crate::statistics::{Mean, wilson_interval};
 
 /// One row of the table.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -29,6 +29,8 @@ pub struct Row {
     /// Median over the drives that reached the goal [s]; null without one. Rows with other successes took other
     /// drives into it.
     pub median_time_to_goal_s: Option<f64>,
+    /// Largest |roll| or |pitch| of each drive, however it ended [deg].
+    pub largest_tilt_deg: Mean,
     /// Drives by how they ended.
     pub outcomes: BTreeMap<Outcome, usize>,
 }
@@ -43,6 +45,8 @@ impl Row {
         }
         let reached = drives.iter().filter(|drive| drive.outcome == Outcome::Goal);
         let times_s: Vec<f64> = reached.map(|drive| drive.time_s).collect();
+        let tilt_deg = |drive: &DriveResult| drive.largest_roll_deg.max(drive.largest_pitch_deg);
+        let tilts_deg: Vec<f64> = drives.iter().map(tilt_deg).collect();
         let (n, n_goal) = (drives.len(), times_s.len());
         let [wilson_low, wilson_high] = wilson_interval(n_goal, n);
         Some(Self {
@@ -54,6 +58,7 @@ impl Row {
             wilson_low,
             wilson_high,
             median_time_to_goal_s: median(times_s),
+            largest_tilt_deg: Mean::of(&tilts_deg)?,
             outcomes,
         })
     }
@@ -92,6 +97,8 @@ mod tests {
         .unwrap();
         assert_eq!((row.n, row.n_goal, row.success), (4, 2, 0.5));
         assert_eq!(row.median_time_to_goal_s, Some(49.0));
+        // 10 degrees of roll and 12 of pitch in every drive.
+        assert_eq!(row.largest_tilt_deg, Mean { value: 12.0, low: 12.0, high: 12.0 });
         assert_eq!(row.outcomes, BTreeMap::from([(Outcome::Goal, 2), (Outcome::Stuck, 2)]));
         assert_eq!([row.wilson_low, row.wilson_high], wilson_interval(2, 4));
         assert_eq!(Row::of(&[]), None);

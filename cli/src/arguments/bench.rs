@@ -236,8 +236,10 @@ fixed beforehand hold. The exit code is 0 once all drives are done, however they
 not.";
 
 const NAVIGATION_AFTER_HELP: &str = "\
-Writes navigation.png, navigation.html, every drive as it ends into navigation.jsonl, and navigation.json with
-  rows         of each method and alpha: n, n_goal, success, wilson_low, wilson_high, median_time_to_goal_s, outcomes
+Writes navigation.png, navigation.html, every drive as it ends into navigation.jsonl, with several alphas
+navigation_alpha.png (success, time and tilt over alpha), and navigation.json with
+  rows         of each method and alpha: n, n_goal, success, wilson_low, wilson_high, median_time_to_goal_s,
+               largest_tilt_deg (mean, bootstrap), outcomes
   comparisons  of two rows on the same starts: n, n_only_one, n_only_other, p_value (exact McNemar),
                time_difference_s where both arrived (mean, low, high: bootstrap)
   verdicts     rule, found, is_passed
@@ -248,6 +250,8 @@ is the table of one run to the byte, for any number of threads.
 
 Example, half a minute:
   surefoot bench navigation --methods physics,nominal --alpha 0.6 --maps 1 --pairs 1
+Example, what the risk tolerance does to one method:
+  surefoot bench navigation --methods pietra,truth --alpha 0.1,0.2,0.4,0.6,0.8,1 --maps 5 --pairs 4
 Example, days in pieces:
   surefoot bench navigation --out table; surefoot bench navigation --out table --resume
 Example, one of 40 jobs of an array, and what its last one does:

@@ -100,10 +100,14 @@ fn finish(report: &Report, arguments: &BenchNavigationArguments) -> anyhow::Resu
     print!("{}", report::navigation::text(report));
     let results = &arguments.results;
     results.write_json("navigation.json", &WithRevision::of(report))?;
-    let picture = report::navigation::picture(report)?;
-    results.write(picture.file, &picture.png)?;
-    let page = report::navigation::page(report, &picture, summary::revision());
+    let levels = report::navigation::picture_of_levels(report)?;
+    let pictures: Vec<_> = [report::navigation::picture(report)?].into_iter().chain(levels).collect();
+    for picture in &pictures {
+        results.write(picture.file, &picture.png)?;
+    }
+    let page = report::navigation::page(report, &pictures, summary::revision());
     results.write("navigation.html", page.as_bytes())?;
-    println!("\n  navigation.json, navigation.html and navigation.png in {}", results.out.display());
+    let files: Vec<&str> = pictures.iter().map(|picture| picture.file).collect();
+    println!("\n  navigation.json, navigation.html and {} in {}", files.join(" and "), results.out.display());
     Ok(())
 }

@@ -5,8 +5,8 @@ use bench::navigation::Report;
 use super::tables;
 use crate::{Picture, html, verdict};
 
-/// The page.
-pub fn page(report: &Report, picture: &Picture, revision: &str) -> String {
+/// The page, with its pictures in their order.
+pub fn page(report: &Report, pictures: &[Picture], revision: &str) -> String {
     let plan = &report.plan;
     let line = format!(
         "{}, {} maps of seed {} with {} pairs of start and goal each, 40 m apart, time limit {} s, {:?}, revision {revision}.",
@@ -16,7 +16,7 @@ pub fn page(report: &Report, picture: &Picture, revision: &str) -> String {
     if !report.verdicts.is_empty() {
         body += &verdict::section(&report.verdicts);
     }
-    body += &html::figure(picture);
+    body.extend(pictures.iter().map(html::figure));
     body += &tables::rows(report).html();
     if !report.comparisons.is_empty() {
         body += &tables::comparisons(report).html();

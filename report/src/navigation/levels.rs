@@ -1,0 +1,167 @@
+//! What the risk tolerance does: success, time to the goal and tilt over alpha, a line for every method.
+
+use bench::closed_loop::Method;
+use bench::navigation::{Report, Row};
+use bench::statistics::Mean;
+
+use crate::Picture;
+use crate::axes::{Axes, Range};
+use crate::canvas::{Anchor, Canvas, EncodeError, MARGIN, PAGE_WIDTH, Point, Rect, Stroke, TextStyle};
+use crate::colour::Rgb;
+
+const TOP: f64 = 200.0;
+const LEFT: f64 = 90.0;
+const GAP: f64 = 90.0;
+const HEIGHT: f64 = 460.0;
+const BELOW: f64 = 90.0;
+/// Marks of the same tolerance stand so far apart, method by method.
+const ASIDE: f64 = 0.012;
+const TEXT: TextStyle = TextStyle::new(18, Anchor::Start);
+
+/// A value with the ends of its interval, if it has one.
+type Mark = (f64, Option<[f64; 2]>);
+
+/// What a panel shows of a row.
+struct Quantity {
+    heading: &'static str,
+    of: fn(&Row) -> Option<Mark>,
+    low: f64,
+    high: f64,
+}
+
+/// Draws success, time and tilt over the risk tolerance, as a PNG 1600 px wide; `None` if no method was driven with two.
+///
+/// # Errors
+/// The encoder refuses.
+pub fn picture(report: &Report) -> Result<Option<Picture>, EncodeError> {
+    let methods = methods(report);
+    let is_swept = methods.iter().any(|method| levels_of(report, *method).len() > 1);
+    if !is_swept {
+        return Ok(None);
+    }
+    let caption = "Success, time to the goal and tilt over the risk tolerance".to_owned();
+    Ok(Some(Picture { file: "navigation_alpha.png", caption, png: drawn(report, &methods).png()? }))
+}
+
+/// In the order of their rows.
+fn methods(report: &Report) -> Vec<Method> {
+    let mut methods: Vec<Method> = report.rows.iter().map(|row| row.method).collect();
+    methods.dedup();
+    methods
+}
+
+/// A method's rows by ascending tolerance, without those that know none.
+fn levels_of(report: &Report, method: Method) -> Vec<(f64, &Row)> {
+    let rows = report.rows.iter().filter(|row| row.method == method);
+    let mut levels: Vec<(f64, &Row)> = rows.filter_map(|row| Some((row.alpha?, row))).collect();
+    levels.sort_by(|a, b| a.0.total_cmp(&b.0));
+    levels
+}
+
+fn colour(method: Method) -> Rgb {
+    match method {
+        Method::Pietra => Rgb::ROLL,
+        Method::PietraAvoid => Rgb(0x6c, 0xb3, 0xf2),
+        Method::Evora => Rgb::UNFAMILIAR,
+        Method::PhysicsInformed => Rgb::VEGETATION,
+        Method::Vanilla => Rgb(0x9a, 0xc8, 0x62),
+        Method::Physics => Rgb::PITCH,
+        Method::Nominal => Rgb::FAILURE,
+        Method::Truth => Rgb::INK,
+    }
+}
+
+fn quantities(report: &Report) -> [Quantity; 3] {
+    let most = |of: fn(&Row) -> Option<f64>| report.rows.iter().filter_map(of).fold(1.0, f64::max);
+    [
+        Quantity {
+            heading: "goal reached [%]",
+            of: |row| {
+                Some((100.0 * row.success, Some([row.wilson_low, row.wilson_high].map(|end| 100.0 * end))))
+            },
+            low: 0.0,
+            high: 103.0,
+        },
+        Quantity {
+            heading: "median time to the goal [s]",
+            of: |row| row.median_time_to_goal_s.map(|time_s| (time_s, None)),
+            low: 0.0,
+            high: 1.1 * most(|row| row.median_time_to_goal_s),
+        },
+        Quantity {
+            heading: "largest roll or pitch, mean over drives [deg]",
+            of: |row| {
+                let Mean { value, low, high } = row.largest_tilt_deg;
+                Some((value, Some([low, high])))
+            },
+            low: 0.0,
+            high: 1.1 * most(|row| Some(row.largest_tilt_deg.high)),
+        },
+    ]
+}
+
+fn drawn(report: &Report, methods: &[Method]) -> Canvas {
+    let n = report.plan.n_maps * report.plan.n_pairs;
+    let told = format!(
+        "{}, seed {}, {n} starts and goals a point; bars are 95 % intervals; who knows no tolerance is a dashed line",
+        report.plan.vehicle, report.plan.seed
+    );
+    let mut canvas = Canvas::titled(TOP + HEIGHT + BELOW, "What the risk tolerance does", &[&told]);
+    draw_legend(methods, &mut canvas);
+    let width = (PAGE_WIDTH - LEFT - MARGIN - 2.0 * GAP) / 3.0;
+    for (place, quantity) in quantities(report).into_iter().enumerate() {
+        let frame = Rect { x: LEFT + (width + GAP) * place as f64, y: TOP, width, height: HEIGHT };
+        let (x, y) = (Range { low: 0.0, high: 1.05 }, Range { low: quantity.low, high: quantity.high });
+        draw_panel(report, methods, &quantity, &Axes { frame, x, y }, &mut canvas);
+    }
+    canvas
+}
+
+fn draw_legend(methods: &[Method], canvas: &mut Canvas) {
+    let mut x = LEFT;
+    for &method in methods {
+        draw_mark((x, 132.0), colour(method), canvas);
+        canvas.text((x + 16.0, 138.0), method.name(), TEXT);
+        x += 56.0 + 10.0 * method.name().len() as f64;
+    }
+}
+
+fn draw_panel(report: &Report, methods: &[Method], quantity: &Quantity, axes: &Axes, canvas: &mut Canvas) {
+    axes.draw_rules(canvas);
+    axes.draw_frame(canvas);
+    axes.draw_x_ticks(canvas);
+    axes.draw_y_ticks(canvas);
+    axes.draw_x_label(canvas, "risk tolerance alpha [-]");
+    canvas.text((axes.frame.x, axes.frame.y - 14.0), quantity.heading, TEXT.bold());
+    for (place, &method) in methods.iter().enumerate() {
+        let aside = ASIDE * (place as f64 - 0.5 * (methods.len() - 1) as f64);
+        let levels = levels_of(report, method);
+        if levels.is_empty() {
+            draw_level_line(report, method, quantity, axes, canvas);
+        }
+        let marks = levels.iter().filter_map(|(alpha, row)| Some((alpha + aside, (quantity.of)(row)?)));
+        let marks: Vec<(f64, Mark)> = marks.collect();
+        let line: Vec<Point> = marks.iter().map(|(alpha, (value, _))| axes.place(*alpha, *value)).collect();
+        canvas.polyline(&line, Stroke::solid(colour(method), 2.0));
+        for (alpha, (value, interval)) in marks {
+            if let Some([low, high]) = interval {
+                let ends = [low, high].map(|end| axes.place(alpha, end));
+                canvas.line(ends[0], ends[1], Stroke::solid(colour(method), 2.0));
+            }
+            draw_mark(axes.place(alpha, value), colour(method), canvas);
+        }
+    }
+}
+
+/// Who knows no tolerance does the same at any.
+fn draw_level_line(report: &Report, method: Method, quantity: &Quantity, axes: &Axes, canvas: &mut Canvas) {
+    let row = report.rows.iter().find(|row| row.method == method);
+    if let Some((value, _)) = row.and_then(quantity.of) {
+        let [from, to] = [axes.x.low, axes.x.high].map(|alpha| axes.place(alpha, value));
+        canvas.line(from, to, Stroke { dash: "9 6", ..Stroke::solid(colour(method), 2.0) });
+    }
+}
+
+fn draw_mark(place: Point, colour: Rgb, canvas: &mut Canvas) {
+    canvas.circle(place, 6.0, colour, Stroke::solid(Rgb::WHITE, 1.5));
+}
