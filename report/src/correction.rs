@@ -6,7 +6,7 @@ use bench::statistics::Mean;
 use crate::axes::{Axes, Range};
 use crate::canvas::{Anchor, Canvas, EncodeError, MARGIN, PAGE_WIDTH, Point, Rect, Stroke, TextStyle};
 use crate::colour::Rgb;
-use crate::table::Table;
+use crate::table::{Table, probability};
 
 const TOP: f64 = 190.0;
 const LEFT: f64 = 100.0;
@@ -68,8 +68,9 @@ pub fn text(report: &MixedGroundReport) -> String {
 fn cells(speed_mps: f64, row: &MixedRow) -> Vec<String> {
     let [share, low, high] = row.within_walls.map(|share| 100.0 * share);
     let paired = row.less_plain.as_ref();
-    let walls =
-        |paired: &Paired| format!("{}/{}, {:.3}", paired.n_only_method, paired.n_only_plain, paired.p_value);
+    let walls = |paired: &Paired| {
+        format!("{}/{}, {}", paired.n_only_method, paired.n_only_plain, probability(paired.p_value))
+    };
     vec![
         format!("{speed_mps}"),
         row.method.name().to_owned(),

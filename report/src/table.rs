@@ -50,6 +50,11 @@ impl Table {
     }
 }
 
+/// A probability as tables tell it.
+pub(super) fn probability(p: f64) -> String {
+    if p < 1e-3 { "<0.001".to_owned() } else { format!("{p:.3}") }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -3,7 +3,7 @@
 use bench::risk::{Cell, Difference, Published, Report, Row};
 
 use crate::axes::number;
-use crate::table::Table;
+use crate::table::{Table, probability};
 
 const NOTE: &str = "\
 success [%] with 95 % Wilson intervals; in brackets behind it the mean time to the goal [s]
@@ -74,10 +74,6 @@ fn difference(difference: &Difference) -> String {
 fn points(value: f64) -> String {
     let told = number(100.0 * value, 1);
     if value > 0.0 { format!("+{told}") } else { told }
-}
-
-fn probability(p: f64) -> String {
-    if p < 1e-3 { "<0.001".to_owned() } else { format!("{p:.3}") }
 }
 
 #[cfg(test)]

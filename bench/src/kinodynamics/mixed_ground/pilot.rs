@@ -13,8 +13,9 @@ use super::super::track::Track;
 use super::run::Run;
 use super::{KinodynamicsError, Method};
 
-/// Of the horizon: two seconds in steps of the time between commands.
-const N_STEPS: usize = 40;
+/// Of the horizon: one second in steps of the time between commands. A right model cuts corners with a longer one, whose end
+/// outweighs its beginning.
+const N_STEPS: usize = 20;
 /// Corners of the reference path are so far apart [m].
 const SPACING_M: f64 = 0.1;
 /// The path begins so far behind the car, and reaches so far beyond the horizon [m].
@@ -127,7 +128,7 @@ impl Pilot {
 }
 
 /// What is known of the car: its description, with the lags of servo and motor.
-fn model(vehicle: &Vehicle) -> Model {
+pub(super) fn model(vehicle: &Vehicle) -> Model {
     let (servo, drivetrain) = (&vehicle.servo, &vehicle.drivetrain);
     let effects = vec![
         Effect::SteerDelay(SteerDelay { delay_s: servo.delay_s }),
@@ -137,11 +138,12 @@ fn model(vehicle: &Vehicle) -> Model {
     Model { effects, ..Model::of(vehicle) }
 }
 
-/// Of a metre across and along the path, squared, per step [s/m2], and of the sampled steering rate [rad/s]: of sixteen
-/// settings those with which [`Method::Plain`] alone stayed between the walls most often, on another seed.
-const PATH_ACROSS_S_PER_M2: f64 = 20.0;
-const PATH_ALONG_S_PER_M2: f64 = 4.0;
-const STEERING_STD_RADPS: f64 = 3.0;
+/// Of a metre across and along the path, squared, per step [s/m2], and of the sampled steering rate [rad/s]. Chosen with a car
+/// that is what the controller believes, so that a right model keeps to the line at the speed that is asked for; never with
+/// the plant.
+const PATH_ACROSS_S_PER_M2: f64 = 200.0;
+const PATH_ALONG_S_PER_M2: f64 = 20.0;
+const STEERING_STD_RADPS: f64 = 1.0;
 
 /// Settings for a car of this size.
 fn config(isa: Isa) -> Config {

@@ -61,3 +61,61 @@ fn an_adapted_model_knows_the_understeer_of_the_car() {
     let slow = &report.speeds[0];
     assert!(slow.rows.iter().all(|row| row.n_finished == 1), "at 1.6 m/s everybody comes around");
 }
+
+/// Once around by a car that is what the controller believes: distance to the line [m] and time [s].
+fn by_the_model(speed_mps: f64) -> (f64, f64) {
+    let vehicle = formats::read_vehicle(super::super::VEHICLE).unwrap();
+    let middle = walls::middle_line(&Track::outdoor());
+    let (layout, world) = ground(&Track::outdoor(), 1).unwrap();
+    let run = Run {
+        vehicle: &vehicle,
+        middle: &middle,
+        layout,
+        world,
+        method: Method::Plain,
+        checkpoint: None,
+        speed_mps,
+        half_width_m: 0.29,
+        seed: 7,
+    };
+    let mut pilot = pilot::Pilot::new(&run, Instructions::widest()).unwrap();
+    let stepper = bicycle::Stepper::new(&pilot::model(&vehicle), 0.05, 1.0);
+    let mut memory = vec![0.0; stepper.n_slots()];
+    let ([x_m, y_m], yaw_rad) = middle.place(0.0);
+    let mut state = bicycle::State { x_m, y_m, yaw_rad, ..Default::default() };
+    let (mut square_m2, mut n, mut way_m, mut began, mut tick) = (0.0, 0.0_f64, 0.0, 0, 0);
+    while way_m < middle.length_m() + 2.0 && tick < 2000 {
+        let bicycle::State { x_m, y_m, yaw_rad, speed_mps, steering_rad } = state;
+        let odometry = bicycle::Odometry {
+            valid_at_ns: tick as u64 * 50_000_000,
+            position_m: [x_m, y_m, 0.0],
+            attitude_rad: [0.0, 0.0, yaw_rad],
+            velocity_mps: [speed_mps, 0.0],
+            wheel_speed_mps: speed_mps,
+            steering_rad,
+            ..Default::default()
+        };
+        let command = pilot.command(&run, &odometry, odometry.valid_at_ns).unwrap();
+        state = stepper.step_state(&state, command, &bicycle::GroundSample::FIRM, &mut memory, tick);
+        let (at_m, off_m) = middle.project([state.x_m, state.y_m], way_m, 0.7);
+        way_m = way_m.max(at_m);
+        tick += 1;
+        if way_m < 2.0 {
+            began = tick;
+        } else {
+            (square_m2, n) = (square_m2 + off_m * off_m, n + 1.0);
+        }
+    }
+    ((square_m2 / n).sqrt(), 0.05 * (tick - began) as f64)
+}
+
+#[test]
+fn a_controller_whose_model_is_right_keeps_to_the_line() {
+    let length_m = walls::middle_line(&Track::outdoor()).length_m();
+    for speed_mps in MIXED_MPS {
+        let (distance_m, time_s) = by_the_model(speed_mps);
+        let share = time_s * speed_mps / length_m;
+        assert!(distance_m < 0.03, "{speed_mps} m/s: {distance_m} m");
+        assert!((0.95..1.05).contains(&share), "{speed_mps} m/s: {share} of the time that is asked for");
+    }
+}
