@@ -93,13 +93,12 @@ impl Run<'_> {
         let length_m = self.middle.length_m();
         let most_ns = (SLOW_FACTOR * (length_m + LEAD_M) / self.speed_mps * 1e9) as u64;
         while tally.way_m < LEAD_M + length_m && tally.failure.is_none() {
+            if machine.now_ns() > most_ns {
+                tally.failure = Some(Failure::Stuck);
+                break;
+            }
             if tally.way_m < LEAD_M {
                 began_ns = machine.now_ns();
-            } else if machine.now_ns() - began_ns > most_ns {
-                tally.failure = Some(Failure::Stuck);
-            }
-            if machine.now_ns() > 2 * most_ns {
-                tally.failure = Some(Failure::Stuck);
             }
             let odometry = machine.measure();
             let Command { speed_mps, steering_rad } = pilot.command(self, &odometry, machine.now_ns())?;
