@@ -318,6 +318,23 @@ fn broken_numbers_in_the_map_are_quarantined() {
     assert_eq!(controller.decide(&input), Decision::Stop(StopReason::NonFiniteResult));
 }
 
+/// The field of times to go has an answer for every place, the goal's latch for every distance: neither may be taken for
+/// the cost of a future that is nowhere.
+#[test]
+fn who_is_nowhere_has_no_time_to_go() {
+    let mut map = level();
+    let GridGeometry { n_rows, n_cols, .. } = *map.geometry();
+    let mut field = CostToGo::new(CostToGoConfig::default(), &model().limits, n_rows, n_cols).unwrap();
+    field.update(map.view(), [8.0, 0.0]).unwrap();
+    let terminal = Terminal::CostToGo(field.view());
+    let objective = Objective::Goal { goal_m: [8.0, 0.0], tolerance_m: 0.5, terminal };
+    map.fill(|risks, _| risks.fill(Risk { linear_traction: f32::NAN, ..Risk::NONE }));
+    let mut controller = Controller::new(smooth(), model(), 5).unwrap();
+    let input = Input { state: standing(), elapsed_s: 0.0, map: map.view(), objective, cycle: 0 };
+    assert_eq!(controller.decide(&input), Decision::Stop(StopReason::NonFiniteResult));
+    assert_eq!(controller.diagnostics().n_non_finite, 1024);
+}
+
 /// Unknown attitude is not level ground.
 #[test]
 fn an_attitude_that_is_not_a_number_counts_as_too_steep() {
