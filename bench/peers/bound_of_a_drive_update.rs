@@ -181,9 +181,8 @@ struct Shared {
 
 /// What the sampling reads; the scores are rows of the inverse covariance of a Gauss-Markov sequence times the plan.
 fn prepare(shared: &mut Shared) {
-    let change = |t: usize, c: usize| {
-        shared.plan[t][c] - if t == 0 { shared.start[c] } else { shared.plan[t - 1][c] }
-    };
+    let change =
+        |t: usize, c: usize| shared.plan[t][c] - if t == 0 { shared.start[c] } else { shared.plan[t - 1][c] };
     let fresh = (1.0 - CORRELATION * CORRELATION).sqrt();
     let mut scores = [[0.0; 2]; N_STEPS + 1];
     for t in 0..N_STEPS {
@@ -523,7 +522,12 @@ fn new_shared() -> *mut Shared {
 }
 
 /// One update; `lap` hears of the end of noise, rollouts and the rest.
-fn update(shared: *mut Shared, n_threads: usize, generator: &mut Generator, mut lap: impl FnMut(usize)) -> bool {
+fn update(
+    shared: *mut Shared,
+    n_threads: usize,
+    generator: &mut Generator,
+    mut lap: impl FnMut(usize),
+) -> bool {
     let own = unsafe { &mut *shared };
     own.plan.copy_within(1.., 0);
     prepare(own);
@@ -563,7 +567,9 @@ fn main() {
                         phase if phase == last => spin_loop(),
                         phase => {
                             last = phase;
-                            unsafe { work(address as *mut Shared, phase % 4, [id, n_threads], &mut generator) };
+                            unsafe {
+                                work(address as *mut Shared, phase % 4, [id, n_threads], &mut generator)
+                            };
                             N_DONE.fetch_add(1, AcqRel);
                         }
                     }
@@ -595,5 +601,7 @@ fn main() {
     let mean_terms_s = unsafe { (*shared).totals[0] }.map(|sum| sum * n_threads as f32 / N_ROLLOUTS as f32);
     println!("{n_threads} threads: least {least_ms:.4} ms, median {median_ms:.4} ms");
     println!("medians: noise {noise_ms:.4} ms, rollouts {rollouts_ms:.4} ms, the rest {rest_ms:.4} ms");
-    println!("plan {speed_mps:.3} m/s {steering_rad:.3} rad, within limits {n_within}, terms {mean_terms_s:?}");
+    println!(
+        "plan {speed_mps:.3} m/s {steering_rad:.3} rad, within limits {n_within}, terms {mean_terms_s:?}"
+    );
 }
