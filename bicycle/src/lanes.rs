@@ -4,6 +4,7 @@
 
 mod block;
 mod instructions;
+mod neon;
 mod packs;
 mod polynomial;
 mod portable;
@@ -76,6 +77,20 @@ pub trait Lanes: Copy + Send + Sync + 'static {
     fn min(self, a: Self::Value, b: Self::Value) -> Self::Value;
     /// Larger of both; `b` where either is NaN.
     fn max(self, a: Self::Value, b: Self::Value) -> Self::Value;
+    /// `a` brought into [low, high]; NaN stays NaN, and bounds that are NaN bound nothing or give NaN.
+    #[inline(always)]
+    fn clamp(self, a: Self::Value, low: Self::Value, high: Self::Value) -> Self::Value {
+        self.min(high, self.max(low, a))
+    }
+    /// A polynomial by its coefficients, lowest power first; in which order it is summed up is the instructions' choice.
+    #[inline(always)]
+    fn polynomial<const N: usize>(self, z: Self::Value, coefficients: &[f32; N]) -> Self::Value {
+        let mut sum = self.single(coefficients[N - 1]);
+        for i in (0..N - 1).rev() {
+            sum = self.mul_add(sum, z, self.single(coefficients[i]));
+        }
+        sum
+    }
     /// Magnitude.
     fn magnitude(self, a: Self::Value) -> Self::Value;
     /// Square root, rounded once; of a negative number, 0; of NaN, NaN.
@@ -159,10 +174,16 @@ impl<L: Lanes> Real<L> {
         Self(self.0, self.0.max(self.1, other.1))
     }
 
-    /// Brought into [low, high]; NaN stays NaN, and bounds that are NaN bound nothing.
+    /// See [`Lanes::clamp`].
     #[inline(always)]
     pub fn clamp(self, low: Self, high: Self) -> Self {
-        high.min(low.max(self))
+        Self(self.0, self.0.clamp(self.1, low.1, high.1))
+    }
+
+    /// See [`Lanes::polynomial`].
+    #[inline(always)]
+    pub fn polynomial<const N: usize>(self, coefficients: &[f32; N]) -> Self {
+        Self(self.0, self.0.polynomial(self.1, coefficients))
     }
 
     /// Square root, see [`Lanes::sqrt`].

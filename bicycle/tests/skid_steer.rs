@@ -234,6 +234,15 @@ fn every_lane_goes_where_one_vehicle_goes() {
             );
         }
     }
+    #[cfg(target_arch = "aarch64")]
+    if let Some(neon) = pulp::aarch64::Neon::try_new() {
+        use pulp::cast;
+        compare(
+            neon,
+            |value| cast::<_, [f32; 8]>(value).to_vec(),
+            |values| cast(<[f32; 8]>::try_from(values).unwrap()),
+        );
+    }
 }
 
 /// The scalar twin is the lanes' step of one lane: the same bits.

@@ -19,6 +19,10 @@ fn both(angle: f32, rate: f32, witness: f32) -> Vec<[f32; 3]> {
         found.extend(pulp::x86::V3::try_new().map(|v3| on(v3, given, |v| cast::<_, [f32; 8]>(v)[0])));
         found.extend(pulp::x86::V4::try_new().map(|v4| on(v4, given, |v| cast::<_, [f32; 16]>(v)[0])));
     }
+    #[cfg(target_arch = "aarch64")]
+    found.extend(
+        pulp::aarch64::Neon::try_new().map(|neon| on(neon, given, |v| pulp::cast::<_, [f32; 8]>(v)[0])),
+    );
     found
 }
 

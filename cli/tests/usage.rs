@@ -141,7 +141,7 @@ fn other_bad_values_are_refused_with_what_would_do() {
                 "magic",
             ],
         ),
-        (&["drive", "--isa", "sse9"], &["--isa", "auto, avx512, avx2, portable", "sse9"]),
+        (&["drive", "--isa", "sse9"], &["--isa", "auto, avx512, avx2, neon, portable", "sse9"]),
         (&["drive", "--pace", "slow"], &["--pace", "fast, real", "slow"]),
         (&["bench", "control", "--updates", "0"], &["--updates", "from 1", "0"]),
         (&["drive", "--walkers", "17"], &["--walkers", "from 1 to 16", "17"]),

@@ -9,6 +9,7 @@ mod avx512;
 pub(crate) mod functions;
 #[allow(unsafe_code)]
 mod lookup;
+mod neon;
 mod portable;
 mod primitives;
 #[allow(unsafe_code)]
@@ -108,10 +109,10 @@ pub(crate) trait Work {
     fn run<K: Kernel>(self, kernel: K) -> Self::Output;
 }
 
-#[cfg(target_arch = "x86_64")]
+#[cfg(any(target_arch = "x86_64", target_arch = "aarch64"))]
 struct Vectorized<K, W>(K, W);
 
-#[cfg(target_arch = "x86_64")]
+#[cfg(any(target_arch = "x86_64", target_arch = "aarch64"))]
 impl<K: Kernel, W: Work> pulp::NullaryFnOnce for Vectorized<K, W> {
     type Output = W::Output;
     #[inline(always)]
@@ -129,6 +130,8 @@ pub(crate) fn run<W: Work>(instructions: Instructions, work: W) -> W::Output {
         Instructions::Avx512(kernel) => kernel.vectorize(Vectorized(kernel, work)),
         #[cfg(target_arch = "x86_64")]
         Instructions::Avx2(kernel) => kernel.vectorize(Vectorized(kernel, work)),
+        #[cfg(target_arch = "aarch64")]
+        Instructions::Neon(kernel) => kernel.vectorize(Vectorized(kernel, work)),
         Instructions::Portable => work.run(Portable),
     }
 }

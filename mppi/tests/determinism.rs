@@ -92,7 +92,7 @@ fn instruction_sets_agree() {
     };
     for model in [model(), with_effects()] {
         let (reference, expected) = decide(Isa::Portable, &model).unwrap();
-        for isa in [Isa::Avx2, Isa::Avx512] {
+        for isa in Isa::SETS {
             let Some((command, found)) = decide(isa, &model) else { continue };
             assert!((command.speed_mps - reference.speed_mps).abs() < 1e-3, "{isa:?}");
             assert!((command.steering_rad - reference.steering_rad).abs() < 1e-3, "{isa:?}");

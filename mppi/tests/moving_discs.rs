@@ -101,7 +101,7 @@ fn no_disc_and_a_disc_far_away_change_no_bit() {
 #[test]
 fn steps_within_a_disc_cost_what_they_are_said_to() {
     let map = level();
-    for isa in [Isa::Portable, Isa::Avx2, Isa::Avx512] {
+    for isa in Isa::SETS {
         let config = Config { isa, ..Config::default() };
         let discs = MovingDiscs::new(OUTLINE, PRICES, 1, N_STEPS);
         let Ok(mut controller) = Controller::with_costs(config, model(), (discs, ()), 3) else { continue };

@@ -85,7 +85,7 @@ fn a_cost_of_nothing_changes_no_bit() {
 #[test]
 fn costs_of_steps_add_up() {
     let map = level();
-    for isa in [Isa::Portable, Isa::Avx2, Isa::Avx512] {
+    for isa in Isa::SETS {
         let config = Config { isa, ..Config::default() };
         let costs = (PerStep(0.01), PerStep(0.02), KeepOut { centre_m: [0.0, 0.0], radius_m: 100.0 });
         let Ok(mut controller) = Controller::with_costs(config, model(), (costs, ()), 3) else { continue };
@@ -221,7 +221,7 @@ fn a_copy_of_a_term_over_the_steps_that_were_kept_costs_the_same() {
     let mut limits = model().limits;
     (limits.reverse_speed_max_mps, limits.lateral_acceleration_max_mps2) = (1.0, 0.3);
     let model = Model { limits, ..model() };
-    for isa in [Isa::Portable, Isa::Avx2, Isa::Avx512] {
+    for isa in Isa::SETS {
         let config = |costs| Config { isa, costs, ..Config::default() };
         let Ok(mut compiled) = Controller::new(config(own), model.clone(), 3) else { continue };
         let retold = Retold { lateral_max_mps2: 0.3, lateral_s: 0.7, reverse_s: 0.4 };

@@ -8,11 +8,16 @@ use thread_priority::{
 };
 
 use bus::status::Role;
+use std::path::Path;
+
+/// Where the system says what each of its cores can do.
+const CORES: &str = "/sys/devices/system/cpu";
 
 /// Sets cores, priority and memory of this thread, and of those that it will start, as a role needs them; says what was done and what was not permitted.
 ///
-/// Control has the last core for itself, the others share the rest. SCHED_FIFO goes to those that the vehicle waits for;
-/// learning and the recorder take what is left. To be called before the process starts any other thread.
+/// Where cores are of several sizes, as the system states them, control has the last of the largest for itself, those that
+/// the vehicle waits for share the other large ones, and learning and the recorder all the rest; where they are alike,
+/// control has the last and the others share the rest. SCHED_FIFO goes to those that the vehicle waits for. To be called before the process starts any other thread.
 pub fn configure_thread(role: Role) -> String {
     [pinned(role), scheduled(role), locked()].join("; ")
 }
@@ -33,7 +38,10 @@ fn pinned(role: Role) -> String {
         Err(error) => return format!("not pinned: {error}"),
     };
     let cores: Vec<usize> = (0..CpuSet::MAX_CPU).filter(|&core| allowed.is_set(core)).collect();
-    let Some(own) = own_cores(role, &cores) else { return "not pinned: there is one core only".to_owned() };
+    let large = largest(&cores, Path::new(CORES));
+    let Some(own) = own_cores(role, &cores, &large) else {
+        return "not pinned: there is one core only".to_owned();
+    };
     let mut wanted = CpuSet::new();
     own.iter().for_each(|&core| wanted.set(core));
     match sched_setaffinity(None, &wanted) {
@@ -44,12 +52,28 @@ fn pinned(role: Role) -> String {
     }
 }
 
-/// The cores of a role among those there are.
-fn own_cores(role: Role, cores: &[usize]) -> Option<&[usize]> {
-    match cores {
-        [] | [_] => None,
-        [_, .., _] if role == Role::Control => cores.get(cores.len() - 1..),
-        [..] => cores.get(..cores.len() - 1),
+/// Those of the cores whose stated capacity is the largest; all of them where nothing is stated of one.
+fn largest(cores: &[usize], stated: &Path) -> Vec<usize> {
+    let capacity = |core: &usize| -> Option<u32> {
+        let text = std::fs::read_to_string(stated.join(format!("cpu{core}/cpu_capacity"))).ok()?;
+        text.trim().parse().ok()
+    };
+    let Some(capacities) = cores.iter().map(capacity).collect::<Option<Vec<u32>>>() else {
+        return cores.to_vec();
+    };
+    let most = capacities.iter().max();
+    cores.iter().zip(&capacities).filter(|(_, of)| Some(*of) == most).map(|(core, _)| *core).collect()
+}
+
+/// The cores of a role among those there are, of which some are large.
+fn own_cores(role: Role, cores: &[usize], large: &[usize]) -> Option<Vec<usize>> {
+    let of_control = *large.last().filter(|_| cores.len() > 1)?;
+    let shared =
+        |among: &[usize]| among.iter().copied().filter(|&core| core != of_control).collect::<Vec<_>>();
+    match priority(role) {
+        _ if role == Role::Control => Some(vec![of_control]),
+        Some(_) if large.len() > 1 => Some(shared(large)),
+        _ => Some(shared(cores)),
     }
 }
 
@@ -84,13 +108,45 @@ mod tests {
     #[test]
     fn control_has_a_core_of_its_own_where_there_are_two() {
         for cores in [vec![0, 1], vec![2, 5, 7]] {
-            let control = own_cores(Role::Control, &cores).unwrap();
-            let others = own_cores(Role::Learning, &cores).unwrap();
-            assert_eq!([others, control].concat(), cores);
+            let control = own_cores(Role::Control, &cores, &cores).unwrap();
+            for other in [Role::Learning, Role::Mapping] {
+                assert_eq!([own_cores(other, &cores, &cores).unwrap(), control.clone()].concat(), cores);
+            }
             assert_eq!(control.len(), 1);
         }
-        assert_eq!(own_cores(Role::Control, &[3]), None);
-        assert_eq!(own_cores(Role::Plant, &[]), None);
+        assert_eq!(own_cores(Role::Control, &[3], &[3]), None);
+        assert_eq!(own_cores(Role::Plant, &[], &[]), None);
+    }
+
+    #[test]
+    fn who_the_vehicle_waits_for_has_the_large_cores() {
+        let cores = [0, 1, 2, 3, 4, 5];
+        let of = |role, large: &[usize]| own_cores(role, &cores, large).unwrap();
+        assert_eq!([of(Role::Control, &[2, 3]), of(Role::Mapping, &[2, 3])], [[3], [2]]);
+        assert_eq!(of(Role::Recorder, &[2, 3]), [0, 1, 2, 4, 5], "whatever is left");
+        // One alone is control's.
+        assert_eq!(of(Role::Control, &[4]), [4]);
+        assert_eq!(of(Role::Mapping, &[4]), [0, 1, 2, 3, 5]);
+    }
+
+    #[test]
+    fn the_largest_cores_are_those_of_which_the_most_is_stated() {
+        let folder = tempfile::tempdir().unwrap();
+        let state = |core: usize, capacity: &str| {
+            let of_core = folder.path().join(format!("cpu{core}"));
+            std::fs::create_dir_all(&of_core).unwrap();
+            std::fs::write(of_core.join("cpu_capacity"), capacity).unwrap();
+        };
+        let large = |cores: &[usize]| largest(cores, folder.path());
+        assert_eq!(large(&[0, 1]), [0, 1], "nothing is stated");
+        for (core, capacity) in [(0, "414\n"), (1, "414\n"), (4, "1024\n"), (5, "1024\n")] {
+            state(core, capacity);
+        }
+        assert_eq!(large(&[0, 1, 4, 5]), [4, 5]);
+        assert_eq!(large(&[0, 1]), [0, 1], "the process may use no others");
+        assert_eq!(large(&[0, 4, 7]), [0, 4, 7], "nothing is stated of the last");
+        state(7, "much");
+        assert_eq!(large(&[4, 0, 7]), [4, 0, 7]);
     }
 
     #[test]

@@ -5,7 +5,9 @@ use crate::evidence::{Evidence, SpeedInput, SpeedSource};
 use bicycle::effect::Effect;
 use bicycle::lanes::{Instructions, Lanes, Portable, Real, Scalar};
 use bicycle::{Asked, GroundSample, LaneState, Limits, Model, Rates, SensorModel, Stepper};
-use pulp::{NullaryFnOnce, f32x8, f32x16};
+use pulp::NullaryFnOnce;
+#[cfg(target_arch = "x86_64")]
+use pulp::{f32x8, f32x16};
 use std::f64::consts::TAU;
 
 /// Quantities compared: along, across [m], turn [rad], speed [m/s], yaw rate [rad/s].
@@ -39,6 +41,8 @@ impl Simulator {
             Instructions::Avx512(lanes) => lanes.vectorize(On(lanes, roll_out)),
             #[cfg(target_arch = "x86_64")]
             Instructions::Avx2(lanes) => lanes.vectorize(On(lanes, roll_out)),
+            #[cfg(target_arch = "aarch64")]
+            Instructions::Neon(lanes) => lanes.vectorize(On(lanes, roll_out)),
             Instructions::Portable => On(Portable, roll_out).call(),
         }
     }
@@ -179,6 +183,18 @@ impl Pack for pulp::x86::V3 {
     }
     #[inline(always)]
     fn unpack(value: f32x8) -> [f32; WIDEST] {
+        widened(pulp::cast(value))
+    }
+}
+
+#[cfg(target_arch = "aarch64")]
+impl Pack for pulp::aarch64::Neon {
+    #[inline(always)]
+    fn pack(values: &[f32; WIDEST]) -> [pulp::f32x4; 2] {
+        pulp::cast(first_eight(values))
+    }
+    #[inline(always)]
+    fn unpack(value: [pulp::f32x4; 2]) -> [f32; WIDEST] {
         widened(pulp::cast(value))
     }
 }

@@ -17,13 +17,15 @@ pub enum Isa {
     Avx512,
     /// AVX2 with FMA.
     Avx2,
+    /// NEON, which every 64-bit ARM processor has.
+    Neon,
     /// What every machine has: the same results on all of them.
     Portable,
 }
 
 impl Isa {
     /// Every set by its name, the widest first.
-    pub const SETS: [Self; 3] = [Self::Avx512, Self::Avx2, Self::Portable];
+    pub const SETS: [Self; 4] = [Self::Avx512, Self::Avx2, Self::Neon, Self::Portable];
 }
 
 /// An instruction set that the machine is known to have.
@@ -35,6 +37,9 @@ pub enum Instructions {
     /// AVX2 with FMA.
     #[cfg(target_arch = "x86_64")]
     Avx2(pulp::x86::V3),
+    /// NEON.
+    #[cfg(target_arch = "aarch64")]
+    Neon(pulp::aarch64::Neon),
     /// What every machine has.
     Portable,
 }
@@ -47,10 +52,10 @@ pub trait OnLanes {
     fn run<L: Lanes>(self, lanes: L) -> Self::Output;
 }
 
-#[cfg(target_arch = "x86_64")]
+#[cfg(any(target_arch = "x86_64", target_arch = "aarch64"))]
 struct Vectorized<L, W>(L, W);
 
-#[cfg(target_arch = "x86_64")]
+#[cfg(any(target_arch = "x86_64", target_arch = "aarch64"))]
 impl<L: Lanes, W: OnLanes> pulp::NullaryFnOnce for Vectorized<L, W> {
     type Output = W::Output;
     #[inline(always)]
@@ -79,9 +84,13 @@ impl Instructions {
             Isa::Avx512 => pulp::x86::V4::try_new().map(Self::Avx512).ok_or(IsaAbsent { isa }),
             #[cfg(target_arch = "x86_64")]
             Isa::Avx2 => pulp::x86::V3::try_new().map(Self::Avx2).ok_or(IsaAbsent { isa }),
+            #[cfg(target_arch = "aarch64")]
+            Isa::Neon => pulp::aarch64::Neon::try_new().map(Self::Neon).ok_or(IsaAbsent { isa }),
             Isa::Portable => Ok(Self::Portable),
             #[cfg(not(target_arch = "x86_64"))]
             Isa::Avx512 | Isa::Avx2 => Err(IsaAbsent { isa }),
+            #[cfg(not(target_arch = "aarch64"))]
+            Isa::Neon => Err(IsaAbsent { isa }),
         }
     }
 
@@ -102,6 +111,8 @@ impl Instructions {
             Self::Avx512(_) => Isa::Avx512,
             #[cfg(target_arch = "x86_64")]
             Self::Avx2(_) => Isa::Avx2,
+            #[cfg(target_arch = "aarch64")]
+            Self::Neon(_) => Isa::Neon,
             Self::Portable => Isa::Portable,
         }
     }
@@ -115,6 +126,8 @@ impl Instructions {
             Self::Avx512(simd) => pulp::Simd::vectorize(simd, work),
             #[cfg(target_arch = "x86_64")]
             Self::Avx2(simd) => pulp::Simd::vectorize(simd, work),
+            #[cfg(target_arch = "aarch64")]
+            Self::Neon(simd) => pulp::Simd::vectorize(simd, work),
             Self::Portable => work.with_simd(pulp::Scalar),
         }
     }
@@ -127,6 +140,8 @@ impl Instructions {
             Self::Avx512(lanes) => lanes.vectorize(Vectorized(lanes, work)),
             #[cfg(target_arch = "x86_64")]
             Self::Avx2(lanes) => lanes.vectorize(Vectorized(lanes, work)),
+            #[cfg(target_arch = "aarch64")]
+            Self::Neon(lanes) => lanes.vectorize(Vectorized(lanes, work)),
             Self::Portable => work.run(Portable),
         }
     }
@@ -137,6 +152,7 @@ fn name(isa: Isa) -> &'static str {
         Isa::Auto => "auto",
         Isa::Avx512 => "avx512",
         Isa::Avx2 => "avx2",
+        Isa::Neon => "neon",
         Isa::Portable => "portable",
     }
 }

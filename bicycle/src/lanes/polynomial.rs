@@ -10,22 +10,12 @@ const COS_TURNS: [f32; 7] = [1.0, -19.739_204, 64.939_12, -85.450_165, 60.167_83
 const TAN: [f32; 6] = [0.999_998_2, 0.333_416_68, 0.132_286_44, 0.059_395_746, 0.008_769_429, 0.022_696_837];
 
 #[inline(always)]
-fn horner<L: Lanes, const N: usize>(lanes: L, z: L::Value, coefficients: &[f32; N]) -> L::Value {
-    let coefficient = |i: usize| lanes.real(f64::from(coefficients[i])).1;
-    let mut sum = coefficient(N - 1);
-    for i in (0..N - 1).rev() {
-        sum = lanes.mul_add(sum, z, coefficient(i));
-    }
-    sum
-}
-
-#[inline(always)]
 pub(super) fn sin_cos_turns<L: Lanes>(lanes: L, r: L::Value) -> (L::Value, L::Value) {
     let z = lanes.mul(r, r);
-    (lanes.mul(r, horner(lanes, z, &SIN_TURNS)), horner(lanes, z, &COS_TURNS))
+    (lanes.mul(r, lanes.polynomial(z, &SIN_TURNS)), lanes.polynomial(z, &COS_TURNS))
 }
 
 #[inline(always)]
 pub(super) fn tan<L: Lanes>(lanes: L, d: L::Value) -> L::Value {
-    lanes.mul(d, horner(lanes, lanes.mul(d, d), &TAN))
+    lanes.mul(d, lanes.polynomial(lanes.mul(d, d), &TAN))
 }

@@ -1,4 +1,4 @@
-//! Packs in plain Rust, for machines without AVX2: the compiler makes of them what the target has.
+//! Packs in plain Rust, for machines without AVX2 or NEON: the compiler makes of them what the target has.
 
 use super::{Constant, Lanes, SPAN, polynomial};
 

@@ -156,6 +156,15 @@ fn packs_agree_with_the_reference() {
             );
         }
     }
+    #[cfg(target_arch = "aarch64")]
+    if let Some(neon) = pulp::aarch64::Neon::try_new() {
+        use pulp::cast;
+        compare(
+            neon,
+            |value| cast::<_, [f32; 8]>(value).to_vec(),
+            |values| cast(<[f32; 8]>::try_from(values).unwrap()),
+        );
+    }
 }
 
 fn compare<L: Lanes>(lanes: L, unpack: impl Fn(L::Value) -> Vec<f32>, pack: impl Fn(&[f32]) -> L::Value) {
@@ -229,6 +238,10 @@ fn functions_of_packs_are_accurate() {
         if let Some(v4) = pulp::x86::V4::try_new() {
             accuracy(v4, |value| cast::<_, [f32; 16]>(value).to_vec());
         }
+    }
+    #[cfg(target_arch = "aarch64")]
+    if let Some(neon) = pulp::aarch64::Neon::try_new() {
+        accuracy(neon, |value| pulp::cast::<_, [f32; 8]>(value).to_vec());
     }
 }
 

@@ -122,6 +122,10 @@ fn a_model_that_validates_steps_finite() {
             any_models(v4, |value| cast::<_, [f32; 16]>(value).to_vec());
         }
     }
+    #[cfg(target_arch = "aarch64")]
+    if let Some(neon) = pulp::aarch64::Neon::try_new() {
+        any_models(neon, |value| pulp::cast::<_, [f32; 8]>(value).to_vec());
+    }
 }
 
 fn any_models<L: Lanes>(lanes: L, unpack: impl Fn(L::Value) -> Vec<f32>) {

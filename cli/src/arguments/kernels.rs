@@ -41,6 +41,8 @@ pub enum InstructionSet {
     Avx512,
     /// AVX2 and FMA, 8 lanes
     Avx2,
+    /// NEON of 64-bit ARM, 8 lanes
+    Neon,
     /// Plain x86-64 or any other processor
     Portable,
 }
@@ -51,6 +53,7 @@ impl From<InstructionSet> for mppi::Isa {
             InstructionSet::Auto => Self::Auto,
             InstructionSet::Avx512 => Self::Avx512,
             InstructionSet::Avx2 => Self::Avx2,
+            InstructionSet::Neon => Self::Neon,
             InstructionSet::Portable => Self::Portable,
         }
     }

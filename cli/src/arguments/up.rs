@@ -92,7 +92,7 @@ pub struct UpArguments {
           help_heading = "Processes")]
     pub third_parties: usize,
 
-    /// Pin processes to cores, ask for SCHED_FIFO and lock memory; each says on standard error what was not permitted
+    /// Pin processes to cores, the largest to what the vehicle waits for, ask for SCHED_FIFO and lock memory; each says on standard error what was not permitted
     #[arg(long, help_heading = "Processes")]
     pub realtime: bool,
 

@@ -15,16 +15,6 @@ const EXP2: [f32; 6] = [1.0, 0.693_146_94, 0.240_221_2, 0.055_507_134, 0.009_675
 /// Below this a weight counts as zero: exp(-60) is beyond what an f32 sum of weights can hold.
 const NEGLIGIBLE: f64 = -60.0;
 
-#[inline(always)]
-fn horner<K: Kernel, const N: usize>(z: Real<K>, coefficients: &[f32; N]) -> Real<K> {
-    let coefficient = |i: usize| z.0.real(f64::from(coefficients[i]));
-    let mut sum = coefficient(N - 1);
-    for i in (0..N - 1).rev() {
-        sum = sum.mul_add(z, coefficient(i));
-    }
-    sum
-}
-
 /// exp(x) for x <= 0; exactly 0 below -60 and for NaN.
 #[inline(always)]
 pub(crate) fn exp_of_negative<K: Kernel>(x: Real<K>) -> Real<K> {
@@ -34,7 +24,7 @@ pub(crate) fn exp_of_negative<K: Kernel>(x: Real<K>) -> Real<K> {
     let rest = scaled.wrap_turns();
     let whole = kernel.truncate((scaled - rest).1);
     let power = kernel.shl::<23>(kernel.add_bits(whole, kernel.word(127)));
-    let value = horner(rest, &EXP2) * Real(kernel, kernel.as_value(power));
+    let value = rest.polynomial(&EXP2) * Real(kernel, kernel.as_value(power));
     value.or_else(floor.less(x), kernel.real(0.0))
 }
 
@@ -86,11 +76,11 @@ impl<K: Kernel> Generator<K> {
         let k = self.kernel;
         let (exponent, rest) = k.split((k.real(2.0) - self.uniform()).1);
         let rest = Real(k, rest);
-        let log2 = horner(rest, &LOG2).mul_add(rest, Real(k, exponent));
+        let log2 = rest.polynomial(&LOG2).mul_add(rest, Real(k, exponent));
         let radius = (log2 * k.real(-2.0 * std::f64::consts::LN_2)).sqrt();
         let turns = self.uniform().wrap_turns();
         let square = turns * turns;
-        [radius * horner(square, &COS_TURNS), radius * (turns * horner(square, &SIN_TURNS))]
+        [radius * square.polynomial(&COS_TURNS), radius * (turns * square.polynomial(&SIN_TURNS))]
     }
 }
 

@@ -44,31 +44,34 @@ fn last_index<T>(table: &[T]) -> usize {
     table.len() - 1
 }
 
+#[cfg(any(target_arch = "x86_64", target_arch = "aarch64"))]
+const _: () = assert!(size_of::<Risk>() == 16 && align_of::<Risk>() == 4);
+
+/// Largest index as a word; tables beyond 2^32 entries are read as if they ended there.
+#[cfg(any(target_arch = "x86_64", target_arch = "aarch64"))]
+#[inline(always)]
+fn last_word<T>(table: &[T]) -> u32 {
+    u32::try_from(last_index(table)).unwrap_or(u32::MAX)
+}
+
+/// One 16-byte row of the table.
+///
+/// # Safety
+/// `index` is an index of the table that `start` points to.
+#[cfg(any(target_arch = "x86_64", target_arch = "aarch64"))]
+#[inline(always)]
+unsafe fn row(start: *const Risk, index: u32) -> pulp::f32x4 {
+    // SAFETY: a Risk is four adjacent f32 (repr(C), 16 bytes), `f32x4` has the same layout, every bit pattern
+    // is a valid f32, and the caller vouches for the index; the read does not ask for alignment.
+    unsafe { start.add(index as usize).cast::<pulp::f32x4>().read_unaligned() }
+}
+
 #[cfg(target_arch = "x86_64")]
 pub(super) mod x86 {
-    use super::last_index;
+    use super::{last_word, row};
     use pulp::x86::{V3, V4};
-    use pulp::{cast, f32x4, f32x8, f32x16, u32x8, u32x16};
+    use pulp::{cast, f32x8, f32x16, u32x8, u32x16};
     use traversability::Risk;
-
-    const _: () = assert!(size_of::<Risk>() == 16 && align_of::<Risk>() == 4);
-
-    /// Largest index as a word; tables beyond 2^32 entries are read as if they ended there.
-    #[inline(always)]
-    fn last_word<T>(table: &[T]) -> u32 {
-        u32::try_from(last_index(table)).unwrap_or(u32::MAX)
-    }
-
-    /// One 16-byte row of the table.
-    ///
-    /// # Safety
-    /// `index` is an index of the table that `start` points to.
-    #[inline(always)]
-    unsafe fn row(start: *const Risk, index: u32) -> f32x4 {
-        // SAFETY: a Risk is four adjacent f32 (repr(C), 16 bytes), `f32x4` has the same layout, every bit pattern
-        // is a valid f32, and the caller vouches for the index; the read does not ask for alignment.
-        unsafe { start.add(index as usize).cast::<f32x4>().read_unaligned() }
-    }
 
     /// Sixteen rows, one 16-byte load each, turned into four columns.
     #[inline(always)]
@@ -118,6 +121,41 @@ pub(super) mod x86 {
             cast!(avx._mm256_unpackhi_pd(cast!(low01), cast!(low23))),
             cast!(avx._mm256_unpacklo_pd(cast!(high01), cast!(high23))),
             cast!(avx._mm256_unpackhi_pd(cast!(high01), cast!(high23))),
+        ]
+    }
+}
+
+#[cfg(target_arch = "aarch64")]
+pub(super) mod aarch64 {
+    use super::{last_word, row};
+    use pulp::aarch64::Neon;
+    use pulp::{cast, f32x4, u32x4};
+    use traversability::Risk;
+
+    /// Eight rows, one 16-byte load each, turned into four columns.
+    #[inline(always)]
+    pub(crate) fn risks8(simd: Neon, table: &[Risk], indices: [u32x4; 2]) -> [[f32x4; 2]; 4] {
+        let last = simd.neon.vdupq_n_u32(last_word(table));
+        let clamped: [[u32; 4]; 2] = indices.map(|four| cast!(simd.neon.vminq_u32(cast!(four), last)));
+        let start = table.as_ptr();
+        let halves = clamped.map(|four| {
+            // SAFETY: the table is not empty and all indices were just clamped to its last one.
+            columns(simd, four.map(|index| unsafe { row(start, index) }))
+        });
+        std::array::from_fn(|column| halves.map(|columns| columns[column]))
+    }
+
+    /// Four rows turned into four columns.
+    #[inline(always)]
+    fn columns(simd: Neon, [r0, r1, r2, r3]: [f32x4; 4]) -> [f32x4; 4] {
+        let neon = simd.neon;
+        let (even01, odd01) = (neon.vtrn1q_f32(cast!(r0), cast!(r1)), neon.vtrn2q_f32(cast!(r0), cast!(r1)));
+        let (even23, odd23) = (neon.vtrn1q_f32(cast!(r2), cast!(r3)), neon.vtrn2q_f32(cast!(r2), cast!(r3)));
+        [
+            cast!(neon.vtrn1q_f64(cast!(even01), cast!(even23))),
+            cast!(neon.vtrn1q_f64(cast!(odd01), cast!(odd23))),
+            cast!(neon.vtrn2q_f64(cast!(even01), cast!(even23))),
+            cast!(neon.vtrn2q_f64(cast!(odd01), cast!(odd23))),
         ]
     }
 }
