@@ -22,7 +22,9 @@ pub enum BagError {
         source: io::Error,
     },
     /// Neither a file of a bag nor a folder that holds one.
-    #[error("{file}: expected a bag of ROS 2, a file ending in .mcap or .db3 or a folder of such, found {found}")]
+    #[error(
+        "{file}: expected a bag of ROS 2, a file ending in .mcap or .db3 or a folder of such, found {found}"
+    )]
     NoBag {
         /// Path as given.
         file: String,

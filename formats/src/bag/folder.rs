@@ -33,9 +33,7 @@ struct Document {
 
 /// The files of the bag in a folder, and what it says of itself.
 #[expect(clippy::type_complexity, reason = "two answers to one question")]
-pub(super) fn look(
-    folder: &Path,
-) -> io::Result<(Vec<PathBuf>, Result<Option<BagMetadata>, String>)> {
+pub(super) fn look(folder: &Path) -> io::Result<(Vec<PathBuf>, Result<Option<BagMetadata>, String>)> {
     let metadata = metadata(folder);
     if let Ok(Some(BagMetadata { files, .. })) = &metadata {
         // Older bags name their own folder, too, which may have been renamed since.
