@@ -17,6 +17,7 @@ mod kinodynamics;
 mod learned_map;
 mod orders;
 mod plant;
+mod play;
 mod replay;
 mod results;
 mod risk;
@@ -53,6 +54,7 @@ pub use kinodynamics::{
 pub use learned_map::{BenchLearnedMapArguments, NetworkSizes};
 pub use orders::{AlphaArguments, AskedRun, GoalArguments, PathArguments};
 pub use plant::BenchPlantArguments;
+pub use play::PlayArguments;
 pub use replay::ReplayArguments;
 pub use results::{JsonArguments, ResultArguments};
 pub use risk::BenchRiskArguments;
@@ -109,6 +111,9 @@ pub enum Command {
     /// Make every decision of a recording again, to the last bit
     #[command(long_about = replay::LONG_ABOUT)]
     Replay(ReplayArguments),
+    /// Feed a bag of ROS 2 through the pipeline, and show what it would have decided
+    #[command(long_about = play::LONG_ABOUT)]
+    Play(PlayArguments),
     /// Search a route over measured ground, and the fastest speeds along it
     #[command(long_about = route::LONG_ABOUT)]
     Route(RouteArguments),

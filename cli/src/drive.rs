@@ -4,7 +4,7 @@
 mod correction;
 pub(crate) mod knowledge;
 mod open_loop;
-mod record;
+pub(crate) mod record;
 pub(crate) mod scene;
 
 use std::collections::BTreeMap;
@@ -145,7 +145,8 @@ fn follow(
 ) -> anyhow::Result<Kept> {
     let [x_m, y_m, _] = scene.task.start;
     let progress = ProgressLine::new(scene.task.distance_to_goal_m(x_m, y_m));
-    let known = KnownRisk::new(&scene.task.world, scene.config.risk_resolution_m(), &scene.vehicle.limits);
+    let known =
+        KnownRisk::new(scene.task.world.bounds(), scene.config.risk_resolution_m(), &scene.vehicle.limits);
     let mut kept = Kept { tally: Tally::default(), known, walked: Vec::new() };
     let began = Instant::now();
     while closed.episode.outcome().is_none() {

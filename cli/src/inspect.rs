@@ -1,5 +1,6 @@
 //! `surefoot inspect`: what a file holds.
 
+mod bag;
 mod recording;
 
 use std::io::Write;
@@ -23,6 +24,9 @@ pub(crate) fn run(arguments: &InspectArguments) -> anyhow::Result<()> {
 }
 
 fn look(path: &Path) -> Result<Value, UsageError> {
+    if formats::Bag::is_at(path) {
+        return bag::look(path);
+    }
     if path.is_dir() {
         return networks(path);
     }
@@ -33,7 +37,7 @@ fn look(path: &Path) -> Result<Value, UsageError> {
         Some("toml") => vehicle(path),
         None if formats::shipped_vehicle_names().any(|name| Path::new(name) == path) => vehicle(path),
         _ => Err(UsageError(format!(
-            "{}: expected a recording, elevation, a vehicle or a folder with networks, found another file",
+            "{}: expected a recording, a bag of ROS 2, elevation, a vehicle or a folder with networks, found another file",
             path.display()
         ))),
     }

@@ -90,12 +90,14 @@ pub mod arguments;
 mod bench;
 mod collect;
 mod drive;
+mod drive_file;
 mod failure;
 mod gap;
 mod inspect;
 pub mod interrupt;
 mod orders;
 pub mod output;
+mod play;
 mod program;
 pub mod progress;
 mod replay;
@@ -168,6 +170,7 @@ fn dispatch(command: Command) -> anyhow::Result<()> {
         Command::Reset(run) => orders::tell(&run, &Order::Reset),
         Command::Alpha(alpha) => orders::alpha(&alpha),
         Command::Replay(replay) => replay::run(&replay),
+        Command::Play(play) => play::run(&play),
         Command::Route(route) => route::run(&route),
         Command::Inspect(inspect) => inspect::run(&inspect),
         Command::Gap { command } => gap::run(&command),

@@ -2,8 +2,8 @@
 
 mod learn;
 mod live;
-mod robot;
-mod roles;
+pub(crate) mod robot;
+pub(crate) mod roles;
 mod ros;
 
 use std::ffi::OsString;

@@ -184,7 +184,11 @@ fn recordings_that_will_not_do_are_refused_and_leave_nothing() {
         ("infinite.csv", "ground.npz", "infinite.csv:9: vx: expected a finite number or nothing, found inf"),
         ("lost.csv", "ground.npz", "expected the columns yaw too"),
         ("parked.csv", "ground.npz", "log: expected a vehicle that moves or is told to"),
-        ("good.txt", "ground.npz", "--log: expected a file ending in .csv or .mcap, found good.txt"),
+        (
+            "good.txt",
+            "ground.npz",
+            "--log: good.txt: expected a drive, a file ending in .csv or .mcap or a bag of ROS 2",
+        ),
     ];
     for (log, ground, part) in cases {
         let told = refuse(here, &["--log", log, "--elevation", ground, "--out", "out/data.safetensors"]);

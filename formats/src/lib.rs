@@ -16,6 +16,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod bag;
 mod cells;
 mod column_names;
 mod config;
@@ -36,6 +37,7 @@ mod skid_steer;
 mod traction_map;
 mod vehicle;
 
+pub use bag::{Bag, BagError, BagMetadata};
 pub use column_names::{ColumnNames, ColumnNamesError};
 pub use config::{ConfigError, ConfigText};
 pub use drive_log_csv::{

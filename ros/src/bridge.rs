@@ -236,7 +236,7 @@ fn name_of(order: &Order) -> &'static str {
     }
 }
 
-fn source_of(clock: RosClock) -> StampSource {
+pub(crate) fn source_of(clock: RosClock) -> StampSource {
     match clock {
         RosClock::TimeOfDay => StampSource::TimeOfDay,
         RosClock::Simulated => StampSource::Simulated,
@@ -245,7 +245,7 @@ fn source_of(clock: RosClock) -> StampSource {
 }
 
 /// By labels where the robot file says which; else what rises by more than half of the clearance is no ground.
-fn classes(ros: &RobotRos, vehicle: &Vehicle) -> Result<Classes, LabelsError> {
+pub(crate) fn classes(ros: &RobotRos, vehicle: &Vehicle) -> Result<Classes, LabelsError> {
     if let Some(labels) = &ros.labels {
         return Ok(Classes::Labels(ClassLabels::new(labels)?));
     }

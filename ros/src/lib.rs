@@ -9,6 +9,7 @@
 
 pub mod actuation;
 mod alarm;
+pub mod bag;
 pub mod bridge;
 pub mod cloud;
 mod complaints;

@@ -130,7 +130,7 @@ impl<M: Serialize> Voice<M> {
 }
 
 /// A topic's name from the root: those without a slash at their beginning lie below the namespace.
-fn absolute(namespace: &str, topic: &str) -> String {
+pub(crate) fn absolute(namespace: &str, topic: &str) -> String {
     if topic.starts_with('/') {
         topic.to_owned()
     } else {

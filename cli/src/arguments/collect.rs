@@ -51,13 +51,28 @@ pub struct CollectArguments {
     #[arg(long, value_name = "DATASET", help_heading = "Simulated drives")]
     pub harder_than: Option<PathBuf>,
 
-    /// A recorded drive instead of simulated ones: .csv or .mcap
+    /// A recorded drive instead of simulated ones: .csv, .mcap, or a bag of ROS 2
     #[arg(long, value_name = "FILE", requires = "elevation", help_heading = "Recorded drives")]
     pub log: Option<PathBuf>,
 
     /// The ground of the recorded drive: .npz, GeoTIFF or 16-bit PNG, in the frame of its poses
     #[arg(long, value_name = "FILE", requires = "log", help_heading = "Recorded drives")]
     pub elevation: Option<PathBuf>,
+
+    /// Topics of a log that is a bag, and columns of one in CSV that have names of their own, separated by commas:
+    /// odometry=/ekf/odom,command=/drive [default: the only one of a fitting type]
+    #[arg(
+        long,
+        value_name = "OURS=THEIRS,..",
+        value_delimiter = ',',
+        requires = "log",
+        help_heading = "Recorded drives"
+    )]
+    pub topics: Vec<String>,
+
+    /// Robot file whose part [ros] says topics, frames and clock of a log that is a bag
+    #[arg(long, value_name = "FILE", requires = "log", help_heading = "Recorded drives")]
+    pub robot: Option<PathBuf>,
 
     /// Where the elevation's south-west corner lies in the log's frame: x [m], y [m] [default: 0,0]
     #[arg(

@@ -55,7 +55,7 @@ pub struct GapDiagnoseArguments {
     #[arg(long, value_name = "VEHICLE", requires = "real", help_heading = "Drives without a case file")]
     pub vehicle: Option<String>,
 
-    /// Nominal drives: what the simulator did, .csv or .mcap
+    /// Nominal drives: what the simulator did: .csv, .mcap, or bags of ROS 2
     ///
     /// Without any, the gap to the bare kinematic bicycle is diagnosed: the physics that every vehicle has can then
     /// not be told from what this one adds.
@@ -63,7 +63,7 @@ pub struct GapDiagnoseArguments {
           help_heading = "Drives without a case file")]
     pub sim: Vec<PathBuf>,
 
-    /// Drives of the robot to find the cause in, .csv or .mcap
+    /// Drives of the robot to find the cause in: .csv, .mcap, or bags of ROS 2
     #[arg(long, value_name = "FILE", num_args = 1.., value_delimiter = ',', requires = "vehicle",
           help_heading = "Drives without a case file")]
     pub real: Vec<PathBuf>,
@@ -73,8 +73,10 @@ pub struct GapDiagnoseArguments {
           help_heading = "Drives without a case file")]
     pub heldout: Vec<PathBuf>,
 
-    /// Columns of CSV drives that have names of their own, separated by commas: ours=theirs
+    /// Columns of CSV drives that have names of their own, and topics of bags, separated by commas: ours=theirs
     ///
+    /// Of bags, odometry, command and imu are topics: odometry=/ekf/odom,command=/drive. Of those that are not named the
+    /// only one of a fitting type counts.
     /// Ours are t, run, x, y, z, roll, pitch, yaw, vx, vy, wz, cmd_speed, cmd_steer and the others of a drive log. A file
     /// without the named column is read as it is.
     #[arg(
@@ -84,6 +86,10 @@ pub struct GapDiagnoseArguments {
         help_heading = "Drives without a case file"
     )]
     pub map: Vec<String>,
+
+    /// Robot file whose part [ros] says topics, frames and clock of drives that are bags; --map goes before its topics
+    #[arg(long, value_name = "FILE", help_heading = "Drives without a case file")]
+    pub robot: Option<PathBuf>,
 
     /// Where the answer goes, besides the folder.
     #[command(flatten)]
@@ -203,6 +209,7 @@ Examples:
       Your own simulator decides: what it lacks, which of its parameters are off, and how
       far the gap shrinks in it.
   surefoot gap diagnose cases/own --map t=stamp,vx=wheel_speed
+  surefoot gap diagnose --vehicle rc_car --sim nominal_bag --real bag_1,bag_2 --map odometry=/odom,command=/drive
       Logs whose columns have names of their own.
   surefoot gap diagnose cases/nightly --fail-above 1.5 --json answer.json
       A gate for a build: exit code 3 once simulator and robot have come apart.

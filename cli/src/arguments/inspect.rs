@@ -8,7 +8,7 @@ use clap::Args;
 #[derive(Args, Clone, Debug)]
 #[command(after_long_help = AFTER_HELP)]
 pub struct InspectArguments {
-    /// A recording (.mcap), elevation (.npz, .tif, .png), a vehicle (.toml, or the name of a shipped one), or a folder
+    /// A recording (.mcap), a bag of ROS 2 (.mcap, .db3 or their folder), elevation (.npz, .tif, .png), a vehicle (.toml, or the name of a shipped one), or a folder
     /// with networks
     #[arg(value_name = "FILE")]
     pub file: PathBuf,
@@ -19,12 +19,13 @@ pub struct InspectArguments {
 }
 
 pub(super) const LONG_ABOUT: &str = "\
-Says what a file holds: topics, times and setup of a recording, also of one that breaks off; size and heights of an \
+Says what a file holds: topics, times and setup of a recording, also of one that breaks off; topics, types, counts and rates of a bag; size and heights of an \
 elevation map; the figures of a vehicle; method, training and size of networks.";
 
 const AFTER_HELP: &str = "\
 Examples:
   surefoot inspect surefoot-out/drive.mcap
+  surefoot inspect rosbag2_2026_01_01
   surefoot inspect rc_car
 
 Exit codes:

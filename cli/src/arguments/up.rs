@@ -6,11 +6,11 @@ use std::ops::RangeInclusive;
 use bus::ages::Periods;
 use bus::channel::{RunName, THIRD_PARTIES};
 use bus::status::Role;
-use clap::{Args, ValueEnum};
+use clap::{Args, FromArgMatches, ValueEnum};
 use formats::{CONTROL_RATES_HZ, ODOMETRY_RATES_HZ, RobotFile, SCAN_RATES_HZ, THIRD_PARTIES_MAX};
 
-use super::DriveArguments;
 use super::values;
+use super::{DriveArguments, Goal};
 
 /// Where the live view is served: on this machine, at the port that Foxglove looks for.
 pub const LIVE_DEFAULT: &str = "127.0.0.1:8765";
@@ -150,6 +150,17 @@ pub struct UpArguments {
 }
 
 impl UpArguments {
+    /// What `surefoot up --robot FILE` is told, with goals [m].
+    ///
+    /// # Errors
+    /// Words that the command line would refuse.
+    pub fn of_robot(robot: &std::path::Path, goals: &[Goal]) -> Result<Self, clap::Error> {
+        let words = ["up".into(), "--robot".into(), robot.as_os_str().to_owned()].into_iter();
+        let goals = goals.iter().map(|goal| format!("--goal={},{}", goal.x_m, goal.y_m).into());
+        let command = Self::augment_args(clap::Command::new("up"));
+        Self::from_arg_matches(&command.try_get_matches_from(words.chain(goals))?)
+    }
+
     /// How often the parts of the run speak.
     pub fn periods(&self) -> Periods {
         let Self { rate, odometry_rate, scan_rate, .. } = *self;

@@ -5,11 +5,12 @@ use std::path::Path;
 use bench::closed_loop::layers_of;
 use bench::collection::{Collection, Recorded, collect_recorded};
 use bicycle::{Column, DriveLog, Vehicle};
-use formats::{read_drive_log_csv, read_drive_log_mcap, read_elevation};
+use formats::read_elevation;
 
 use super::told;
 use crate::UsageError;
 use crate::arguments::{CollectArguments, Goal};
+use crate::drive_file::{self, Mapping};
 
 /// Reads both files and labels what was driven.
 pub(super) fn gather(
@@ -19,7 +20,7 @@ pub(super) fn gather(
     elevation: &Path,
 ) -> anyhow::Result<Collection> {
     let source = Recorded { log: log.display().to_string(), ground: elevation.display().to_string() };
-    let mut log = read_log(log)?;
+    let mut log = read_log(arguments, log)?;
     if let Some(Goal { x_m, y_m }) = arguments.elevation_origin {
         log = moved(&log, [-x_m, -y_m])?;
     }
@@ -40,20 +41,11 @@ fn moved(log: &DriveLog, [east_m, north_m]: [f64; 2]) -> Result<DriveLog, UsageE
     Ok(moved)
 }
 
-fn read_log(path: &Path) -> Result<DriveLog, UsageError> {
-    let extension = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
-    match extension.as_str() {
-        "csv" => Ok(read_drive_log_csv(path).map_err(UsageError::from_input)?.log),
-        "mcap" => {
-            let read = read_drive_log_mcap(path).map_err(UsageError::from_input)?;
-            if let Some(problem) = read.ended_early {
-                eprintln!("surefoot: {}: the recording ends early, {problem}", path.display());
-            }
-            Ok(read.log)
-        }
-        _ => Err(UsageError(format!(
-            "--log: expected a file ending in .csv or .mcap, found {}",
-            path.display()
-        ))),
-    }
+fn read_log(arguments: &CollectArguments, path: &Path) -> Result<DriveLog, UsageError> {
+    let mapping = Mapping::of("--topics", &arguments.topics, arguments.robot.as_deref())?;
+    let mut doubts = Vec::new();
+    let log = drive_file::read(path, &mapping, &mut doubts)
+        .map_err(|UsageError(problem)| UsageError(format!("--log: {problem}")))?;
+    doubts.iter().for_each(|doubt| eprintln!("surefoot: {doubt}"));
+    Ok(log)
 }

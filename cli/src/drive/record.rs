@@ -6,7 +6,7 @@ use std::path::Path;
 use bench::closed_loop::{ClosedLoop, Cycle};
 use bicycle::State;
 use formats::{DriveRecorder, RecordError};
-use scenarios::{Observation, World};
+use scenarios::{Bounds, Observation, World};
 use terrain::{GridGeometry, GridMap, Pose};
 use traversability::{GroundFlags, RiskMapView};
 
@@ -87,8 +87,8 @@ impl Recording {
     }
 }
 
-/// The risk of every place as it was last known, over the whole world.
-pub(super) struct KnownRisk {
+/// The risk of every place as it was last known.
+pub(crate) struct KnownRisk {
     /// Worst expected linear traction, zero in headings that break a limit, mean over all headings; NaN where the
     /// ground was never known.
     pub traction: GridMap<f32>,
@@ -99,8 +99,7 @@ pub(super) struct KnownRisk {
 }
 
 impl KnownRisk {
-    pub fn new(world: &World, resolution_m: f64, limits: &bicycle::Limits) -> Self {
-        let bounds = world.bounds();
+    pub fn new(bounds: Bounds, resolution_m: f64, limits: &bicycle::Limits) -> Self {
         let first = bounds.south_west_m.map(|edge_m| (edge_m / resolution_m).floor() as i64);
         let last = bounds.north_east_m.map(|edge_m| (edge_m / resolution_m).ceil() as i64);
         let [n_cols, n_rows] = [0, 1].map(|axis| (last[axis] - first[axis]) as usize);

@@ -98,9 +98,9 @@ fn diagnosed_against(
 }
 
 fn read(request: &Request, doubts: &mut Vec<String>) -> Result<Case, UsageError> {
-    let names = &request.names;
+    let mapping = &request.mapping;
     let (sim, real) =
-        (drives::read(&request.sim, names, doubts)?, drives::read(&request.real, names, doubts)?);
+        (drives::read(&request.sim, mapping, doubts)?, drives::read(&request.real, mapping, doubts)?);
     let machine = machine::read(&request.vehicle, &[&sim.logs[..], &real.logs[..]].concat())?;
     Case::screened(machine, sim, real, doubts).map_err(UsageError::from_input)
 }
@@ -112,7 +112,7 @@ fn open_heldout(
     doubts: &mut Vec<String>,
 ) -> Result<Verified, UsageError> {
     let Diagnosed { case, baseline, diagnosis } = *diagnosed;
-    let heldout = drives::read(&request.heldout, &request.names, doubts)?;
+    let heldout = drives::read(&request.heldout, &request.mapping, doubts)?;
     let heldout = case.heldout(heldout, doubts).map_err(UsageError::from_input)?;
     let judged = || verify(baseline, &case.machine, diagnosis, &heldout.logs);
     let verification =

@@ -2,10 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
-use formats::ColumnNames;
+use formats::Bag;
 
 use crate::UsageError;
 use crate::arguments::GapDiagnoseArguments;
+use crate::drive_file::Mapping;
 
 /// Which file or name stands for the vehicle, and which files hold its drives.
 #[derive(Clone, Debug, PartialEq)]
@@ -16,23 +17,22 @@ pub(super) struct Request {
     pub sim: Vec<PathBuf>,
     pub real: Vec<PathBuf>,
     pub heldout: Vec<PathBuf>,
-    /// What columns of CSV drives are called.
-    pub names: ColumnNames,
+    /// What columns of CSV drives and topics of bags are called.
+    pub mapping: Mapping,
 }
 
 impl Request {
     pub(super) fn of(arguments: &GapDiagnoseArguments) -> Result<Self, UsageError> {
-        let names = ColumnNames::parse(arguments.map.iter().map(String::as_str))
-            .map_err(|error| UsageError(format!("--map: {error}")))?;
+        let mapping = Mapping::of("--map", &arguments.map, arguments.robot.as_deref())?;
         let request = match (&arguments.case, &arguments.vehicle) {
-            (Some(case), _) => Self { names, ..Self::of_case(case)? },
+            (Some(case), _) => Self { mapping, ..Self::of_case(case)? },
             (None, vehicle) => Self {
                 name: None,
                 vehicle: vehicle.clone().unwrap_or_default(),
                 sim: arguments.sim.clone(),
                 real: arguments.real.clone(),
                 heldout: arguments.heldout.clone(),
-                names,
+                mapping,
             },
         };
         request.check()?;
@@ -47,14 +47,14 @@ impl Request {
             sim: case.sim,
             real: case.real,
             heldout: case.heldout,
-            names: ColumnNames::default(),
+            mapping: Mapping::default(),
         })
     }
 
     /// Every drive's file stands where it is said to and is named once. The held-out ones are not opened for it.
     fn check(&self) -> Result<(), UsageError> {
         let drives: Vec<&PathBuf> = self.sim.iter().chain(&self.real).chain(&self.heldout).collect();
-        if let Some(missing) = drives.iter().find(|path| !path.is_file()) {
+        if let Some(missing) = drives.iter().find(|path| !path.is_file() && !Bag::is_at(path)) {
             return Err(UsageError(format!("{}: expected a file, found none", missing.display())));
         }
         let repeated = (0..drives.len()).find(|&drive| drives[..drive].contains(&drives[drive]));
@@ -100,7 +100,7 @@ mod tests {
             sim: vec!["a/real_1.csv".into(), "surreal.csv".into()],
             real: vec!["sim_real/drive.csv".into(), "SIM-2.csv".into()],
             heldout: Vec::new(),
-            names: ColumnNames::default(),
+            mapping: Mapping::default(),
         };
         let told = request.doubtful_names().unwrap();
         let expected = [
@@ -118,7 +118,7 @@ mod tests {
             sim: sim.iter().map(PathBuf::from).collect(),
             real: real.iter().map(PathBuf::from).collect(),
             heldout: Vec::new(),
-            names: ColumnNames::default(),
+            mapping: Mapping::default(),
         };
         let told = with(&["real_1.csv", "real_2.csv"], &["sim_1.csv"]).doubtful_names().unwrap_err().0;
         assert!(told.contains("found them swapped? real_1.csv: given as a nominal drive"), "{told}");
@@ -137,7 +137,7 @@ mod tests {
             sim: vec![sim.to_owned()],
             real: vec![real.to_owned()],
             heldout: Vec::new(),
-            names: ColumnNames::default(),
+            mapping: Mapping::default(),
         };
         let told = with(&file, &file).check().unwrap_err().0;
         assert!(told.ends_with("d.csv: expected each drive once, found it twice"), "{told}");

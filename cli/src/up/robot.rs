@@ -16,7 +16,7 @@ use crate::drive::scene::{self, Machine};
 const TOLERANCE_LENGTHS: f64 = 0.3;
 
 /// The arguments with what the robot's file says in them; without a file, as they are.
-pub(super) fn described(arguments: &UpArguments) -> Result<UpArguments, UsageError> {
+pub(crate) fn described(arguments: &UpArguments) -> Result<UpArguments, UsageError> {
     let mut arguments = arguments.clone();
     let Some(path) = &arguments.robot else { return Ok(arguments) };
     let robot = read_robot(path).map_err(UsageError::from_input)?;
@@ -100,14 +100,14 @@ fn roles_of(robot: &RobotFile) -> Result<Vec<Role>, String> {
 }
 
 /// How often the parts of the run speak.
-pub(super) fn periods(arguments: &UpArguments) -> Periods {
+pub(crate) fn periods(arguments: &UpArguments) -> Periods {
     let periods = arguments.periods();
     let mission_hz = arguments.described.as_ref().and_then(|robot| robot.rates.mission_hz);
     Periods { mission_s: mission_hz.map_or(periods.mission_s, f64::recip), ..periods }
 }
 
 /// The ages that are asked for.
-pub(super) fn ages(arguments: &UpArguments) -> AskedAges {
+pub(crate) fn ages(arguments: &UpArguments) -> AskedAges {
     let of_words = AskedAges::of_command(arguments.command_age);
     arguments.described.as_ref().map_or(of_words, |robot| {
         let ages = &robot.ages;
@@ -122,7 +122,7 @@ pub(super) fn ages(arguments: &UpArguments) -> AskedAges {
 }
 
 /// The machine, with a guard that its configuration may change; of a robot, with its limits, sensors and areas.
-pub(super) fn machine(arguments: &UpArguments, guard: GuardConfig) -> Result<Machine, UsageError> {
+pub(crate) fn machine(arguments: &UpArguments, guard: GuardConfig) -> Result<Machine, UsageError> {
     let Some(robot) = &arguments.described else { return scene::machine(&arguments.drive, guard) };
     let mut vehicle = read_vehicle(&robot.vehicle).map_err(UsageError::from_input)?;
     lower(&mut vehicle.limits, &robot.safety);
@@ -154,7 +154,7 @@ fn lower(limits: &mut bicycle::Limits, safety: &RobotSafety) {
 }
 
 /// How near to a goal counts as there [m]; `None` where a simulated world says it.
-pub(super) fn tolerance_m(arguments: &UpArguments, machine: &Machine) -> Option<f64> {
+pub(crate) fn tolerance_m(arguments: &UpArguments, machine: &Machine) -> Option<f64> {
     let of_length = TOLERANCE_LENGTHS * machine.vehicle.geometry.length_m;
     arguments.drive.tolerance.or(arguments.described.as_ref().map(|_| of_length))
 }

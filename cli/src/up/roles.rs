@@ -242,7 +242,7 @@ fn level(arguments: &UpArguments) -> Result<CvarLevel, UsageError> {
 }
 
 /// What the method believes of the ground, and which networks that takes.
-fn belief(machine: &Machine) -> anyhow::Result<(Belief, u64)> {
+pub(crate) fn belief(machine: &Machine) -> anyhow::Result<(Belief, u64)> {
     let knowledge = &machine.knowledge;
     Ok(match (knowledge.method.learned(), &knowledge.networks) {
         (Some((_, unfamiliar)), Some(networks)) => {

@@ -149,6 +149,7 @@ pub struct TfMessage {
 named! {
     PoseStamped = "geometry_msgs" / "PoseStamped";
     PoseArray = "geometry_msgs" / "PoseArray";
+    Twist = "geometry_msgs" / "Twist";
     TwistStamped = "geometry_msgs" / "TwistStamped";
     TfMessage = "tf2_msgs" / "TFMessage";
 }

@@ -1,0 +1,209 @@
+//! Bags of ROS 2 of both storages, whole, cut off and damaged.
+
+#![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
+
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::BufWriter;
+use std::path::Path;
+
+use formats::{Bag, RecordedMessage};
+use rusqlite::{Connection, params};
+
+/// The tables of rosbag2, as far as its readers need them.
+const TABLES: &str = "
+    CREATE TABLE topics(id INTEGER PRIMARY KEY, name TEXT NOT NULL, type TEXT NOT NULL,
+        serialization_format TEXT NOT NULL, offered_qos_profiles TEXT NOT NULL);
+    CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER NOT NULL, timestamp INTEGER NOT NULL,
+        data BLOB NOT NULL);
+    CREATE INDEX timestamp_idx ON messages (timestamp ASC);
+    INSERT INTO topics VALUES (1, '/odom', 'nav_msgs/msg/Odometry', 'cdr', '');";
+
+/// What the message of a number holds: as much as odometry.
+fn payload(number: u64) -> Vec<u8> {
+    number.to_le_bytes().repeat(90)
+}
+
+fn write_database(path: &Path, numbers: std::ops::Range<u64>) {
+    let mut connection = Connection::open(path).unwrap();
+    connection.execute_batch(TABLES).unwrap();
+    let transaction = connection.transaction().unwrap();
+    for number in numbers {
+        let row = params![number as i64 * 10, payload(number)];
+        transaction
+            .execute("INSERT INTO messages(topic_id, timestamp, data) VALUES (1, ?1, ?2)", row)
+            .unwrap();
+    }
+    transaction.commit().unwrap();
+}
+
+fn write_mcap(path: &Path, numbers: std::ops::Range<u64>, compression: Option<mcap::Compression>) {
+    let options = mcap::WriteOptions::new().compression(compression).chunk_size(Some(4096)).profile("ros2");
+    let mut writer = options.create(BufWriter::new(File::create(path).unwrap())).unwrap();
+    let schema = writer.add_schema("nav_msgs/msg/Odometry", "ros2msg", b"").unwrap();
+    let channel = writer.add_channel(schema, "/odom", "cdr", &BTreeMap::new()).unwrap();
+    for number in numbers {
+        let header = mcap::records::MessageHeader {
+            channel_id: channel,
+            sequence: number as u32,
+            log_time: number * 10,
+            publish_time: number * 10,
+        };
+        writer.write_to_known_channel(&header, &payload(number)).unwrap();
+    }
+    writer.finish().unwrap();
+}
+
+fn write_metadata(folder: &Path, n_messages: u64, files: &[&str]) {
+    let listed: String = files.iter().map(|file| format!("    - {file}\n")).collect();
+    let text = format!(
+        "rosbag2_bagfile_information:\n  version: 9\n  storage_identifier: mcap\n  message_count: {n_messages}\n  \
+         duration:\n    nanoseconds: 5\n  compression_mode: ''\n  relative_file_paths:\n{listed}"
+    );
+    std::fs::write(folder.join("metadata.yaml"), text).unwrap();
+}
+
+/// The numbers of all messages, each checked to be what was written, and where the bag ends.
+fn read(path: &Path) -> (Vec<u64>, Option<String>) {
+    let mut numbers = Vec::new();
+    let ended_early = Bag::open(path).unwrap().take_all(|message: RecordedMessage| {
+        let number = message.log_time_ns / 10;
+        assert_eq!(message.data, payload(number));
+        let channel = &message.channel;
+        assert_eq!((channel.topic.as_str(), channel.encoding.as_str()), ("/odom", "cdr"));
+        assert_eq!(channel.schema, "nav_msgs/msg/Odometry");
+        numbers.push(number);
+        Ok(())
+    });
+    (numbers, ended_early)
+}
+
+fn up_to(n: u64) -> Vec<u64> {
+    (0..n).collect()
+}
+
+#[test]
+fn every_storage_gives_the_same_messages() {
+    let folder = tempfile::tempdir().unwrap();
+    for compression in [None, Some(mcap::Compression::Lz4), Some(mcap::Compression::Zstd)] {
+        let path = folder.path().join("drive.mcap");
+        write_mcap(&path, 0..100, compression);
+        assert_eq!(read(&path), (up_to(100), None), "{compression:?}");
+        assert!(Bag::is_at(&path));
+    }
+    let path = folder.path().join("drive.db3");
+    write_database(&path, 0..100);
+    assert_eq!(read(&path), (up_to(100), None));
+    assert!(Bag::is_at(&path));
+}
+
+#[test]
+fn files_of_a_folder_follow_one_another_by_their_numbers() {
+    let folder = tempfile::tempdir().unwrap();
+    for file in 0..11 {
+        write_mcap(&folder.path().join(format!("drive_{file}.mcap")), 5 * file..5 * file + 5, None);
+    }
+    assert_eq!(read(folder.path()), (up_to(55), None), "drive_10 is the last");
+}
+
+#[test]
+fn the_metadata_says_the_order_and_how_much_there_was() {
+    let folder = tempfile::tempdir().unwrap();
+    write_mcap(&folder.path().join("b.mcap"), 0..3, None);
+    write_mcap(&folder.path().join("a.mcap"), 3..5, None);
+    write_metadata(folder.path(), 5, &["old_name/b.mcap", "a.mcap"]);
+    assert_eq!(read(folder.path()), (up_to(5), None));
+    write_metadata(folder.path(), 7, &["b.mcap", "a.mcap"]);
+    let (numbers, ended_early) = read(folder.path());
+    assert_eq!(numbers, up_to(5));
+    assert_eq!(ended_early.unwrap(), "after 5 messages: metadata.yaml promises 7");
+    write_metadata(folder.path(), 5, &["b.mcap", "gone.mcap"]);
+    let (numbers, ended_early) = read(folder.path());
+    assert_eq!(numbers, up_to(3));
+    assert!(ended_early.unwrap().starts_with("after 3 messages, in gone.mcap: "));
+}
+
+#[test]
+fn metadata_that_is_none_is_not_needed() {
+    let folder = tempfile::tempdir().unwrap();
+    write_database(&folder.path().join("drive_0.db3"), 0..5);
+    std::fs::write(folder.path().join("metadata.yaml"), "rosbag2_bagfile_information: [").unwrap();
+    assert_eq!(read(folder.path()), (up_to(5), None));
+    let bag = Bag::open(folder.path()).unwrap();
+    let problem = bag.metadata().unwrap_err();
+    assert!(problem.starts_with("metadata.yaml: expected what rosbag2 writes, found: "), "{problem}");
+    assert!(!problem.contains('\n'), "one line");
+}
+
+/// What is whole of a file that is cut off after a share of its bytes, and where it ends.
+fn cut(path: &Path, share: f64) -> (Vec<u64>, String) {
+    let n_bytes = (std::fs::metadata(path).unwrap().len() as f64 * share) as u64;
+    File::options().write(true).open(path).unwrap().set_len(n_bytes).unwrap();
+    let (numbers, ended_early) = read(path);
+    (numbers, ended_early.unwrap())
+}
+
+#[test]
+fn a_bag_that_is_cut_off_gives_what_is_whole() {
+    let folder = tempfile::tempdir().unwrap();
+    let writers: [(&str, &dyn Fn(&Path)); 2] = [
+        ("drive.mcap", &|path| write_mcap(path, 0..1000, None)),
+        ("drive.db3", &|path| write_database(path, 0..1000)),
+    ];
+    for (name, write) in writers {
+        let path = folder.path().join(name);
+        write(&path);
+        let (numbers, ended) = cut(&path, 0.5);
+        assert!((300..700).contains(&numbers.len()), "{name}: {}", numbers.len());
+        assert_eq!(numbers, up_to(numbers.len() as u64), "{name}");
+        assert!(ended.starts_with(&format!("after {} messages, in {name}: ", numbers.len())), "{ended}");
+        let (numbers, ended) = cut(&path, 0.001);
+        assert!(numbers.is_empty() && ended.starts_with("after 0 messages"), "{name}: {ended}");
+    }
+}
+
+#[test]
+fn a_bag_that_is_damaged_gives_what_comes_before() {
+    let folder = tempfile::tempdir().unwrap();
+    for name in ["drive.mcap", "drive.db3"] {
+        let path = folder.path().join(name);
+        match name {
+            "drive.mcap" => write_mcap(&path, 0..1000, None),
+            _ => write_database(&path, 0..1000),
+        }
+        let mut bytes = std::fs::read(&path).unwrap();
+        let middle = bytes.len() / 2;
+        bytes[middle..middle + 20_000].fill(0xa5);
+        std::fs::write(&path, bytes).unwrap();
+        let (numbers, ended) = read(&path);
+        assert!((300..700).contains(&numbers.len()), "{name}: {}", numbers.len());
+        assert!(ended.unwrap().contains(name));
+    }
+}
+
+#[test]
+fn what_is_no_bag_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let told = |name: &str| Bag::open(&folder.path().join(name)).unwrap_err().to_string();
+    assert!(told("").ends_with("found a folder without any"), "{}", told(""));
+    assert!(told("absent.mcap").contains("expected a readable bag, found: "), "{}", told("absent.mcap"));
+    std::fs::write(folder.path().join("drive.bag"), "#ROSBAG V2.0\n").unwrap();
+    assert!(told("drive.bag").ends_with("found another ending"), "{}", told("drive.bag"));
+    let other = folder.path().join("other.db3");
+    Connection::open(&other).unwrap().execute_batch("CREATE TABLE songs(name TEXT)").unwrap();
+    assert!(read(&other).1.unwrap().contains("no such table: topics"));
+    std::fs::write(&other, "a text").unwrap();
+    assert!(read(&other).1.unwrap().contains("not a database"));
+}
+
+#[test]
+fn a_message_of_no_topic_ends_the_bag() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("drive.db3");
+    write_database(&path, 0..3);
+    let connection = Connection::open(&path).unwrap();
+    connection.execute("INSERT INTO messages(topic_id, timestamp, data) VALUES (7, 30, x'00')", []).unwrap();
+    let (numbers, ended) = read(&path);
+    assert_eq!(numbers, up_to(3));
+    assert!(ended.unwrap().ends_with("expected a message on a known topic, found one on topic number 7"));
+}
