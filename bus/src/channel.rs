@@ -84,10 +84,10 @@ pub const SCAN: Channel<ScanHeader, PointRecord> =
     Channel { name: "scan", depth: 2, history: 0, n_readers: 2, check: payload::check_scan };
 /// The map of the ground: mapping.
 pub const SURFACE: Channel<SurfaceHeader, [f32; 8]> =
-    Channel { name: "surface", depth: 2, history: 0, n_readers: 3, check: payload::check_surface };
+    Channel { name: "surface", depth: 2, history: 0, n_readers: 4, check: payload::check_surface };
 /// What moves: mapping, after every scan, where the settings say how it is dealt with.
 pub const TRACKS: Channel<TracksHeader, TrackRecord> =
-    Channel { name: "tracks", depth: 4, history: 0, n_readers: 2, check: payload::check_tracks };
+    Channel { name: "tracks", depth: 4, history: 0, n_readers: 3, check: payload::check_tracks };
 /// The risk map of what was learned: learning.
 pub const RISK: Channel<RiskHeader, [f32; 4]> =
     Channel { name: "risk", depth: 1, history: 0, n_readers: 4, check: payload::check_risk };

@@ -11,6 +11,7 @@ use bus::watchdog::Watchdog;
 pub struct Actuation {
     watchdog: Watchdog,
     steering_rate_max_radps: f64,
+    speed_limit_mps: f32,
     is_stopped: bool,
     applied: Applied,
     /// Where the front wheels are by what they were told, and when [rad], [ns].
@@ -38,6 +39,7 @@ impl Actuation {
             applied: *watchdog.applied(),
             watchdog,
             steering_rate_max_radps: limits.steering_rate_max_radps,
+            speed_limit_mps: f32::INFINITY,
             is_stopped: false,
             steering: (0.0, 0),
             decided_on_ns: 0,
@@ -63,10 +65,23 @@ impl Actuation {
         self.is_stopped = false;
     }
 
+    /// From now on the vehicle is told no greater speed, either way [m/s]; as one that holds itself back, it says so with
+    /// its odometry, and the next plan starts from there.
+    pub fn limit_speed(&mut self, speed_limit_mps: f64) {
+        self.speed_limit_mps = speed_limit_mps as f32;
+    }
+
     /// What the vehicle is to be told now.
     pub fn carry_out(&mut self, now_ns: u64) -> Told {
         let mut decision = self.watchdog.carry_out(now_ns);
         let mut next = *self.watchdog.applied();
+        let limit_mps = self.speed_limit_mps;
+        if next.command.speed_mps.abs() > limit_mps {
+            let speed_mps = next.command.speed_mps.clamp(-limit_mps, limit_mps);
+            let command = Command { speed_mps, ..next.command };
+            (decision, next) =
+                (Decision::Drive(command), Applied { command, since_ns: now_ns, by: AppliedBy::Vehicle });
+        }
         if self.is_stopped {
             decision = Decision::Stop(StopReason::EmergencyStop);
             let command = decision.command(self.applied.command);
@@ -164,6 +179,22 @@ mod tests {
         actuation.release();
         assert_eq!(actuation.carry_out(11 * STEP_NS).command.speed_mps, 1.0);
         assert_eq!(actuation.complete(OdometryRecord::default(), 11 * STEP_NS).applied_by, 0);
+    }
+
+    #[test]
+    fn no_command_is_faster_than_the_limit_and_odometry_tells_of_it() {
+        let mut actuation = actuation();
+        actuation.limit_speed(0.25);
+        let mut told_mps = |speed_mps: f32, step: u64| {
+            actuation.admit(&drive(speed_mps, 0.2, step * STEP_NS), step * STEP_NS);
+            let told = actuation.carry_out(step * STEP_NS).command;
+            let record = actuation.complete(OdometryRecord::default(), step * STEP_NS);
+            assert_eq!((record.applied_speed_mps, told.steering_rad), (told.speed_mps, 0.2));
+            (told.speed_mps, record.applied_by)
+        };
+        assert_eq!(told_mps(1.0, 10), (0.25, 1));
+        assert_eq!(told_mps(-0.5, 11), (-0.25, 1));
+        assert_eq!(told_mps(0.125, 12), (0.125, 0));
     }
 
     #[test]

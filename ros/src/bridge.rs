@@ -1,7 +1,9 @@
 //! The node beside the bus: what comes from the robot goes in, what is decided goes out.
 
 mod hearing;
+mod heights;
 mod saying;
+mod services;
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -22,10 +24,12 @@ use crate::intake::Intake;
 use crate::node::{Node, NodeError};
 use crate::odometry::Frames;
 use crate::orders::{Director, Order, Orders};
+use crate::parameters::{Change, Parameters};
 use crate::stamps::{Arrival, StampClock, StampSource};
 use crate::transforms::Transforms;
 use hearing::Ears;
 use saying::Voices;
+use services::Services;
 
 /// Longest time between two looks at the bus [ns].
 const POLL_NS: u64 = 5_000_000;
@@ -60,6 +64,10 @@ pub struct BridgeSetup<'a> {
     pub periods: Periods,
     /// How old what is followed may be.
     pub ages: AgeLimits,
+    /// Share of the worst outcomes that the run was started to plan for, in (0, 1].
+    pub alpha: f64,
+    /// Who judges the ground, as `--method` names it.
+    pub method: String,
     /// Who may hear the node.
     pub discovery: Discovery,
     /// Who says orders to the mission.
@@ -98,16 +106,27 @@ struct Bridge {
     meter: Meter,
     command_period_ns: u64,
     commanded_at_ns: u64,
-    path_speed_mps: f64,
+    services: Services,
 }
 
 impl Bridge {
     fn new(bus: &Bus, setup: BridgeSetup<'_>) -> Result<Self, BridgeError> {
-        let BridgeSetup { ros, vehicle, sensors, periods, ages, discovery, director } = setup;
+        let BridgeSetup { ros, vehicle, sensors, periods, ages, discovery, alpha, method, director } = setup;
         let mut node = Node::join(discovery, &ros.namespace, &ros.node)?;
         let transforms = Transforms::new(clock::nanoseconds(ros.transform_age_max_s));
-        let frames = Frames { map: ros.map_frame.clone(), vehicle: ros.vehicle_frame.clone() };
+        let frames = Frames { map: ros.frame(&ros.map_frame), vehicle: ros.frame(&ros.vehicle_frame) };
+        let sensors = sensors.iter().map(|sensor| ros.frame(sensor)).collect();
+        let speed_max_mps = vehicle.limits.speed_max_mps;
+        let parameters = Parameters {
+            alpha,
+            method,
+            path_speed_mps: ros.path_speed_mps,
+            speed_limit_mps: speed_max_mps,
+            speed_max_mps,
+            use_sim_time: ros.clock == RosClock::Simulated,
+        };
         let stamps = StampClock::new(source_of(ros.clock));
+        let services = Services::new(&mut node, parameters)?;
         Ok(Self {
             ears: Ears::new(bus, &mut node, &ros.topics)?,
             voices: Voices::new(bus, &mut node, ros, vehicle, &periods)?,
@@ -123,7 +142,7 @@ impl Bridge {
             meter: Meter::new(bus, Role::Ros)?,
             command_period_ns: clock::nanoseconds(ros.command_hz.recip()),
             commanded_at_ns: 0,
-            path_speed_mps: ros.path_speed_mps,
+            services,
         })
     }
 
@@ -139,13 +158,29 @@ impl Bridge {
             is_new = true;
         });
         self.missions.poll(|_, records| *mission = records.last().copied().or(*mission));
+        self.mission.iter().for_each(|mission| self.services.follow(mission));
         let now_ns = clock::now_ns();
+        self.set_parameters(now_ns, tell)?;
         if is_new || now_ns.saturating_sub(self.commanded_at_ns) >= self.command_period_ns {
             self.meter.count(now_ns.saturating_sub(self.commanded_at_ns + self.command_period_ns));
             self.command(now_ns)?;
         }
         self.show(now_ns)?;
         self.report(now_ns)
+    }
+
+    /// Does what was asked for by parameters.
+    fn set_parameters(&mut self, now_ns: u64, tell: &mut dyn FnMut(&str)) -> Result<(), BridgeError> {
+        let stamp_ns = self.intake.clock().stamp_ns(now_ns, arrival()).unwrap_or_default();
+        for change in self.services.answer(stamp_ns)? {
+            match change {
+                Change::Alpha(alpha) if self.orders.say(Order::Tolerate(alpha)) => self.services.note_asked(),
+                Change::Alpha(_) => tell("alpha: expected no more orders than the mission can answer"),
+                Change::SpeedLimit(speed_mps) => self.actuation.limit_speed(speed_mps),
+                Change::PathSpeed(_) => {}
+            }
+        }
+        Ok(())
     }
 
     /// Says what the vehicle is to do now.
@@ -169,6 +204,7 @@ impl Bridge {
         let stamp_ns = |at_ns: u64| stamps.stamp_ns(at_ns, arrival());
         self.voices.plan(&stamp_ns)?;
         self.voices.maps(&stamp_ns)?;
+        self.voices.moving(&stamp_ns)?;
         let diagnosis = saying::Diagnosis {
             decision: self.decision,
             mission: self.mission,
@@ -181,6 +217,9 @@ impl Bridge {
 
     fn follow_answers(&mut self, tell: &mut dyn FnMut(&str)) {
         for (order, answer) in self.orders.answers() {
+            if matches!(order, Order::Tolerate(_)) {
+                self.services.note_answered();
+            }
             match answer {
                 Ok(mission) => tell(&format!("{}: {mission}", name_of(&order))),
                 Err(problem) => tell(&format!("{}: {problem}", name_of(&order))),
@@ -229,6 +268,7 @@ fn name_of(order: &Order) -> &'static str {
     match order {
         Order::Goals(_) => "goal",
         Order::Path { .. } => "path",
+        Order::Tolerate(_) => "alpha",
         Order::Pause => "pause",
         Order::Resume => "resume",
         Order::EmergencyStop => "emergency stop",

@@ -20,6 +20,7 @@ pub mod message;
 mod node;
 pub mod odometry;
 pub mod orders;
+pub mod parameters;
 pub mod rigid;
 pub mod stamps;
 pub mod telling;

@@ -1,12 +1,14 @@
 //! The ROS 2 messages that are spoken, field by field in the order of their definitions, which is that of their bytes.
 //!
-//! Definitions are those of ROS 2 Jazzy; the ones here have not changed since Foxy. A message's name on the wire is its
+//! Definitions are those of ROS 2 Jazzy; the ones here have not changed since Humble. A message's name on the wire is its
 //! package and type, [`Named`].
 
 mod diagnostic;
 mod geometry;
+mod grid_map;
 mod navigation;
 mod sensor;
+mod visualization;
 
 use serde::{Deserialize, Serialize};
 
@@ -15,8 +17,10 @@ pub use geometry::{
     Point, Pose, PoseArray, PoseStamped, PoseWithCovariance, Quaternion, TfMessage, Transform,
     TransformStamped, Twist, TwistStamped, TwistWithCovariance, Vector3,
 };
+pub use grid_map::{Float32MultiArray, GridMap, GridMapInfo, MultiArrayDimension, MultiArrayLayout};
 pub use navigation::{AckermannDrive, AckermannDriveStamped, MapMetaData, OccupancyGrid, Odometry, Path};
 pub use sensor::{Imu, PointCloud2, PointField};
+pub use visualization::{ColorRgba, CompressedImage, Duration, Marker, MarkerArray, MeshFile, UvCoordinate};
 
 /// A message by its name in ROS.
 pub trait Named {
@@ -85,6 +89,7 @@ pub struct Clock {
 named! {
     Bool = "std_msgs" / "Bool";
     Clock = "rosgraph_msgs" / "Clock";
+    ros2_client::parameters::raw::ParameterEvent = "rcl_interfaces" / "ParameterEvent";
 }
 
 #[cfg(test)]

@@ -3,8 +3,12 @@
 use std::net::{IpAddr, Ipv4Addr};
 
 use ros2_client::qos::{Durability, History, QosProfile, WhenFull};
-use ros2_client::{Context, Gid, MessageTypeName, Name, NodeName, NodeOptions, Publisher, Subscription};
+use ros2_client::{
+    Context, Gid, Message, MessageTypeName, Name, NodeName, NodeOptions, Publisher, Server, ServiceMapping,
+    ServiceTypeName, Subscription,
+};
 use rustdds::DomainParticipantBuilder;
+use rustdds::mio1::event::Source;
 use rustdds::mio1::{Events, Interest, Poll, Token};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -15,6 +19,8 @@ use crate::message::Named;
 
 /// Messages of one topic that are taken in at one look: whoever floods a topic keeps no other waiting.
 const BATCH: usize = 64;
+/// Requests of a service that wait.
+const REQUESTS: usize = 16;
 
 /// Why there is no node, or no topic of it. Every message is one line.
 #[derive(Debug, thiserror::Error)]
@@ -129,6 +135,32 @@ impl<M: Serialize> Voice<M> {
     }
 }
 
+/// A service that is offered.
+pub(crate) struct Service<Q: Message, A: Message> {
+    name: String,
+    server: Server<Q, A>,
+}
+
+impl<Q: Message + 'static, A: Message + 'static> Service<Q, A> {
+    /// Answers what has been asked. What cannot be read is asked in vain: nobody knows whom to answer.
+    pub(crate) fn answer(&self, mut reply: impl FnMut(Q) -> A) -> Result<(), NodeError> {
+        for _ in 0..BATCH {
+            match self.server.receive_request() {
+                Ok(Some((id, asked))) => {
+                    let sent = self.server.send_response(id, reply(asked));
+                    sent.map_err(|error| NodeError::Topic {
+                        topic: self.name.clone(),
+                        problem: error.to_string(),
+                    })?;
+                }
+                Ok(None) => break,
+                Err(_) => {}
+            }
+        }
+        Ok(())
+    }
+}
+
 /// A topic's name from the root: those without a slash at their beginning lie below the namespace.
 pub(crate) fn absolute(namespace: &str, topic: &str) -> String {
     if topic.starts_with('/') {
@@ -144,6 +176,7 @@ pub(crate) struct Node {
     poll: Poll,
     events: Events,
     n_ears: usize,
+    full_name: String,
 }
 
 impl Node {
@@ -167,7 +200,13 @@ impl Node {
         let options = NodeOptions::new().enable_rosout(false);
         let node = context.new_node(named, options).map_err(|error| refused(error.to_string()))?;
         let poll = Poll::new().map_err(|error| refused(error.to_string()))?;
-        Ok(Self { node, poll, events: Events::with_capacity(64), n_ears: 0 })
+        let full_name = absolute(namespace, name);
+        Ok(Self { node, poll, events: Events::with_capacity(64), n_ears: 0, full_name })
+    }
+
+    /// Namespace and name.
+    pub(crate) fn full_name(&self) -> &str {
+        &self.full_name
     }
 
     /// Listens to a topic; to none of an empty name.
@@ -183,10 +222,7 @@ impl Node {
         let of = self.topic::<M>(topic, &profile)?;
         let subscription = self.node.create_subscription::<M>(&of, Some(profile));
         let mut subscription = subscription.map_err(|error| failed(error.to_string()))?;
-        let token = Token(self.n_ears);
-        self.n_ears += 1;
-        let registered = self.poll.registry().register(&mut subscription, token, Interest::READABLE);
-        registered.map_err(|error| failed(error.to_string()))?;
+        self.wake_for(&mut subscription).map_err(|error| failed(error.to_string()))?;
         Ok(Some(Ear { topic: topic.to_owned(), subscription }))
     }
 
@@ -211,6 +247,33 @@ impl Node {
         let failed = |problem: String| NodeError::Topic { topic: topic.to_owned(), problem };
         let publisher = publisher.map_err(|error| failed(error.to_string()))?;
         Ok(Some(Voice { topic: topic.to_owned(), publisher }))
+    }
+
+    /// Offers a service of the node's parameters below its name, of a type of `rcl_interfaces`.
+    pub(crate) fn serve<Q, A>(&mut self, service: &str, kind: &str) -> Result<Service<Q, A>, NodeError>
+    where
+        Q: Message + Clone + 'static,
+        A: Message + 'static,
+    {
+        let name = format!("{}/{service}", self.full_name);
+        let failed = |problem: String| NodeError::Topic { topic: name.clone(), problem };
+        let path = Name::parse(&name).map_err(|error| failed(error.to_string()))?;
+        let profile = QosProfile::publisher_default()
+            .history(History::KeepLast { depth: REQUESTS })
+            .reliability_reliable(WhenFull::Fail);
+        let kind = ServiceTypeName::new("rcl_interfaces", kind);
+        let mapping = ServiceMapping::Enhanced;
+        let server = self.node.create_server(mapping, &path, &kind, profile.clone(), profile.clone());
+        let mut server = server.map_err(|error| failed(error.to_string()))?;
+        self.wake_for(&mut server).map_err(|error| failed(error.to_string()))?;
+        Ok(Service { name, server })
+    }
+
+    /// Ends a wait when there is something to be read.
+    fn wake_for(&mut self, source: &mut impl Source) -> std::io::Result<()> {
+        let token = Token(self.n_ears);
+        self.n_ears += 1;
+        self.poll.registry().register(source, token, Interest::READABLE)
     }
 
     /// Waits until something has come, at most so long.

@@ -19,6 +19,8 @@ pub enum Order {
         /// How fast [m/s].
         speed_mps: f64,
     },
+    /// Plan for this share of the worst outcomes, in (0, 1].
+    Tolerate(f64),
     /// Wait.
     Pause,
     /// Go on.

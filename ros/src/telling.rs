@@ -1,5 +1,8 @@
 //! What the robot is told, as ROS says it.
 
+mod layers;
+mod markers;
+
 use bicycle::{Command, Decision, HoldReason, Limits};
 use nalgebra::UnitQuaternion;
 use terrain::GridGeometry;
@@ -10,6 +13,8 @@ use crate::message::{
     Path, Point, Pose, PoseStamped, Twist, TwistStamped, Vector3,
 };
 use crate::rigid;
+pub use layers::grid_map;
+pub use markers::{moving, plan as plan_markers};
 
 /// Occupancy of a cell that must not be touched.
 const OBSTACLE: i8 = 100;

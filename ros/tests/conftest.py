@@ -10,9 +10,14 @@ import time
 from pathlib import Path
 
 import pytest
+from geometry_msgs.msg import PoseStamped
+from std_msgs.msg import Bool
 
 FOLDER = Path(__file__).parent
 SUREFOOT = os.environ["SUREFOOT"]
+CAR = FOLDER / "car.toml"
+ROCK_M, ROCK_RADIUS_M = (2.5, 0.1), 0.35
+GOAL_M = (5.0, 0.0)
 
 
 def until(is_so, patience_s: float, what: str) -> float:
@@ -107,6 +112,30 @@ class Run(Process):
         return None
 
 
+class Operator:
+    """Says goals and stops, as RViz and a panel would."""
+
+    def __init__(self, node) -> None:
+        self.node = node
+        self.goals = node.create_publisher(PoseStamped, "goal_pose", 1)
+        self.stops = node.create_publisher(Bool, "emergency_stop", 1)
+        self.pauses = node.create_publisher(Bool, "pause", 1)
+
+    def goal(self, place_m, frame="odom") -> None:
+        until(lambda: self.goals.get_subscription_count() > 0, 20, "somebody hears goals")
+        told = PoseStamped()
+        told.header.frame_id = frame
+        told.header.stamp = self.node.get_clock().now().to_msg()
+        told.pose.position.x, told.pose.position.y = place_m
+        self.goals.publish(told)
+
+    def stop(self, is_emergency: bool) -> None:
+        self.stops.publish(Bool(data=is_emergency))
+
+    def pause(self, is_paused: bool) -> None:
+        self.pauses.publish(Bool(data=is_paused))
+
+
 @pytest.fixture
 def start():
     """Starts processes, and ends them after the test; of one that failed, their last words are shown."""
@@ -140,3 +169,11 @@ def node():
     thread.join(5)
     node.destroy_node()
     rclpy.shutdown()
+
+
+@pytest.fixture
+def loop(start, node, tmp_path):
+    """A robot and a run that are ready for a goal."""
+    robot, run, operator = start(Robot), start(Run, CAR, tmp_path), Operator(node)
+    until(lambda: robot.state()["commands"] > 20, 60, "the robot is commanded")
+    return robot, run, operator

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from cyclonedds.core import Policy, Qos
 from cyclonedds.domain import DomainParticipant
 from cyclonedds.idl import IdlStruct
-from cyclonedds.idl.types import array, float32, float64, int32, sequence, uint32
+from cyclonedds.idl.types import array, float32, float64, int32, sequence, uint8, uint16, uint32
 from cyclonedds.pub import DataWriter
 from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic
@@ -95,6 +95,27 @@ class Odometry(IdlStruct, typename="nav_msgs::msg::dds_::Odometry_"):
 
 
 @dataclass
+class PointField(IdlStruct, typename="sensor_msgs::msg::dds_::PointField_"):
+    name: str
+    offset: uint32
+    datatype: uint8
+    count: uint32
+
+
+@dataclass
+class PointCloud2(IdlStruct, typename="sensor_msgs::msg::dds_::PointCloud2_"):
+    header: Header
+    height: uint32
+    width: uint32
+    fields: sequence[PointField]
+    is_bigendian: bool
+    point_step: uint32
+    row_step: uint32
+    data: sequence[uint8]
+    is_dense: bool
+
+
+@dataclass
 class AckermannDriveStamped(IdlStruct, typename="ackermann_msgs::msg::dds_::AckermannDriveStamped_"):
     header: Header
     steering_angle: float32
@@ -104,7 +125,52 @@ class AckermannDriveStamped(IdlStruct, typename="ackermann_msgs::msg::dds_::Acke
     jerk: float32
 
 
+@dataclass
+class Pose(IdlStruct, typename="surefoot_test::Pose"):
+    position: Vector3
+    orientation: Quaternion
+
+
+@dataclass
+class Dimension(IdlStruct, typename="std_msgs::msg::dds_::MultiArrayDimension_"):
+    label: str
+    size: uint32
+    stride: uint32
+
+
+@dataclass
+class Layout(IdlStruct, typename="std_msgs::msg::dds_::MultiArrayLayout_"):
+    dim: sequence[Dimension]
+    data_offset: uint32
+
+
+@dataclass
+class Layer(IdlStruct, typename="std_msgs::msg::dds_::Float32MultiArray_"):
+    layout: Layout
+    data: sequence[float32]
+
+
+@dataclass
+class GridMapInfo(IdlStruct, typename="grid_map_msgs::msg::dds_::GridMapInfo_"):
+    resolution: float64
+    length_x: float64
+    length_y: float64
+    pose: Pose
+
+
+@dataclass
+class GridMap(IdlStruct, typename="grid_map_msgs::msg::dds_::GridMap_"):
+    header: Header
+    info: GridMapInfo
+    layers: sequence[str]
+    basic_layers: sequence[str]
+    data: sequence[Layer]
+    outer_start_index: uint16
+    inner_start_index: uint16
+
+
 RELIABLE = Qos(Policy.Reliability.Reliable(duration(seconds=1)), Policy.History.KeepLast(8))
+LOOSE = Qos(Policy.Reliability.BestEffort, Policy.History.KeepLast(8))
 LATCHED = Qos(
     Policy.Reliability.Reliable(duration(seconds=1)), Policy.History.KeepLast(8), Policy.Durability.TransientLocal
 )

@@ -9,7 +9,8 @@ from nav_msgs.msg import Path as Way
 from rclpy.serialization import serialize_message
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import Imu, PointCloud2, PointField
-from std_msgs.msg import Bool, Header
+from std_msgs.msg import Bool, ColorRGBA, Header
+from visualization_msgs.msg import Marker, MarkerArray
 
 FOLDER = Path(__file__).parents[1] / "src/message/recorded"
 
@@ -65,6 +66,15 @@ def diagnosis() -> DiagnosticArray:
     return DiagnosticArray(header=header(""), status=[status])
 
 
+def markers() -> MarkerArray:
+    line = Marker(header=header("map"), ns="plan", id=3, type=Marker.LINE_STRIP, pose=pose(1.0))
+    line.scale.x, line.lifetime.sec = 0.5, 1
+    line.color = ColorRGBA(r=0.25, g=0.5, b=0.75, a=1.0)
+    line.points, line.colors = [Point(x=1.0, y=2.0, z=3.0)], [ColorRGBA(r=1.0, a=0.5)]
+    line.text = "way"
+    return MarkerArray(markers=[line, Marker(header=header("odom"), ns="moving", type=Marker.CYLINDER)])
+
+
 def messages() -> dict:
     stamped = PoseStamped(header=header("map"), pose=pose(1.0))
     return {
@@ -79,6 +89,7 @@ def messages() -> dict:
         "occupancy_grid": grid(),
         "twist_stamped": twist(),
         "diagnostic_array": diagnosis(),
+        "marker_array": markers(),
     }
 
 

@@ -3,52 +3,13 @@
 import os
 import signal
 import time
-from pathlib import Path
 
-import pytest
-from conftest import Robot, Run, until
-from geometry_msgs.msg import PoseStamped
-from nav_msgs.msg import OccupancyGrid
+from conftest import GOAL_M, ROCK_M, ROCK_RADIUS_M, Robot, until
 from diagnostic_msgs.msg import DiagnosticArray
+from nav_msgs.msg import OccupancyGrid
 from rclpy.qos import DurabilityPolicy, QoSProfile
-from std_msgs.msg import Bool
 
-CAR = Path(__file__).parent / "car.toml"
-ROCK_M, ROCK_RADIUS_M = (2.5, 0.1), 0.35
-GOAL_M = (5.0, 0.0)
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-
-
-class Operator:
-    """Says goals and stops, as RViz and a panel would."""
-
-    def __init__(self, node) -> None:
-        self.node = node
-        self.goals = node.create_publisher(PoseStamped, "goal_pose", 1)
-        self.stops = node.create_publisher(Bool, "emergency_stop", 1)
-        self.pauses = node.create_publisher(Bool, "pause", 1)
-
-    def goal(self, place_m, frame="odom") -> None:
-        until(lambda: self.goals.get_subscription_count() > 0, 20, "somebody hears goals")
-        told = PoseStamped()
-        told.header.frame_id = frame
-        told.header.stamp = self.node.get_clock().now().to_msg()
-        told.pose.position.x, told.pose.position.y = place_m
-        self.goals.publish(told)
-
-    def stop(self, is_emergency: bool) -> None:
-        self.stops.publish(Bool(data=is_emergency))
-
-    def pause(self, is_paused: bool) -> None:
-        self.pauses.publish(Bool(data=is_paused))
-
-
-@pytest.fixture
-def loop(start, node, tmp_path):
-    """A robot and a run that are ready for a goal."""
-    robot, run, operator = start(Robot), start(Run, CAR, tmp_path), Operator(node)
-    until(lambda: robot.state()["commands"] > 20, 60, "the robot is commanded")
-    return robot, run, operator
 
 
 def test_a_goal_is_reached_around_the_rock(loop):
@@ -109,9 +70,13 @@ def test_a_robot_that_restarts_is_driven_on(loop, start):
 
 
 def test_who_comes_late_is_given_the_map_that_was_said_last(loop, node):
-    robot, _, _ = loop
+    robot, run, operator = loop
     first, late = [], []
     node.create_subscription(OccupancyGrid, "risk", first.append, LATCHED)
+    # Risk is judged from the first goal on.
+    operator.goal(GOAL_M)
+    until(lambda: run.has_said("goal: driving to"), 5, "a mission")
+    operator.pause(True)
     until(lambda: len(first) > 3, 20, "the risk is told")
     robot.say("silent cloud")
     time.sleep(2.0)
@@ -119,9 +84,10 @@ def test_who_comes_late_is_given_the_map_that_was_said_last(loop, node):
     time.sleep(1.0)
     assert len(first) == n_before, "without scans there are no new maps"
     node.create_subscription(OccupancyGrid, "risk", late.append, LATCHED)
-    until(lambda: late, 10, "the late one has a map")
-    grid = late[0]
-    assert grid.header == first[-1].header and grid.data == first[-1].data
+    # Those of the seconds before it may come first.
+    until(lambda: late and late[-1].header == first[-1].header, 10, "the late one has the last map")
+    grid = late[-1]
+    assert grid.data == first[-1].data
     cell = lambda x_m, y_m: grid.data[
         int((y_m - grid.info.origin.position.y) / grid.info.resolution) * grid.info.width
         + int((x_m - grid.info.origin.position.x) / grid.info.resolution)
@@ -133,7 +99,8 @@ def test_who_comes_late_is_given_the_map_that_was_said_last(loop, node):
 FAULTS = {
     "cloud of nan": "points: data: expected returns of the sensor, found",
     "cloud without z": 'points: fields: expected one named "z", found x, y, intensity, label, ring',
-    "odometry of another clock": "odometry: stamp: expected a time of this machine's time of day, found one 1000.0",
+    # As far ahead as it is when it comes: a little less than when it was said.
+    "odometry of another clock": "odometry: stamp: expected a time of this machine's time of day, found one ",
     "odometry of nan": "odometry: position: expected finite numbers, found [NaN, 0.0, 0.0]",
 }
 

@@ -59,8 +59,11 @@ def circling() -> Odometry:
 @pytest.fixture
 def bridge(start, tmp_path):
     words = [SUREFOOT, "up", "--robot", str(FRAMES), "--role", "ros", "--out", str(tmp_path)]
-    bridge = start(Process, words)
-    yield bridge, Peer()
+    bridge, peer = start(Process, words), Peer()
+    # It comes first: it has room on its channels for more readers than this program asks for.
+    commands = peer.reader("north/command", AckermannDriveStamped)
+    until(lambda: commands.take(1), 30, "a command to stand")
+    yield bridge, peer
 
 
 def test_odometry_is_carried_to_the_rear_axle_and_the_map_by_tf(bridge):
@@ -98,6 +101,78 @@ def test_odometry_is_carried_to_the_rear_axle_and_the_map_by_tf(bridge):
     assert record.yaw_rate_radps == pytest.approx(0.5, abs=1e-9)
 
 
+def test_a_transform_that_nobody_tells_any_more_is_told_of_and_odometry_is_refused(bridge):
+    process, peer = bridge
+    odometry, moving = peer.writer("north/odom", Odometry), peer.writer("tf", TFMessage)
+    fixed = peer.writer("tf_static", TFMessage, LATCHED)
+    fixed.write(told("base_link", "rear_axle", (0.0, 0.0, 0.0), 0.0))
+    inlet = Inlet(Bus("ros-frames"), "odometry")
+
+    def is_told() -> bool:
+        moving.write(told("map", "odom", (0.0, 0.0, 0.0), 0.0))
+        time.sleep(0.05)
+        odometry.write(circling())
+        return inlet.newest() is not None
+
+    until(is_told, 20, "odometry on the bus")
+    since = len(process.lines)
+    # The bridge believes a transform for 1 s.
+    stale = 'odometry: frame "odom": expected a transform on /tf at most 1.00 s away from the message'
+
+    def is_refused() -> bool:
+        time.sleep(0.05)
+        odometry.write(circling())
+        return process.has_said(stale, since)
+
+    until(is_refused, 10, stale)
+    time.sleep(0.2)
+    inlet.newest()
+    odometry.write(circling())
+    time.sleep(0.5)
+    assert inlet.newest() is None, "what is refused is as if it had not come"
+
+
+def test_robots_of_one_network_keep_to_their_own_topics_and_frames(bridge, start, tmp_path):
+    _, peer = bridge
+    words = FRAMES.read_text().replace("ros-frames", "ros-south").replace("/north", "/south")
+    file, out = tmp_path / "south.toml", tmp_path / "south"
+    out.mkdir()
+    file.write_text(words + 'frame_prefix = "south/"\n')
+    start(Process, [SUREFOOT, "up", "--robot", str(file), "--role", "ros", "--out", str(out)])
+    heard = {}
+
+    def both_speak() -> bool:
+        for robot, reader in readers.items():
+            heard.update({robot: told.header.frame_id for told in reader.take(100)})
+        return len(heard) == 2
+
+    readers = {robot: peer.reader(f"{robot}/command", AckermannDriveStamped) for robot in ("north", "south")}
+    until(both_speak, 20, "commands of both robots")
+    assert heard == {"north": "rear_axle", "south": "south/rear_axle"}
+    odometry, moving = peer.writer("south/odom", Odometry), peer.writer("tf", TFMessage)
+    fixed = peer.writer("tf_static", TFMessage, LATCHED)
+    inlets = {robot: Inlet(Bus(f"ros-{robot}"), "odometry") for robot in ("frames", "south")}
+    # Transforms of the same names without the prefix are the other robot's.
+    fixed.write(told("south/base_link", "south/rear_axle", (-1.5, 0.3, -0.1), 0.0))
+    records = []
+
+    def is_told() -> bool:
+        moving.write(told("map", "odom", (10.0, 20.0, 0.0), math.pi / 2))
+        moving.write(told("south/map", "south/odom", (1.0, 0.0, 0.0), 0.0))
+        time.sleep(0.05)
+        message = circling()
+        message.header.frame_id, message.child_frame_id = "south/odom", "south/base_link"
+        odometry.write(message)
+        newest = inlets["south"].newest()
+        if newest is not None:
+            records.append(list(newest[2][0].position_m))
+        return bool(records)
+
+    until(is_told, 20, "odometry of the southern robot")
+    assert records[-1] == pytest.approx([3.5, 1.3, 0.1], abs=1e-9)
+    assert inlets["frames"].newest() is None, "the northern robot hears nothing of it"
+
+
 def test_commands_are_said_as_ackermann_for_as_long_as_they_count(bridge):
     _, peer = bridge
     reader = peer.reader("north/command", AckermannDriveStamped)
@@ -107,7 +182,6 @@ def test_commands_are_said_as_ackermann_for_as_long_as_they_count(bridge):
         heard.extend(reader.take(100))
         return bool(heard)
 
-    # The bridge comes first, which has room on its channels for more readers than this program asks for.
     until(is_there, 20, "a command to stand")
     assert all(told.speed == 0.0 for told in heard)
     commands = Outlet(Bus("ros-frames"), "command")

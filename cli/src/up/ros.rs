@@ -9,6 +9,7 @@ use ros::bridge::{self, BridgeError, BridgeSetup};
 use ros::environment;
 use ros::orders::Order;
 use runtime::operator;
+use traversability::CvarLevel;
 
 use super::{robot, roles};
 use crate::UsageError;
@@ -36,6 +37,8 @@ pub(super) fn run(arguments: &UpArguments, machine: &Machine, ages: AgeLimits) -
         periods: robot::periods(arguments),
         ages,
         discovery,
+        alpha: arguments.drive.alpha,
+        method: machine.knowledge.method.name().to_owned(),
         director: Arc::new(move |order| direct(&run, order)),
     };
     let bus = roles::join(arguments)?;
@@ -64,6 +67,10 @@ fn navigators(order: &Order) -> Result<navigator::Order, String> {
         Order::Resume => return Ok(navigator::Order::Resume),
         Order::EmergencyStop => return Ok(navigator::Order::EmergencyStop),
         Order::Reset => return Ok(navigator::Order::Reset),
+        Order::Tolerate(alpha) => {
+            let level = CvarLevel::new(*alpha).map_err(|error| error.to_string())?;
+            return Ok(navigator::Order::Tolerate(level));
+        }
         Order::Goals(goals_m) => Route::goals(goals_m.clone(), ANY_TOLERANCE_M),
         Order::Path { corners_m, speed_mps } => Route::path(corners_m.clone(), *speed_mps, ANY_TOLERANCE_M),
     };

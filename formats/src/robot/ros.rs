@@ -14,6 +14,9 @@ pub struct RobotRos {
     pub node: String,
     /// Domain, unless `ROS_DOMAIN_ID` says another.
     pub domain_id: u16,
+    /// What the frames of this robot begin with, where several share a network; frames with a slash at their beginning are
+    /// named without it.
+    pub frame_prefix: String,
     /// Frame of the map: x east, y north, z up.
     pub map_frame: String,
     /// Frame of the vehicle: forward, left, up at the rear axle's centre.
@@ -40,6 +43,7 @@ impl Default for RobotRos {
             namespace: "/".to_owned(),
             node: "surefoot".to_owned(),
             domain_id: 0,
+            frame_prefix: String::new(),
             map_frame: "map".to_owned(),
             vehicle_frame: "base_link".to_owned(),
             clock: RosClock::TimeOfDay,
@@ -127,6 +131,10 @@ pub struct RosTopics {
     pub plan: String,
     /// `nav_msgs/OccupancyGrid`, out: the risk.
     pub risk: String,
+    /// `grid_map_msgs/GridMap`, out: heights and risks.
+    pub grid_map: String,
+    /// `visualization_msgs/MarkerArray`, out: the plan, and what moves.
+    pub markers: String,
     /// `diagnostic_msgs/DiagnosticArray`, out.
     pub diagnostics: String,
 }
@@ -137,8 +145,8 @@ impl Default for RosTopics {
             ["odom", "points", "imu", "/tf", "/tf_static", "/clock"].map(str::to_owned);
         let [goal, goals, path, emergency_stop, pause] =
             ["goal_pose", "goals", "path", "emergency_stop", "pause"].map(str::to_owned);
-        let [command, plan, risk, diagnostics] =
-            ["command", "plan", "risk", "/diagnostics"].map(str::to_owned);
+        let [command, plan, risk, markers, diagnostics] =
+            ["command", "plan", "risk", "markers", "/diagnostics"].map(str::to_owned);
         let points = vec![points];
         Self {
             odometry,
@@ -155,6 +163,9 @@ impl Default for RosTopics {
             command,
             plan,
             risk,
+            // Of some size, and few want it.
+            grid_map: String::new(),
+            markers,
             diagnostics,
         }
     }
@@ -164,6 +175,11 @@ impl Default for RosTopics {
 const DOMAIN_MAX: u16 = 232;
 
 impl RobotRos {
+    /// A frame of this robot as it is called on the network.
+    pub fn frame(&self, name: &str) -> String {
+        name.strip_prefix('/').map_or_else(|| format!("{}{name}", self.frame_prefix), str::to_owned)
+    }
+
     /// Refuses what no node could be. Errors: [`ConfigError::Field`].
     pub(super) fn check(&self, text: &ConfigText) -> Result<(), ConfigError> {
         let positive = [

@@ -211,7 +211,7 @@ impl Bridge {
         }
         for path in heard(&mut self.ears.path, refused) {
             if let Some(corners_m) = refused.kept("path", self.intake.path(&path)) {
-                let speed_mps = self.path_speed_mps;
+                let speed_mps = self.services.parameters.path_speed_mps;
                 self.order(Order::Path { corners_m, speed_mps }, refused);
             }
         }

@@ -2,16 +2,18 @@
 
 use bicycle::{Command, Decision, Limits, Vehicle};
 use bus::ages::Periods;
-use bus::channel::{Bus, Inlet, PLAN, RISK, RISK_PHYSICS};
+use bus::channel::{Bus, Inlet, PLAN, RISK, RISK_PHYSICS, TRACKS};
 use bus::clock::{self, SECOND_NS};
-use bus::message::{MissionRecord, PlanRecord, RiskHeader, Stamp};
+use bus::message::{MissionRecord, PlanRecord, RiskHeader, Stamp, TrackRecord, TracksHeader};
 use bus::payload::risk_views;
 use formats::{RobotRos, RosCommand};
 
 use super::BridgeError;
+use super::heights::Heights;
 use crate::complaints::Complaints;
 use crate::message::{
-    AckermannDriveStamped, DiagnosticArray, Header, OccupancyGrid, Path, Time, TwistStamped,
+    AckermannDriveStamped, DiagnosticArray, GridMap, Header, MarkerArray, OccupancyGrid, Path, Time,
+    TwistStamped,
 };
 use crate::node::{Node, NodeError, Saying, Voice};
 use crate::telling;
@@ -34,11 +36,17 @@ pub(super) struct Voices {
     command: Commanding,
     plan: Option<Voice<Path>>,
     risk: Option<Voice<OccupancyGrid>>,
+    grid_map: Option<Voice<GridMap>>,
+    markers: Option<Voice<MarkerArray>>,
     diagnostics: Option<Voice<DiagnosticArray>>,
     plans: Inlet<Stamp, PlanRecord>,
     maps: [Inlet<RiskHeader, [f32; 4]>; 2],
+    heights: Heights,
+    tracks: Inlet<TracksHeader, TrackRecord>,
     map_at_ns: u64,
     diagnosed_at_ns: u64,
+    /// What the node's part of the diagnoses is called.
+    node: String,
     map_frame: String,
     vehicle_frame: String,
     wheelbase_m: f64,
@@ -74,13 +82,18 @@ impl Voices {
             },
             plan: node.speak(&topics.plan, Saying::Passing)?,
             risk: node.speak(&topics.risk, Saying::Latched)?,
+            grid_map: node.speak(&topics.grid_map, Saying::Latched)?,
+            markers: node.speak(&topics.markers, Saying::Passing)?,
             diagnostics: node.speak(&topics.diagnostics, Saying::Passing)?,
             plans: bus.inlet(&PLAN)?,
             maps: [bus.inlet(&RISK)?, bus.inlet(&RISK_PHYSICS)?],
+            heights: Heights::new(bus)?,
+            tracks: bus.inlet(&TRACKS)?,
             map_at_ns: 0,
             diagnosed_at_ns: 0,
-            map_frame: ros.map_frame.clone(),
-            vehicle_frame: ros.vehicle_frame.clone(),
+            node: node.full_name().to_owned(),
+            map_frame: ros.frame(&ros.map_frame),
+            vehicle_frame: ros.frame(&ros.vehicle_frame),
             wheelbase_m: vehicle.geometry.wheelbase_m,
             limits: vehicle.limits,
             age_max_s: 5.0 * periods.scan_s.max(periods.odometry_s),
@@ -98,19 +111,36 @@ impl Voices {
 
     /// The way that is meant to be driven.
     pub(super) fn plan(&mut self, stamp_ns: &StampNs<'_>) -> Result<(), NodeError> {
-        let Self { plan: Some(voice), plans, map_frame, .. } = self else { return Ok(()) };
         let mut newest = None;
-        plans.poll(|stamp, places| {
+        self.plans.poll(|stamp, places| newest = Some((stamp.valid_at_ns, places.to_vec())));
+        let Some((valid_at_ns, places)) = newest else { return Ok(()) };
+        let Some(stamp_ns) = stamp_ns(valid_at_ns) else { return Ok(()) };
+        let header = header(&self.map_frame, stamp_ns);
+        if let Some(voice) = &self.plan {
             let pose = |place: &PlanRecord| [place.position_m[0], place.position_m[1], place.yaw_rad];
-            let told = |stamp_ns| telling::path(header(map_frame, stamp_ns), places.iter().map(pose));
-            newest = stamp_ns(stamp.valid_at_ns).map(told);
+            voice.say(telling::path(header.clone(), places.iter().map(pose)))?;
+        }
+        let Some(voice) = &self.markers else { return Ok(()) };
+        voice.say(telling::plan_markers(header, &places, self.limits.speed_max_mps))
+    }
+
+    /// What moves.
+    pub(super) fn moving(&mut self, stamp_ns: &StampNs<'_>) -> Result<(), NodeError> {
+        let Self { markers: Some(voice), tracks, map_frame, .. } = self else { return Ok(()) };
+        let mut newest = None;
+        tracks.poll(|told, tracks| {
+            let stamp_ns = stamp_ns(told.stamp.valid_at_ns);
+            newest = stamp_ns.map(|stamp_ns| telling::moving(&header(map_frame, stamp_ns), tracks));
         });
-        newest.map_or(Ok(()), |plan| voice.say(plan))
+        newest.filter(|told| !told.markers.is_empty()).map_or(Ok(()), |told| voice.say(told))
     }
 
     /// The newest risk map, whoever made it.
     pub(super) fn maps(&mut self, stamp_ns: &StampNs<'_>) -> Result<(), NodeError> {
-        let Self { risk: Some(voice), maps, map_at_ns, map_frame, limits, .. } = self else { return Ok(()) };
+        let Self { risk, grid_map, maps, heights, map_at_ns, map_frame, limits, .. } = self;
+        if grid_map.is_some() {
+            heights.hear();
+        }
         for inlet in maps {
             let Some(message) = inlet.newest() else { continue };
             let valid_at_ns = message.header().stamp.valid_at_ns;
@@ -120,7 +150,15 @@ impl Voices {
             *map_at_ns = valid_at_ns;
             let views = risk_views(message.header(), message.payload());
             let (Some((map, _)), Some(stamp_ns)) = (views, stamp_ns(valid_at_ns)) else { continue };
-            voice.say(telling::occupancy(header(map_frame, stamp_ns), &map, limits))?;
+            let header = header(map_frame, stamp_ns);
+            if let Some(voice) = grid_map {
+                let surface = heights.of(&message.header().surface, map.geometry.resolution_m);
+                let height_m = |lattice| *surface?.at_lattice(lattice)?;
+                voice.say(telling::grid_map(header.clone(), &map, height_m))?;
+            }
+            if let Some(voice) = risk {
+                voice.say(telling::occupancy(header, &map, limits))?;
+            }
         }
         Ok(())
     }
@@ -138,7 +176,7 @@ impl Voices {
         }
         self.diagnosed_at_ns = now_ns;
         let header = header("", stamp_ns(now_ns).unwrap_or_default());
-        let status = [self.input_status(now_ns, diagnosis), decision_status(diagnosis)].to_vec();
+        let status = vec![self.input_status(now_ns, diagnosis), self.decision_status(diagnosis)];
         voice.say(DiagnosticArray { header, status })
     }
 
@@ -158,18 +196,18 @@ impl Voices {
             ("scan age [s]", format!("{scan_s:.3}")),
             ("messages refused", diagnosis.complaints.n().to_string()),
         ];
-        telling::status(level, "surefoot: input", message, &values)
+        telling::status(level, &format!("{}: input", self.node), message, &values)
     }
-}
 
-fn decision_status(diagnosis: &Diagnosis<'_>) -> crate::message::DiagnosticStatus {
-    let (level, message) = match &diagnosis.decision {
-        Some(decision @ Decision::Stop(_)) => (WARNING, telling::decision_text(decision)),
-        Some(decision) => (WELL, telling::decision_text(decision)),
-        None => (WARNING, "nothing is commanded".to_owned()),
-    };
-    let mission = diagnosis.mission.map_or_else(|| "unknown".to_owned(), |mission| mission.to_string());
-    telling::status(level, "surefoot: decision", message, &[("mission", mission)])
+    fn decision_status(&self, diagnosis: &Diagnosis<'_>) -> crate::message::DiagnosticStatus {
+        let (level, message) = match &diagnosis.decision {
+            Some(decision @ Decision::Stop(_)) => (WARNING, telling::decision_text(decision)),
+            Some(decision) => (WELL, telling::decision_text(decision)),
+            None => (WARNING, "nothing is commanded".to_owned()),
+        };
+        let mission = diagnosis.mission.map_or_else(|| "unknown".to_owned(), |mission| mission.to_string());
+        telling::status(level, &format!("{}: decision", self.node), message, &[("mission", mission)])
+    }
 }
 
 fn header(frame: &str, stamp_ns: i64) -> Header {

@@ -98,6 +98,28 @@ fn what_the_robot_is_told_is_written_as_rclpy_reads_it() {
 }
 
 #[test]
+fn markers_are_written_as_rclpy_reads_them() {
+    let color = |[r, g, b, a]: [f32; 4]| ColorRgba { r, g, b, a };
+    let line = Marker {
+        header: header("map"),
+        ns: "plan".into(),
+        id: 3,
+        r#type: Marker::LINE_STRIP,
+        pose: pose(1.0),
+        scale: vector([0.5, 0.0, 0.0]),
+        color: color([0.25, 0.5, 0.75, 1.0]),
+        lifetime: Duration { sec: 1, nanosec: 0 },
+        points: vec![Point { x: 1.0, y: 2.0, z: 3.0 }],
+        colors: vec![color([1.0, 0.0, 0.0, 0.5])],
+        text: "way".into(),
+        ..Marker::default()
+    };
+    let thing =
+        Marker { header: header("odom"), ns: "moving".into(), r#type: Marker::CYLINDER, ..Marker::default() };
+    same(recorded!("marker_array"), MarkerArray { markers: vec![line, thing] });
+}
+
+#[test]
 fn times_survive_the_way_before_and_after_the_beginning() {
     for at_ns in [0, 1, -1, 1_500_000_000, -1_500_000_000, 1_700_000_000_123_456_789] {
         assert_eq!(Time::from_nanoseconds(at_ns).nanoseconds(), at_ns);
