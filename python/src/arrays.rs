@@ -78,7 +78,6 @@ pub fn shape(lengths: &[usize]) -> String {
 }
 
 /// So many real numbers, from an array or any sequence. Of complex ones NumPy would leave a part out.
-#[derive(Clone, Copy)]
 pub struct Reals<T, const N: usize>(pub [T; N]);
 
 impl<'a, 'py, T, const N: usize> FromPyObject<'a, 'py> for Reals<T, N>

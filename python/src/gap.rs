@@ -4,25 +4,25 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use bicycle::Column;
-use formats::{DescribedVehicle, DriveLogFile, GapVehicleError};
+use formats::DriveLogFile;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyString};
 use report::gap::Told;
 use sim_to_real::{
-    Answer, Baseline, Case, Diagnosed, Diagnosis, Drives, InSimulatorDiagnosis, InSimulatorError, Machine,
-    Manoeuvre, PartUnknown, Verification, WithoutSimulator, decide_in_simulator, diagnose_without_simulator,
-    own_runs, repaired, verify,
+    Answer, Baseline, Case, Diagnosed, Diagnosis, Drives, InSimulatorDiagnosis, InSimulatorError, Manoeuvre,
+    PartUnknown, Verification, WithoutSimulator, decide_in_simulator, diagnose_without_simulator, own_runs,
+    repaired, verify,
 };
 
 use crate::arrays::kind;
 use crate::detached::{detached, interruptible};
-use crate::drives::{column_names, drives};
-use crate::failure::{refused_config, refused_file, refused_type, refused_value};
+use crate::drives::{column_names, drives, machine};
+use crate::failure::{refused_type, refused_value};
 use crate::frames::{frame, in_notebook};
 use crate::model::Model;
 use crate::own_simulator::OwnSimulator;
 use crate::recording::log_columns;
-use crate::settings::{Source, fields_of, json_dict};
+use crate::settings::json_dict;
 use crate::typed::{Fields, Intervals};
 use crate::vehicle::Vehicle;
 
@@ -47,7 +47,7 @@ const MANOEUVRE: &str = "manoeuvre.csv";
 #[pyo3(signature = (
     sim: "Sequence[_Drive]",
     real: "Sequence[_Drive]",
-    vehicle: "Vehicle | _Path | dict[str, Any]",
+    vehicle: "Vehicle | _Path | _Description",
     *,
     heldout: "Sequence[_Drive] | None" = None,
     columns: "dict[str, str] | None" = None,
@@ -201,33 +201,6 @@ impl Work {
 fn told(error: InSimulatorError<PyErr>) -> PyErr {
     match error {
         InSimulatorError::Run(error) => error,
-        other => refused_value(other),
-    }
-}
-
-fn machine(found: &Bound<'_, PyAny>, drives: &[bicycle::DriveLog]) -> PyResult<Machine> {
-    if let Ok(vehicle) = found.cast::<Vehicle>() {
-        return Ok(Machine::of_vehicle(&vehicle.get().0));
-    }
-    if let Some(description) = fields_of(found)? {
-        let source = Source::of_fields("vehicle", &description)?;
-        let vehicle = source.with_text(|text| formats::parse_gap_vehicle(text, Path::new("")));
-        return Ok(Machine::of_case(vehicle.map_err(refused_vehicle)?, drives));
-    }
-    let Ok(path) = found.extract::<PathBuf>() else {
-        let expected =
-            "a Vehicle, the name of one, the path of a vehicle's file, a dict or a dataclass of it";
-        return Err(refused_type("vehicle", expected, kind(found)));
-    };
-    let vehicle: DescribedVehicle =
-        formats::read_described_vehicle(&path.to_string_lossy()).map_err(refused_vehicle)?;
-    Ok(Machine::described(vehicle, drives))
-}
-
-fn refused_vehicle(error: GapVehicleError) -> PyErr {
-    match error {
-        GapVehicleError::Config(error) => refused_config(error),
-        GapVehicleError::Unreadable { ref file, ref source } => refused_file(Path::new(file), source),
         other => refused_value(other),
     }
 }

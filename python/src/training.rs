@@ -93,6 +93,10 @@ impl Dataset {
         self.0.to_bytes().map(|bytes| PyBytes::new(py, &bytes)).map_err(refused_value)
     }
 
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, (Bound<'py, PyBytes>,))> {
+        Ok((py.get_type::<Self>().getattr("from_bytes")?, (self.to_bytes(py)?,)))
+    }
+
     /// The examples of both. Raises `ValueError` for another vehicle.
     fn joined(&self, other: &Self) -> PyResult<Self> {
         self.0.clone().joined(other.0.clone()).map(Self).map_err(refused_value)

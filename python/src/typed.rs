@@ -60,7 +60,6 @@ impl<'py, T: Scalar, D: Dimension> IntoPyObject<'py> for &Array<T, D> {
 }
 
 /// Anything by its name.
-#[derive(Clone)]
 pub struct Fields<'py>(pub Bound<'py, PyDict>);
 
 impl<'py> IntoPyObject<'py> for Fields<'py> {

@@ -1111,7 +1111,7 @@ def attach(run: str | None=None) -> Run:
     where there is no such run.
     """
 
-def diagnose(sim: Sequence[_Drive], real: Sequence[_Drive], vehicle: Vehicle | _Path | dict[str, Any], *, heldout: Sequence[_Drive] | None=None, columns: dict[str, str] | None=None, simulator: Callable[[dict[str, Any]], Mapping[str, Any]] | None=None, name: str | None=None) -> GapReport:
+def diagnose(sim: Sequence[_Drive], real: Sequence[_Drive], vehicle: Vehicle | _Path | _Description, *, heldout: Sequence[_Drive] | None=None, columns: dict[str, str] | None=None, simulator: Callable[[dict[str, Any]], Mapping[str, Any]] | None=None, name: str | None=None) -> GapReport:
     """Says why simulator and robot disagree: where, which effect, how far the gap shrinks, and what to drive next.
 
     sim, real, heldout: lists of drives, each a data frame or a dict of arrays with the columns of a drive log (`t` [s] and a

@@ -26,3 +26,4 @@ def test_the_pages_are_built_with_every_public_name(tmp_path):
     for notebook in notebooks:
         assert (tmp_path / "python/notebooks" / notebook / "index.html").exists(), notebook
         assert f'href="python/notebooks/{notebook}/"' in start, f"nothing leads to {notebook}"
+        assert f'{notebook}.ipynb"' not in start, "leads out of the pages"
