@@ -13,6 +13,11 @@ proportional speed controller, a servo of first order with a rate limit. Body fr
 import json
 import math
 import sys
+from typing import Any
+
+Message = dict[str, Any]
+# x, y [m], yaw [rad], speed [m/s], yaw rate [rad/s].
+Row = tuple[float, float, float, float, float]
 
 PROTOCOL = 1
 GRAVITY_MPS2 = 9.81
@@ -32,7 +37,7 @@ KNOBS = [
 ]
 
 
-def clamp(value, low, high):
+def clamp(value: float, low: float, high: float) -> float:
     """`value`, or the bound that it lies beyond."""
     return low if value < low else high if value > high else value
 
@@ -40,7 +45,7 @@ def clamp(value, low, high):
 class Car:
     """A car of the size that the vehicle has; its state is that of the centre of mass."""
 
-    def __init__(self, vehicle, knobs):
+    def __init__(self, vehicle: Message, knobs: dict[str, float]) -> None:
         self.wheelbase_m = vehicle["wheelbase_m"]
         self.steering_max_rad = vehicle["steering_max_rad"]
         nominal_kg = 75.0 * self.wheelbase_m**3
@@ -61,7 +66,7 @@ class Car:
         self.motor_s = knobs["motor_time_constant_s"]
         self.servo_s = knobs["servo_time_constant_s"]
 
-    def begin(self, start):
+    def begin(self, start: dict[str, float]) -> None:
         """Stands where the run begins, with that speed, the actuators at rest."""
         self.yaw_rad = start["yaw_rad"]
         self.x_m = start["x_m"] + self.rear_m * math.cos(self.yaw_rad)
@@ -73,13 +78,13 @@ class Car:
         self.force_n = 0.0
         self.acceleration_mps2 = [0.0, 0.0]
 
-    def measured(self):
+    def measured(self) -> Row:
         """x, y [m], yaw [rad], speed [m/s], yaw rate [rad/s] at the middle of the rear axle."""
         sine, cosine = math.sin(self.yaw_rad), math.cos(self.yaw_rad)
         x_m, y_m = self.x_m - self.rear_m * cosine, self.y_m - self.rear_m * sine
         return x_m, y_m, self.yaw_rad, self.forward_mps, self.yaw_rate_radps
 
-    def actuate(self, command_mps, command_rad, step_s):
+    def actuate(self, command_mps: float, command_rad: float, step_s: float) -> None:
         """Servo and motor follow their commands."""
         wanted_rad = clamp(command_rad, -self.steering_max_rad, self.steering_max_rad)
         rate = clamp((wanted_rad - self.steering_rad) / self.servo_s,
@@ -91,7 +96,7 @@ class Car:
         wanted_n = clamp(wanted_n, -self.force_max_n, self.force_max_n)
         self.force_n += (wanted_n - self.force_n) * (1.0 - math.exp(-step_s / self.motor_s))
 
-    def loads_n(self):
+    def loads_n(self) -> list[float]:
         """Loads of the tyres: front left, front right, rear left, rear right."""
         weight_n = self.mass_kg * GRAVITY_MPS2
         ahead_n = self.mass_kg * self.acceleration_mps2[0] * self.height_m / self.wheelbase_m
@@ -101,7 +106,9 @@ class Car:
         least_n = 0.02 * weight_n
         return [max(load, least_n) for load in (front_n - left_n, front_n + left_n, rear_n - left_n, rear_n + left_n)]
 
-    def step(self, command_mps, command_rad, slope_ahead, slope_left, step_s):
+    def step(
+        self, command_mps: float, command_rad: float, slope_ahead: float, slope_left: float, step_s: float
+    ) -> None:
         """Goes one step."""
         self.actuate(command_mps, command_rad, step_s)
         v, u, r = self.forward_mps, self.left_mps, self.yaw_rate_radps
@@ -136,7 +143,7 @@ class Car:
         self.yaw_rad += self.yaw_rate_radps * step_s
 
 
-def driven(vehicle, run):
+def driven(vehicle: Message, run: Message) -> list[Row]:
     """Every row of a run: x, y, yaw, speed, yaw rate; the first is the start."""
     car = Car(vehicle, run["knobs"])
     car.begin(run["start"])
@@ -151,16 +158,16 @@ def driven(vehicle, run):
     return rows
 
 
-def motion(vehicle, run):
+def motion(vehicle: Message, run: Message) -> Message:
     """The answer to a run."""
     x_m, y_m, yaw_rad, speed_mps, yaw_rate_radps = (list(column) for column in zip(*driven(vehicle, run)))
     return {"type": "motion", "id": run["id"], "x_m": x_m, "y_m": y_m, "yaw_rad": yaw_rad, "speed_mps": speed_mps,
             "yaw_rate_radps": yaw_rate_radps}
 
 
-def serve():
+def serve() -> None:
     """Answers line by line until nobody asks any more."""
-    vehicle = None
+    vehicle: Message = {}
     for line in sys.stdin:
         message = json.loads(line)
         if message["type"] == "hello":

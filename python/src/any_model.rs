@@ -2,7 +2,9 @@
 
 use bicycle::{MotionCommand, MotionLimits, MotionModel, SkidSteerCommand};
 use mppi::{Config, Controller, Driven};
+use pyo3::inspect::PyStaticExpr;
 use pyo3::prelude::*;
+use pyo3::{PyTypeInfo, type_hint_union};
 
 use crate::arrays::kind;
 use crate::failure::refused_type;
@@ -22,6 +24,9 @@ pub enum AnyModel {
 
 impl<'py> FromPyObject<'_, 'py> for AnyModel {
     type Error = PyErr;
+
+    const INPUT_TYPE: PyStaticExpr =
+        type_hint_union!(Model::TYPE_HINT, SkidSteerModel::TYPE_HINT, PythonModel::TYPE_HINT);
 
     fn extract(found: Borrowed<'_, 'py, PyAny>) -> PyResult<Self> {
         if let Ok(model) = found.cast::<Model>() {

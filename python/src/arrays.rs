@@ -2,13 +2,15 @@
 
 use numpy::ndarray::{Dim, Dimension, IntoDimension};
 use numpy::{
-    Element, IntoPyArray, PyArray, PyArray1, PyArrayDescrMethods, PyArrayMethods, PyReadonlyArray,
-    PyUntypedArray, PyUntypedArrayMethods, dtype,
+    Element, IntoPyArray, PyArray1, PyArrayDescrMethods, PyArrayMethods, PyReadonlyArray, PyUntypedArray,
+    PyUntypedArrayMethods, dtype,
 };
+use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use pyo3::types::PyBool;
 
 use crate::failure::{refused, refused_type};
+use crate::typed::{Array, Scalar};
 
 /// An array whose elements lie row by row without gaps: the caller's own memory where it is like that, else a copy.
 ///
@@ -75,13 +77,34 @@ pub fn shape(lengths: &[usize]) -> String {
     }
 }
 
+/// So many real numbers, from an array or any sequence. Of complex ones NumPy would leave a part out.
+pub struct Reals<T, const N: usize>(pub [T; N]);
+
+impl<'a, 'py, T, const N: usize> FromPyObject<'a, 'py> for Reals<T, N>
+where
+    [T; N]: FromPyObject<'a, 'py, Error = PyErr>,
+{
+    type Error = PyErr;
+
+    fn extract(found: Borrowed<'a, 'py, PyAny>) -> PyResult<Self> {
+        if is_complex(&found) {
+            return Err(PyTypeError::new_err(format!("expected {N} real numbers, found complex ones")));
+        }
+        found.extract().map(Self)
+    }
+}
+
+fn is_complex(found: &Bound<'_, PyAny>) -> bool {
+    found.cast::<PyUntypedArray>().is_ok_and(|array| array.dtype().kind() == b'c')
+}
+
 /// As many numbers as there are names for them, from an array or any sequence.
 pub fn numbers<const N: usize>(
     argument: &str,
     found: &Bound<'_, PyAny>,
     names: [&str; N],
 ) -> PyResult<[f64; N]> {
-    if let Ok(numbers) = found.extract::<[f64; N]>() {
+    if let Ok(Reals(numbers)) = found.extract::<Reals<f64, N>>() {
         return Ok(numbers);
     }
     let expected = format!("{N} numbers ({})", names.join(", "));
@@ -103,15 +126,15 @@ pub fn kind(found: &Bound<'_, PyAny>) -> String {
 }
 
 /// Values as an array of Python's that takes over their memory.
-pub fn owned<'py, T: Element, const N: usize>(
-    py: Python<'py>,
+pub fn owned<T: Scalar, const N: usize>(
+    py: Python<'_>,
     values: Vec<T>,
     shape: [usize; N],
-) -> PyResult<Bound<'py, PyArray<T, Dim<[usize; N]>>>>
+) -> PyResult<Array<T, Dim<[usize; N]>>>
 where
     Dim<[usize; N]>: Dimension,
     [usize; N]: IntoDimension<Dim = Dim<[usize; N]>>,
 {
-    let array: Bound<'py, PyArray1<T>> = values.into_pyarray(py);
-    array.reshape(shape)
+    let array: Bound<'_, PyArray1<T>> = values.into_pyarray(py);
+    Ok(Array(array.reshape(shape)?.unbind()))
 }

@@ -8,7 +8,9 @@ use evidential::{BeliefMapError, Checkpoint, Learned, Method, Unfamiliar, shippe
 use formats::overlay;
 use navigator::{Config, RiskEstimator};
 use physics_prior::Assumption;
+use pyo3::inspect::PyStaticExpr;
 use pyo3::prelude::*;
+use pyo3::{PyTypeInfo, type_hint_union};
 use terrain::{DistantPosition, GridGeometry, GridMap, SurfaceCell};
 use traversability::CvarLevel;
 
@@ -33,7 +35,7 @@ pub struct PhysicsPrior(Judge);
 #[pymethods]
 impl PhysicsPrior {
     #[new]
-    #[pyo3(signature = (vehicle, settings=None, *, cvar_level=0.6))]
+    #[pyo3(signature = (vehicle, settings: "_Settings | None" = None, *, cvar_level=0.6))]
     fn new(vehicle: AnyVehicle<'_>, settings: Option<&Bound<'_, PyAny>>, cvar_level: f64) -> PyResult<Self> {
         let level = CvarLevel::new(cvar_level).map_err(refused_value)?;
         let config = config(&vehicle, settings)?;
@@ -46,7 +48,7 @@ impl PhysicsPrior {
     /// ground: `Surface` or `ElevationMap`. centre_m: two numbers, x_m, y_m, around which the window of
     /// `settings["risk_map"]` lies; without them the map covers all of the ground. Maps are made from scratch, on all cores
     /// and without Python's lock. Raises `ValueError` where cells of map and ground cannot line up.
-    #[pyo3(signature = (ground, *, centre_m=None))]
+    #[pyo3(signature = (ground, *, centre_m: "_Floats | None" = None))]
     fn judge(
         &self,
         py: Python<'_>,
@@ -79,7 +81,14 @@ impl Evidential {
     /// says, or "avoid", it costs a detour as well. settings and cvar_level as for `PhysicsPrior`. Raises `ValueError` for
     /// another vehicle or method.
     #[staticmethod]
-    #[pyo3(signature = (vehicle, method="pietra", settings=None, *, cvar_level=0.6, unfamiliar="fuse"))]
+    #[pyo3(signature = (
+        vehicle,
+        method="pietra",
+        settings: "_Settings | None" = None,
+        *,
+        cvar_level=0.6,
+        unfamiliar="fuse",
+    ))]
     fn load(
         vehicle: AnyVehicle<'_>,
         method: &str,
@@ -97,7 +106,15 @@ impl Evidential {
 
     /// Networks of your own: what `surefoot train` wrote as weights.safetensors and weights.json.
     #[staticmethod]
-    #[pyo3(signature = (vehicle, weights, sidecar, settings=None, *, cvar_level=0.6, unfamiliar="fuse"))]
+    #[pyo3(signature = (
+        vehicle,
+        weights,
+        sidecar,
+        settings: "_Settings | None" = None,
+        *,
+        cvar_level=0.6,
+        unfamiliar="fuse",
+    ))]
     fn from_bytes(
         vehicle: AnyVehicle<'_>,
         weights: &[u8],
@@ -117,7 +134,7 @@ impl Evidential {
     }
 
     /// The risk map of the ground, as `PhysicsPrior.judge`. Cells unlike the training data have flag 4.
-    #[pyo3(signature = (ground, *, centre_m=None))]
+    #[pyo3(signature = (ground, *, centre_m: "_Floats | None" = None))]
     fn judge(
         &self,
         py: Python<'_>,
@@ -168,6 +185,8 @@ pub enum AnyGround<'py> {
 
 impl<'py> FromPyObject<'_, 'py> for AnyGround<'py> {
     type Error = PyErr;
+
+    const INPUT_TYPE: PyStaticExpr = type_hint_union!(Surface::TYPE_HINT, ElevationMap::TYPE_HINT);
 
     fn extract(found: Borrowed<'_, 'py, PyAny>) -> PyResult<Self> {
         if let Ok(surface) = found.cast::<Surface>() {

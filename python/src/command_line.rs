@@ -15,6 +15,7 @@ const BROKEN_OFF: u8 = 101;
 /// start: what starts it again for its own processes, the interpreter and the words before the command's own. words: the
 /// command's own. file: which file holds it.
 #[pyfunction]
+#[pyo3(signature = (start: "Sequence[str]", words: "Sequence[str]", file))]
 pub fn run_command_line(py: Python<'_>, start: Vec<OsString>, words: Vec<OsString>, file: PathBuf) -> u8 {
     py.detach(|| {
         let run = AssertUnwindSafe(|| cli::run_as(Program { file, start, words }));

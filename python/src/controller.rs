@@ -2,11 +2,10 @@
 
 use bicycle::Decision as Decided;
 use mppi::{Config, Objective, ReferencePath, Terminal};
-use numpy::ndarray::Ix2;
-use numpy::{PyArray1, PyArray2, PyArray3, PyUntypedArrayMethods};
+use numpy::PyUntypedArrayMethods;
+use numpy::ndarray::{Ix1, Ix2, Ix3};
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
 use toml::Value;
 
 use crate::any_model::AnyModel;
@@ -18,6 +17,7 @@ use crate::planner::{Cycle, N_STATE, Outcome, Planner};
 use crate::plug_in::{Called, is_within};
 use crate::risk_map::RiskMap;
 use crate::settings::{Source, dict};
+use crate::typed::{Array, Fields};
 
 /// Model predictive path integral control over a risk map (Williams et al. 2017).
 ///
@@ -53,7 +53,13 @@ struct Run {
 #[pymethods]
 impl Mppi {
     #[new]
-    #[pyo3(signature = (model, settings=None, *, seed=1, cost=None))]
+    #[pyo3(signature = (
+        model,
+        settings: "_Settings | None" = None,
+        *,
+        seed=1,
+        cost: "Callable[[SampledRollouts], _Answer] | None" = None,
+    ))]
     fn new(
         py: Python<'_>,
         model: AnyModel,
@@ -87,7 +93,15 @@ impl Mppi {
     /// decision; None stands for nothing on the first and for a step of the horizon on all others. Numbers that are not
     /// finite, a map without the vehicle, no feasible future: such a cycle gives a decision to stop with its reason and
     /// raises nothing.
-    #[pyo3(signature = (state, risk_map, goal_m, *, tolerance_m=0.5, cost_to_go=None, elapsed_s=None))]
+    #[pyo3(signature = (
+        state: "_Floats",
+        risk_map,
+        goal_m: "_Floats",
+        *,
+        tolerance_m=0.5,
+        cost_to_go=None,
+        elapsed_s=None,
+    ))]
     #[expect(clippy::too_many_arguments, reason = "keywords in Python")]
     fn decide(
         &self,
@@ -115,7 +129,15 @@ impl Mppi {
     ///
     /// points_m: float64 (point, 2), x_m, y_m of at least two corners. tolerance_m: distance from the last of them at which the
     /// end counts as reached. All else as `decide`.
-    #[pyo3(signature = (state, risk_map, points_m, speed_mps, *, tolerance_m=0.5, elapsed_s=None))]
+    #[pyo3(signature = (
+        state: "_Floats",
+        risk_map,
+        points_m: "_Float64",
+        speed_mps,
+        *,
+        tolerance_m=0.5,
+        elapsed_s=None,
+    ))]
     #[expect(clippy::too_many_arguments, reason = "keywords in Python")]
     fn follow(
         &self,
@@ -151,32 +173,28 @@ impl Mppi {
         let futures = self.sampled(py, risk_map.get(), |planner, map| planner.futures(n, map))?;
         let n = futures.costs_s.len();
         Ok(Rollouts {
-            states: owned(py, futures.states, [n, self.config.n_steps + 1, N_STATE])?.unbind(),
-            costs_s: owned(py, futures.costs_s, [n])?.unbind(),
-            weights: owned(py, futures.weights, [n])?.unbind(),
+            states: owned(py, futures.states, [n, self.config.n_steps + 1, N_STATE])?,
+            costs_s: owned(py, futures.costs_s, [n])?,
+            weights: owned(py, futures.weights, [n])?,
         })
     }
 
     /// Where the plan leads over the map: float64 (step + 1, 5), the predicted start first.
-    fn trajectory<'py>(
-        &self,
-        py: Python<'py>,
-        risk_map: &Bound<'py, RiskMap>,
-    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    fn trajectory<'py>(&self, py: Python<'py>, risk_map: &Bound<'py, RiskMap>) -> PyResult<Array<f64, Ix2>> {
         let states = self.sampled(py, risk_map.get(), |planner, map| planner.trajectory(map))?;
         owned(py, states, [self.config.n_steps + 1, N_STATE])
     }
 
     /// The commands of the plan: float32 (step, 2), the one just decided first.
     #[getter]
-    fn plan<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f32>>> {
+    fn plan(&self, py: Python<'_>) -> PyResult<Array<f32, Ix2>> {
         owned(py, self.take(py, |planner, _| planner.plan())?, [self.config.n_steps, 2])
     }
 
     /// What the last decision that sampled tells about itself, as a dict: costs of the cheapest rollout and their means by
     /// term [s], temperature [s], effective sample size, free energy [s], feasible rollouts and so on.
     #[getter]
-    fn diagnostics<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+    fn diagnostics<'py>(&self, py: Python<'py>) -> PyResult<Fields<'py>> {
         dict(py, &self.take(py, |planner, _| planner.diagnostics())?)
     }
 
@@ -190,7 +208,7 @@ impl Mppi {
 
     /// What the vehicle was really told, two numbers as `Decision.command`, from `after_s` after the last decision on,
     /// where that is something else. Numbers that are not finite are no command and change nothing.
-    #[pyo3(signature = (command, after_s=0.0))]
+    #[pyo3(signature = (command: "_Floats", after_s=0.0))]
     fn note_sent(&self, py: Python<'_>, command: &Bound<'_, PyAny>, after_s: f64) -> PyResult<()> {
         let told =
             numbers("command", command, [self.state_names[3], self.state_names[4]])?.map(|part| part as f32);
@@ -210,7 +228,7 @@ impl Mppi {
 
     /// Its settings as a dict.
     #[getter]
-    fn settings<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+    fn settings<'py>(&self, py: Python<'py>) -> PyResult<Fields<'py>> {
         dict(py, &self.config)
     }
 
@@ -362,9 +380,9 @@ impl Decision {
 #[pyclass(frozen, get_all, module = "surefoot")]
 pub struct Rollouts {
     /// Float64 (rollout, step + 1, 5), the start first; see `Mppi.state_names`.
-    states: Py<PyArray3<f64>>,
+    states: Array<f64, Ix3>,
     /// Float32 (rollout,): what each costs [s].
-    costs_s: Py<PyArray1<f32>>,
+    costs_s: Array<f32, Ix1>,
     /// Float32 (rollout,): the share of each in the average; those of all rollouts sum to one.
-    weights: Py<PyArray1<f32>>,
+    weights: Array<f32, Ix1>,
 }

@@ -1,7 +1,7 @@
 //! The least time to the goal over a map.
 
 use mppi::CostToGoConfig;
-use numpy::PyArray2;
+use numpy::ndarray::Ix2;
 use pyo3::prelude::*;
 
 use crate::any_model::AnyModel;
@@ -11,6 +11,7 @@ use crate::failure::refused_value;
 use crate::ground::grid;
 use crate::risk_map::RiskMap;
 use crate::settings::Source;
+use crate::typed::Array;
 
 /// The field of least time to the goal over the known map, which tells the controller what lies beyond its horizon.
 ///
@@ -25,7 +26,7 @@ pub struct CostToGo {
 #[pymethods]
 impl CostToGo {
     #[new]
-    #[pyo3(signature = (model, n_rows, n_cols, settings=None))]
+    #[pyo3(signature = (model, n_rows, n_cols, settings: "_Settings | None" = None))]
     fn new(
         model: AnyModel,
         n_rows: usize,
@@ -43,6 +44,7 @@ impl CostToGo {
 
     /// Solves for the times over the map to the goal, two numbers, x_m, y_m, which may lie beyond it. Raises `ValueError` for a
     /// map of another shape or a goal that is no place; the field is then as it was.
+    #[pyo3(signature = (risk_map, goal_m: "_Floats"))]
     fn update(
         &self,
         py: Python<'_>,
@@ -57,7 +59,7 @@ impl CostToGo {
 
     /// Least time from each cell to the goal [s]: float32 (row, col), zero before the first update, a copy.
     #[getter]
-    fn seconds<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f32>>> {
+    fn seconds(&self, py: Python<'_>) -> PyResult<Array<f32, Ix2>> {
         let seconds = self.field.take(py, |field| field.view().seconds.to_vec())?;
         owned(py, seconds, self.shape)
     }

@@ -15,7 +15,7 @@ use pyo3::prelude::*;
 use runtime::ages::{self, AskedAges};
 use terrain::TerrainClass;
 
-use crate::arrays::{array, numbers, require_shape, values};
+use crate::arrays::{Reals, array, numbers, require_shape, values};
 use crate::failure::{refused, refused_value};
 use crate::keeper::Keeper;
 use crate::running::{Ears, Run, now_ns, refused_channel, require_time, run_name};
@@ -126,7 +126,17 @@ impl Driver {
     /// position_m: rear axle's centre in the map frame, x, y, z. attitude_rad: roll, pitch, yaw. velocity_mps: forward and
     /// leftward, in the body frame. valid_at_ns: when that was; now, if not given. applied: what another than `carry_out` told
     /// the actuators, speed [m/s] and steering angle [rad].
-    #[pyo3(signature = (position_m, attitude_rad, velocity_mps, yaw_rate_radps, *, wheel_speed_mps=None, steering_rad=0.0, valid_at_ns=None, applied=None))]
+    #[pyo3(signature = (
+        position_m: "_Floats",
+        attitude_rad: "_Floats",
+        velocity_mps: "_Floats",
+        yaw_rate_radps,
+        *,
+        wheel_speed_mps=None,
+        steering_rad=0.0,
+        valid_at_ns=None,
+        applied: "tuple[float, float] | None" = None,
+    ))]
     #[expect(clippy::too_many_arguments, reason = "keywords in Python")]
     fn publish_odometry(
         &self,
@@ -138,7 +148,7 @@ impl Driver {
         wheel_speed_mps: Option<f64>,
         steering_rad: f64,
         valid_at_ns: Option<u64>,
-        applied: Option<[f32; 2]>,
+        applied: Option<Reals<f32, 2>>,
     ) -> PyResult<()> {
         let velocity_mps = numbers("velocity_mps", velocity_mps, ["forward", "leftward"])?;
         let record = OdometryRecord {
@@ -158,7 +168,7 @@ impl Driver {
         require_sound((ODOMETRY.check)(&of_time(at_ns), &[record]), "odometry")?;
         let sent = self.voice.ask(py, move |voice| {
             let mut told = *voice.watchdog.applied();
-            if let Some([speed_mps, steering_rad]) = applied {
+            if let Some(Reals([speed_mps, steering_rad])) = applied {
                 told.command = bicycle::Command { speed_mps, steering_rad };
                 (told.since_ns, told.by) = (at_ns, AppliedBy::Vehicle);
             }
@@ -171,6 +181,11 @@ impl Driver {
     ///
     /// times_ns: uint64 (sample,). acceleration_mps2, angular_rate_radps: float32 (sample, 3), body frame; (0, 0, +9.81) at
     /// rest on level ground.
+    #[pyo3(signature = (
+        times_ns: "NDArray[np.uint64]",
+        acceleration_mps2: "_Float32",
+        angular_rate_radps: "_Float32",
+    ))]
     fn publish_imu(
         &self,
         py: Python<'_>,
@@ -208,7 +223,14 @@ impl Driver {
     /// points: float32 (point, 3) [m], in the frame of `sensor`: 0 the vehicle's body, else the robot file's sensor of this
     /// number. terrain_class: uint8 (point,), 0 open, 1 loose, 2 vegetation, 3 obstacle; all open, if not given. origin_m:
     /// where the rays start, in the frame of the points.
-    #[pyo3(signature = (points, terrain_class=None, *, sensor=0, origin_m=[0.0; 3], valid_at_ns=None))]
+    #[pyo3(signature = (
+        points: "_Float32",
+        terrain_class: "_Uint8 | None" = None,
+        *,
+        sensor=0,
+        origin_m: "Sequence[float]" = Reals([0.0; 3]),
+        valid_at_ns=None,
+    ))]
     #[expect(clippy::too_many_arguments, reason = "keywords in Python")]
     fn publish_scan(
         &self,
@@ -216,7 +238,7 @@ impl Driver {
         points: &Bound<'_, PyAny>,
         terrain_class: Option<&Bound<'_, PyAny>>,
         sensor: u32,
-        origin_m: [f32; 3],
+        origin_m: Reals<f32, 3>,
         valid_at_ns: Option<u64>,
     ) -> PyResult<()> {
         let found = array::<f32, Ix2>("points", points, "point, 3")?;
@@ -239,7 +261,7 @@ impl Driver {
         let records: Vec<PointRecord> = records.collect();
         let at_ns = valid_at_ns.unwrap_or_else(now_ns);
         require_time("valid_at_ns", at_ns)?;
-        let header = ScanHeader { stamp: of_time(at_ns), origin_m, sensor };
+        let header = ScanHeader { stamp: of_time(at_ns), origin_m: origin_m.0, sensor };
         require_sound((SCAN.check)(&header, &records), "points")?;
         let sent = self.voice.ask(py, move |voice| {
             let mut loan = voice.scans.write(records.len(), |place| records[place])?;
@@ -251,16 +273,17 @@ impl Driver {
 
     /// Says where to go, in place of the run's own mission process: to be repeated once a second. outcome: 0 under way, 1
     /// goal reached, 6 out of time; see docs/runtime.md.
-    #[pyo3(signature = (goal_m, tolerance_m, time_s, *, outcome=0))]
+    #[pyo3(signature = (goal_m: "Sequence[float]", tolerance_m, time_s, *, outcome=0))]
     fn publish_mission(
         &self,
         py: Python<'_>,
-        goal_m: [f64; 2],
+        goal_m: Reals<f64, 2>,
         tolerance_m: f64,
         time_s: f64,
         outcome: u64,
     ) -> PyResult<()> {
-        let record = MissionRecord { goal_m, tolerance_m, time_s, outcome, ..MissionRecord::default() };
+        let record =
+            MissionRecord { goal_m: goal_m.0, tolerance_m, time_s, outcome, ..MissionRecord::default() };
         require_sound((MISSION.check)(&of_time(now_ns()), &[record]), "a mission")?;
         let sent = self.voice.ask(py, move |voice| {
             let mut outlet = match voice.missions.take() {

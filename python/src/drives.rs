@@ -3,15 +3,19 @@
 use std::path::{Path, PathBuf};
 
 use bicycle::{Column, DriveLog, DriveRow};
-use formats::{ColumnNames, DriveFileError, DriveLogFileError, McapReadError};
+use formats::{
+    ColumnNames, DescribedVehicle, DriveFileError, DriveLogFileError, GapVehicleError, McapReadError,
+};
 use numpy::{PyArray1, PyArrayMethods, PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList, PyString, PyTuple};
-use sim_to_real::Drives;
+use sim_to_real::{Drives, Machine};
 
 use crate::arrays::{kind, shape};
-use crate::failure::{refused, refused_file, refused_type, refused_value};
+use crate::failure::{refused, refused_config, refused_file, refused_type, refused_value};
 use crate::recording::Recording;
+use crate::settings::{Source, fields_of};
+use crate::vehicle::Vehicle;
 
 const DRIVES: &str = "a list of drives: data frames, dicts of arrays, recordings or paths of files";
 
@@ -91,6 +95,34 @@ fn of_file(path: &Path, names: &ColumnNames, doubts: &mut Vec<String>) -> PyResu
     let name = path.display().to_string();
     doubts.extend(drive.ended_early.map(|problem| format!("{name}: the recording ends early, {problem}")));
     Ok((name, drive.log))
+}
+
+/// The vehicle that was driven: a [`Vehicle`], the name of one, the path of a file, a dict or a dataclass.
+pub fn machine(found: &Bound<'_, PyAny>, drives: &[bicycle::DriveLog]) -> PyResult<Machine> {
+    if let Ok(vehicle) = found.cast::<Vehicle>() {
+        return Ok(Machine::of_vehicle(&vehicle.get().0));
+    }
+    if let Some(description) = fields_of(found)? {
+        let source = Source::of_fields("vehicle", &description)?;
+        let vehicle = source.with_text(|text| formats::parse_gap_vehicle(text, Path::new("")));
+        return Ok(Machine::of_case(vehicle.map_err(refused_vehicle)?, drives));
+    }
+    let Ok(path) = found.extract::<PathBuf>() else {
+        let expected =
+            "a Vehicle, the name of one, the path of a vehicle's file, a dict or a dataclass of it";
+        return Err(refused_type("vehicle", expected, kind(found)));
+    };
+    let vehicle: DescribedVehicle =
+        formats::read_described_vehicle(&path.to_string_lossy()).map_err(refused_vehicle)?;
+    Ok(Machine::described(vehicle, drives))
+}
+
+fn refused_vehicle(error: GapVehicleError) -> PyErr {
+    match error {
+        GapVehicleError::Config(error) => refused_config(error),
+        GapVehicleError::Unreadable { ref file, ref source } => refused_file(Path::new(file), source),
+        other => refused_value(other),
+    }
 }
 
 /// The columns of a table that have a meaning.

@@ -5,11 +5,12 @@ use numpy::ndarray::{Ix1, Ix2};
 use pyo3::prelude::*;
 use terrain::{ElevationConfig, Pose, RangePoint, Scan, TerrainClass};
 
-use crate::arrays::{array, numbers, optional, require_shape, values};
+use crate::arrays::{Reals, array, numbers, optional, require_shape, values};
 use crate::detached::Turns;
 use crate::failure::{refused, refused_value};
 use crate::ground::Surface;
 use crate::settings::{Source, dict};
+use crate::typed::Fields;
 
 /// The semantic elevation map: fused from scans and poses, its window follows the vehicle.
 ///
@@ -24,7 +25,7 @@ pub struct ElevationMap {
 #[pymethods]
 impl ElevationMap {
     #[new]
-    #[pyo3(signature = (settings=None))]
+    #[pyo3(signature = (settings: "_Settings | None" = None))]
     fn new(settings: Option<&Bound<'_, PyAny>>) -> PyResult<Self> {
         let config: ElevationConfig = match settings {
             Some(settings) => Source::new("settings", settings)?.parse(formats::ConfigText::parse)?,
@@ -41,7 +42,14 @@ impl ElevationMap {
     /// open where there is none. origin_m: where the rays start in the body frame [m]. valid_at_ns: when it was measured,
     /// on a clock that only goes on. Points and classes are interleaved, which copies them; points that are no numbers are
     /// dropped and counted. Raises `ValueError` for a pose or an origin that is no place; the map is then as it was.
-    #[pyo3(signature = (points, pose, *, terrain_class=None, origin_m=[0.0; 3], valid_at_ns=0))]
+    #[pyo3(signature = (
+        points: "_Float32",
+        pose: "_Floats",
+        *,
+        terrain_class: "_Uint8 | None" = None,
+        origin_m: "Sequence[float]" = Reals([0.0; 3]),
+        valid_at_ns=0,
+    ))]
     #[expect(clippy::too_many_arguments, reason = "keywords in Python")]
     fn fuse(
         &self,
@@ -49,13 +57,13 @@ impl ElevationMap {
         points: &Bound<'_, PyAny>,
         pose: &Bound<'_, PyAny>,
         terrain_class: Option<&Bound<'_, PyAny>>,
-        origin_m: [f32; 3],
+        origin_m: Reals<f32, 3>,
         valid_at_ns: u64,
     ) -> PyResult<FuseReport> {
         let [x_m, y_m, z_m, roll_rad, pitch_rad, yaw_rad] =
             numbers("pose", pose, ["x_m", "y_m", "z_m", "roll_rad", "pitch_rad", "yaw_rad"])?;
         let pose = Pose { x_m, y_m, z_m, roll_rad, pitch_rad, yaw_rad };
-        let scan = Scan { valid_at_ns, origin_m, points: range_points(points, terrain_class)? };
+        let scan = Scan { valid_at_ns, origin_m: origin_m.0, points: range_points(points, terrain_class)? };
         let report = self.map.take(py, |map| map.fuse(&scan, &pose))?.map_err(refused_value)?;
         Ok(FuseReport {
             n_points: report.n_points,
@@ -73,7 +81,7 @@ impl ElevationMap {
 
     /// Its settings as a dict.
     #[getter]
-    fn settings<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, pyo3::types::PyDict>> {
+    fn settings<'py>(&self, py: Python<'py>) -> PyResult<Fields<'py>> {
         dict(py, &self.config)
     }
 

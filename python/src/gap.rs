@@ -4,25 +4,26 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use bicycle::Column;
-use formats::{DescribedVehicle, DriveLogFile, GapVehicleError};
+use formats::DriveLogFile;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyString};
 use report::gap::Told;
 use sim_to_real::{
-    Answer, Baseline, Case, Diagnosed, Diagnosis, Drives, InSimulatorDiagnosis, InSimulatorError, Machine,
-    Manoeuvre, PartUnknown, Verification, WithoutSimulator, decide_in_simulator, diagnose_without_simulator,
-    own_runs, repaired, verify,
+    Answer, Baseline, Case, Diagnosed, Diagnosis, Drives, InSimulatorDiagnosis, InSimulatorError, Manoeuvre,
+    PartUnknown, Verification, WithoutSimulator, decide_in_simulator, diagnose_without_simulator, own_runs,
+    repaired, verify,
 };
 
 use crate::arrays::kind;
 use crate::detached::{detached, interruptible};
-use crate::drives::{column_names, drives};
-use crate::failure::{refused_config, refused_file, refused_type, refused_value};
+use crate::drives::{column_names, drives, machine};
+use crate::failure::{refused_type, refused_value};
 use crate::frames::{frame, in_notebook};
 use crate::model::Model;
 use crate::own_simulator::OwnSimulator;
 use crate::recording::log_columns;
-use crate::settings::Source;
+use crate::settings::json_dict;
+use crate::typed::{Fields, Intervals};
 use crate::vehicle::Vehicle;
 
 /// Where the designed commands stand, as the advice says it.
@@ -35,7 +36,7 @@ const MANOEUVRE: &str = "manoeuvre.csv";
 /// where they are there: x, y [m], yaw [rad], vx [m/s], wz [rad/s], roll, pitch, and `run`, in which `t` begins anew), a
 /// `Recording`, or the path of a CSV file or a recording. sim holds drives of the simulator, at least two of them, or none,
 /// and then a bare bicycle stands for it; heldout are used for nothing but to verify the answer. vehicle: a `Vehicle`, the
-/// name of one that ships, the path of a vehicle's file, or a dict of it ("name", "wheelbase" [m], and where they are known
+/// name of one that ships, the path of a vehicle's file, or a dict or a dataclass of it ("name", "wheelbase" [m], and where known
 /// "max_steer" [rad], "max_speed" [m/s], "noise"). columns: a dict from our names to yours, {"vx": "wheel_speed"}.
 /// simulator: a callable that drives commands as your simulator does and so decides; see docs/python.md. name: for the
 /// report.
@@ -43,7 +44,16 @@ const MANOEUVRE: &str = "manoeuvre.csv";
 /// Returns a `GapReport`. Takes from seconds to minutes; Ctrl-C ends it. Raises `ValueError` for drives that would be
 /// misread, with what gave them away, and what the callable raises.
 #[pyfunction]
-#[pyo3(signature = (sim, real, vehicle, *, heldout=None, columns=None, simulator=None, name=None))]
+#[pyo3(signature = (
+    sim: "Sequence[_Drive]",
+    real: "Sequence[_Drive]",
+    vehicle: "Vehicle | _Path | _Description",
+    *,
+    heldout: "Sequence[_Drive] | None" = None,
+    columns: "dict[str, str] | None" = None,
+    simulator: "Callable[[dict[str, Any]], Mapping[str, Any]] | None" = None,
+    name=None,
+))]
 #[expect(clippy::too_many_arguments, reason = "keywords in Python")]
 pub fn diagnose(
     py: Python<'_>,
@@ -195,32 +205,6 @@ fn told(error: InSimulatorError<PyErr>) -> PyErr {
     }
 }
 
-fn machine(found: &Bound<'_, PyAny>, drives: &[bicycle::DriveLog]) -> PyResult<Machine> {
-    if let Ok(vehicle) = found.cast::<Vehicle>() {
-        return Ok(Machine::of_vehicle(&vehicle.get().0));
-    }
-    if let Ok(description) = found.cast::<PyDict>() {
-        let source = Source::of_dict("vehicle", description)?;
-        let vehicle = source.with_text(|text| formats::parse_gap_vehicle(text, Path::new("")));
-        return Ok(Machine::of_case(vehicle.map_err(refused_vehicle)?, drives));
-    }
-    let Ok(path) = found.extract::<PathBuf>() else {
-        let expected = "a Vehicle, the name of one, the path of a vehicle's file or a dict of it";
-        return Err(refused_type("vehicle", expected, kind(found)));
-    };
-    let vehicle: DescribedVehicle =
-        formats::read_described_vehicle(&path.to_string_lossy()).map_err(refused_vehicle)?;
-    Ok(Machine::described(vehicle, drives))
-}
-
-fn refused_vehicle(error: GapVehicleError) -> PyErr {
-    match error {
-        GapVehicleError::Config(error) => refused_config(error),
-        GapVehicleError::Unreadable { ref file, ref source } => refused_file(Path::new(file), source),
-        other => refused_value(other),
-    }
-}
-
 /// What separates a robot from its simulator, as `surefoot gap diagnose` tells it.
 ///
 /// Made by `surefoot.gap.diagnose`. In a notebook it shows itself as a page; `print` tells it in words.
@@ -280,15 +264,14 @@ impl GapReport {
 impl GapReport {
     /// The whole answer as a dict: that of `answer.json`, whose layout has the version `schema_version`.
     #[getter]
-    fn answer<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let text = serde_json::to_string(&self.answer).map_err(refused_value)?;
-        py.import("json")?.call_method1("loads", (text,))
+    fn answer<'py>(&self, py: Python<'py>) -> PyResult<Fields<'py>> {
+        json_dict(py, &serde_json::to_vec(&self.answer).map_err(refused_value)?)
     }
 
     /// The conclusion: "none", "effects", "effects_and_unknown" or "unknown".
     #[getter]
-    fn verdict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        self.answer(py)?.get_item("verdict")
+    fn verdict(&self, py: Python<'_>) -> PyResult<String> {
+        self.answer(py)?.0.as_any().get_item("verdict")?.extract()
     }
 
     /// Ids of the announced effects, strongest first.
@@ -300,7 +283,7 @@ impl GapReport {
     /// Best value and the ends of the 90 % interval of every parameter: {effect: {parameter: (value, low, high)}}, in the
     /// unit that the parameter's name ends in.
     #[getter]
-    fn intervals<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+    fn intervals<'py>(&self, py: Python<'py>) -> PyResult<Intervals<'py>> {
         let effects = PyDict::new(py);
         for effect in &self.answer.effects {
             let parameters = PyDict::new(py);
@@ -309,7 +292,7 @@ impl GapReport {
             }
             effects.set_item(&effect.id, parameters)?;
         }
-        Ok(effects)
+        Ok(Intervals(effects))
     }
 
     /// What is doubtful about the drives, in sentences.
@@ -348,6 +331,7 @@ impl GapReport {
 /// The drive that would tell apart what a diagnosis leaves open: a table with t [s], cmd_speed [m/s] and cmd_steer [rad],
 /// 50 Hz, for level ground; `None` where no drive would help.
 #[pyfunction]
+#[pyo3(signature = (report) -> "pd.DataFrame | None")]
 pub fn manoeuvre<'py>(py: Python<'py>, report: &GapReport) -> PyResult<Option<Bound<'py, PyAny>>> {
     let Some(manoeuvre) = &report.manoeuvre else { return Ok(None) };
     let columns =
@@ -361,7 +345,7 @@ pub fn manoeuvre<'py>(py: Python<'py>, report: &GapReport) -> PyResult<Option<Bo
 /// whether to apply what is named where a part of the gap stays unknown, for which it may stand. Returns a `Model`; raises
 /// `ValueError` for an answer that names no effect, or none that a model can hold.
 #[pyfunction]
-#[pyo3(signature = (diagnosis, model, *, force=false))]
+#[pyo3(signature = (diagnosis: "GapReport | dict[str, Any] | _Path", model: "Model | Vehicle", *, force=false))]
 pub fn apply(diagnosis: &Bound<'_, PyAny>, model: &Bound<'_, PyAny>, force: bool) -> PyResult<Model> {
     let model = if let Ok(vehicle) = model.cast::<Vehicle>() {
         bicycle::Model::of(&vehicle.get().0)

@@ -1,13 +1,14 @@
 //! The ground as arrays.
 
+use numpy::PyUntypedArrayMethods;
 use numpy::ndarray::{Ix2, Ix3};
-use numpy::{PyArray2, PyArray3, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use terrain::{GridGeometry, GridMap, Knowledge, LATTICE_MAX, SurfaceCell, TerrainClass};
 
 use crate::arrays::{array, optional, owned, require_shape, values};
 use crate::failure::refused;
+use crate::typed::{Array, Scalar};
 
 /// Cells of a map: as many as an elevation map may have.
 const CELLS_MAX: usize = 1 << 22;
@@ -34,7 +35,17 @@ impl Surface {
     /// height_variance_m2: float32 (row, col). knowledge: uint8 (row, col), 1 where a height was filled in between measured
     /// ones, else 2, and 0 where nothing is known. Cells are interleaved, so each array is copied. Raises `TypeError` for another type of number, `ValueError` for another shape and for values that no ground has.
     #[staticmethod]
-    #[pyo3(signature = (height_m, resolution_m, *, origin=(0, 0), terrain_class=None, vegetation_height_m=None, height_variance_m2=None, class_probability=None, knowledge=None))]
+    #[pyo3(signature = (
+        height_m: "_Float32",
+        resolution_m,
+        *,
+        origin=(0, 0),
+        terrain_class: "_Uint8 | None" = None,
+        vegetation_height_m: "_Float32 | None" = None,
+        height_variance_m2: "_Float32 | None" = None,
+        class_probability: "_Float32 | None" = None,
+        knowledge: "_Uint8 | None" = None,
+    ))]
     #[expect(clippy::too_many_arguments, reason = "keywords in Python")]
     fn from_arrays(
         height_m: &Bound<'_, PyAny>,
@@ -106,31 +117,31 @@ impl Surface {
 
     /// Height of the ground itself, below plants [m]: float32 (row, col), NaN where unknown.
     #[getter]
-    fn height_m<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f32>>> {
+    fn height_m(&self, py: Python<'_>) -> PyResult<Array<f32, Ix2>> {
         self.cells(py, |cell| cell.height_m)
     }
 
     /// Variance of the height [m2]: float32 (row, col), infinite where unknown.
     #[getter]
-    fn height_variance_m2<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f32>>> {
+    fn height_variance_m2(&self, py: Python<'_>) -> PyResult<Array<f32, Ix2>> {
         self.cells(py, |cell| cell.height_variance_m2)
     }
 
     /// Height of soft plants above the ground [m]: float32 (row, col).
     #[getter]
-    fn vegetation_height_m<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f32>>> {
+    fn vegetation_height_m(&self, py: Python<'_>) -> PyResult<Array<f32, Ix2>> {
         self.cells(py, |cell| cell.vegetation_height_m)
     }
 
     /// Likeliest class: uint8 (row, col), 0 open, 1 loose, 2 vegetation, 3 obstacle.
     #[getter]
-    fn terrain_class<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<u8>>> {
+    fn terrain_class(&self, py: Python<'_>) -> PyResult<Array<u8, Ix2>> {
         self.cells(py, |cell| cell.class() as u8)
     }
 
     /// Probability of each class: float32 (row, col, class).
     #[getter]
-    fn class_probability<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f32>>> {
+    fn class_probability(&self, py: Python<'_>) -> PyResult<Array<f32, Ix3>> {
         let (n_rows, n_cols) = self.shape();
         let values = self.0.values().iter().flat_map(|cell| cell.class_probability).collect();
         owned(py, values, [n_rows, n_cols, TerrainClass::COUNT])
@@ -138,7 +149,7 @@ impl Surface {
 
     /// How the height came to be known: uint8 (row, col), 0 unknown, 1 interpolated, 2 measured.
     #[getter]
-    fn knowledge<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<u8>>> {
+    fn knowledge(&self, py: Python<'_>) -> PyResult<Array<u8, Ix2>> {
         self.cells(py, |cell| cell.knowledge as u8)
     }
 
@@ -153,7 +164,7 @@ impl Surface {
         layers.set_item("class_probability", self.class_probability(py)?)?;
         layers.set_item("knowledge", self.knowledge(py)?)?;
         let make = with_keywords(&py.get_type::<Self>().getattr("from_arrays")?, &layers)?;
-        Ok((make, (self.height_m(py)?.into_any(), self.resolution_m())))
+        Ok((make, (self.height_m(py)?.0.into_bound(py).into_any(), self.resolution_m())))
     }
 
     fn __repr__(&self) -> String {
@@ -163,11 +174,7 @@ impl Surface {
 }
 
 impl Surface {
-    fn cells<'py, T: numpy::Element>(
-        &self,
-        py: Python<'py>,
-        of: impl Fn(&SurfaceCell) -> T,
-    ) -> PyResult<Bound<'py, PyArray2<T>>> {
+    fn cells<T: Scalar>(&self, py: Python<'_>, of: impl Fn(&SurfaceCell) -> T) -> PyResult<Array<T, Ix2>> {
         let (n_rows, n_cols) = self.shape();
         owned(py, self.0.values().iter().map(of).collect(), [n_rows, n_cols])
     }

@@ -11,6 +11,8 @@ use crate::belief::Evidential;
 use crate::detached::detached;
 use crate::failure::refused_value;
 use crate::frames::in_notebook;
+use crate::settings::json_dict;
+use crate::typed::Fields;
 use crate::vehicle::Vehicle;
 
 /// Holds what was foretold of the ground against what recorded drives met on it.
@@ -20,7 +22,13 @@ use crate::vehicle::Vehicle;
 /// that drove. evidential: the networks that judge the ground; without, physics alone does. Returns a `GroundReport`. Raises
 /// `ValueError` for what is no drive or has no maps.
 #[pyfunction]
-#[pyo3(signature = (drives, vehicle, *, reference=Vec::new(), evidential=None))]
+#[pyo3(signature = (
+    drives: "Sequence[_Path]",
+    vehicle,
+    *,
+    reference: "Sequence[_Path]" = Vec::new(),
+    evidential=None,
+))]
 pub fn ground(
     py: Python<'_>,
     drives: Vec<PathBuf>,
@@ -71,9 +79,8 @@ impl GroundReport {
 impl GroundReport {
     /// All numbers as a dict: that of `ground.json`, whose layout has the version `schema_version`.
     #[getter]
-    fn numbers<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let text = serde_json::to_string(&self.report).map_err(refused_value)?;
-        py.import("json")?.call_method1("loads", (text,))
+    fn numbers<'py>(&self, py: Python<'py>) -> PyResult<Fields<'py>> {
+        json_dict(py, &serde_json::to_vec(&self.report).map_err(refused_value)?)
     }
 
     /// Id of what has changed since the reference drives; `None` where nothing has, or nothing known explains it.

@@ -5,6 +5,7 @@
 //! reaches them, and hands their results on as arrays; `docs/python.md` is its manual, `python/examples` are its examples.
 //!
 //! - `arrays`: what may come in as an array and what is said where it may not, and how results become arrays.
+//! - `typed`: what type results have in Python, for the stubs, which are generated.
 //! - `settings`: TOML text, files and dicts are one thing to the crates, the text that a configuration file holds.
 //! - `detached`: work without Python's lock, in threads that survive a fork, whose panics become an exception.
 //! - `frames`, `recording`: recordings as tables, maps and clouds.
@@ -42,6 +43,7 @@ mod settings;
 mod simulation;
 mod task;
 mod training;
+mod typed;
 mod vehicle;
 
 /// The module that Python loads; the package `surefoot` gives its names to users.

@@ -5,10 +5,10 @@ use std::path::PathBuf;
 use bicycle::{MotionModel, SkidSteer};
 use formats::{ConfigText, parse_model, read_model};
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
 
 use crate::failure::{refused_config, refused_value};
 use crate::settings::{Source, dict};
+use crate::typed::Fields;
 
 /// The kinematic bicycle with its effects: `wheelbase_m`, `[limits]`, and one `[[effects]]` per effect.
 ///
@@ -32,14 +32,15 @@ impl Model {
         Source::of_text(name, text).parse(parse_model).map(Self)
     }
 
-    /// From a dict of what stands in the file.
+    /// From a dict of what stands in the file, or a dataclass with such fields, of which those that are None count as absent.
     #[staticmethod]
-    fn from_dict(description: &Bound<'_, PyDict>) -> PyResult<Self> {
-        Source::of_dict("model", description)?.parse(parse_model).map(Self)
+    #[pyo3(signature = (description: "_Description"))]
+    fn from_dict(description: &Bound<'_, PyAny>) -> PyResult<Self> {
+        Source::of_description("model", description)?.parse(parse_model).map(Self)
     }
 
     /// A dict of what stands in the file.
-    fn to_dict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+    fn to_dict<'py>(&self, py: Python<'py>) -> PyResult<Fields<'py>> {
         dict(py, &self.0)
     }
 
@@ -56,7 +57,7 @@ impl Model {
         self.0 == other.0
     }
 
-    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, (Bound<'py, PyDict>,))> {
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, (Fields<'py>,))> {
         Ok((py.get_type::<Self>().getattr("from_dict")?, (self.to_dict(py)?,)))
     }
 }
@@ -78,14 +79,15 @@ impl SkidSteerModel {
         Self::checked(Source::of_text(name, text).parse(ConfigText::parse)?)
     }
 
-    /// From a dict of what stands in the file.
+    /// From a dict of what stands in the file, or a dataclass with such fields, of which those that are None count as absent.
     #[staticmethod]
-    fn from_dict(description: &Bound<'_, PyDict>) -> PyResult<Self> {
-        Self::checked(Source::of_dict("model", description)?.parse(ConfigText::parse)?)
+    #[pyo3(signature = (description: "_Description"))]
+    fn from_dict(description: &Bound<'_, PyAny>) -> PyResult<Self> {
+        Self::checked(Source::of_description("model", description)?.parse(ConfigText::parse)?)
     }
 
     /// A dict of what stands in the file.
-    fn to_dict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+    fn to_dict<'py>(&self, py: Python<'py>) -> PyResult<Fields<'py>> {
         dict(py, &self.0)
     }
 
@@ -101,7 +103,7 @@ impl SkidSteerModel {
         self.0 == other.0
     }
 
-    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, (Bound<'py, PyDict>,))> {
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, (Fields<'py>,))> {
         Ok((py.get_type::<Self>().getattr("from_dict")?, (self.to_dict(py)?,)))
     }
 }

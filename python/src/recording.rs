@@ -11,7 +11,7 @@ use formats::{
 };
 use numpy::IntoPyArray;
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyTuple};
+use pyo3::types::PyDict;
 use runtime::recorder::topic;
 use runtime::replay::{Row, recorded_odometry, recorded_rows};
 use terrain::Scan;
@@ -22,6 +22,8 @@ use crate::detached::{Interrupts, detached};
 use crate::failure::{refused, refused_file, refused_value};
 use crate::frames::{frame, recorded, words};
 use crate::ground::Surface;
+use crate::settings::json_dict;
+use crate::typed::Fields;
 
 const DRIVE_LOG: &str = "/drive_log";
 const DECISION: &str = "/decision";
@@ -199,21 +201,22 @@ impl Recording {
 
     /// What is needed to repeat the run, as a dict; `None` where it was not recorded.
     #[getter]
-    fn setup<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
-        let parsed = self.setup.as_ref().map(|text| py.import("json")?.call_method1("loads", (&text[..],)));
-        parsed.transpose()
+    fn setup<'py>(&self, py: Python<'py>) -> PyResult<Option<Fields<'py>>> {
+        self.setup.as_ref().map(|text| json_dict(py, text)).transpose()
     }
 
     /// The drive log: `time_ns`, `t` [s], `run`, and what was measured and commanded, x, y, yaw, vx, wz, cmd_speed,
     /// cmd_steer and so on, in metres, radians and seconds; NaN where nothing was measured.
     ///
     /// Raises `ValueError` where the recording has none.
+    #[pyo3(signature = () -> "pd.DataFrame")]
     fn drive_log<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.log_columns(py, |_| true)
     }
 
     /// Where the vehicle was and how it moved, under the names of the drive log: every message of the odometry where these
     /// were recorded (`surefoot up`), else the rows of the drive log.
+    #[pyo3(signature = () -> "pd.DataFrame")]
     fn odometry<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         if !self.topics.contains_key(topic::ODOMETRY) {
             return self.log_columns(py, |column| !is_command(column));
@@ -223,16 +226,19 @@ impl Recording {
     }
 
     /// What the vehicle was told: `time_ns`, `t`, and the columns of the drive log that begin with cmd_.
+    #[pyo3(signature = () -> "pd.DataFrame")]
     fn commands<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.log_columns(py, is_command)
     }
 
     /// What was decided in each cycle: `decision` is drive, hold or stop, `reason` says why it is not drive.
+    #[pyo3(signature = () -> "pd.DataFrame")]
     fn decisions<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.rows_of(py, DECISION, |message| Ok(vec![json_row(message)?]))
     }
 
     /// Figures of the controller in each cycle, of recordings of `surefoot drive`.
+    #[pyo3(signature = () -> "pd.DataFrame")]
     fn controller<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.rows_of(py, CONTROLLER, |message| Ok(vec![json_row(message)?]))
     }
@@ -241,6 +247,7 @@ impl Recording {
     /// record (of scans and maps the headers). Names are those of the fields.
     ///
     /// Raises `ValueError` for a topic that is not there or holds something else.
+    #[pyo3(signature = (topic) -> "pd.DataFrame")]
     fn table<'py>(&self, py: Python<'py>, topic: &str) -> PyResult<Bound<'py, PyAny>> {
         let found = self.require(topic)?;
         if topic == DRIVE_LOG {
@@ -306,7 +313,7 @@ impl RecordedMessages {
         own
     }
 
-    fn __next__<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyTuple>>> {
+    fn __next__<'py>(&self, py: Python<'py>) -> PyResult<Option<(u64, Bound<'py, PyAny>)>> {
         let mut interrupts = Interrupts::default();
         let message = detached(py, || {
             let mut messages = self.messages.lock().unwrap_or_else(PoisonError::into_inner);
@@ -327,7 +334,7 @@ impl RecordedMessages {
             Kind::Risk => risk_dict(py, recorded_risk(&message).map_err(told)?)?.into_any(),
             Kind::Scan => scan_dict(py, &recorded_scan(&message).map_err(told)?)?.into_any(),
         };
-        Ok(Some((message.log_time_ns, content).into_pyobject(py)?))
+        Ok(Some((message.log_time_ns, content)))
     }
 }
 

@@ -1,7 +1,7 @@
 //! The risk map as arrays.
 
-use numpy::ndarray::Ix4;
-use numpy::{PyArray2, PyArray3, PyArray4, PyArrayMethods, PyReadonlyArray4, PyUntypedArrayMethods};
+use numpy::ndarray::{Ix2, Ix3, Ix4};
+use numpy::{PyArray4, PyArrayMethods, PyReadonlyArray4, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use terrain::{Cell, GridGeometry};
@@ -10,6 +10,7 @@ use traversability::{Ground, GroundFlags, Risk, RiskMapView};
 use crate::arrays::{array, numbers, owned, require_shape, values};
 use crate::failure::{refused, refused_value};
 use crate::ground::{Pickled, grid, layer, pairs, require_classes, with_keywords};
+use crate::typed::{Array, Scalar};
 
 /// Numbers of one risk: linear traction, angular traction, |roll|, |pitch|.
 const N_PARAMETERS: usize = 4;
@@ -50,7 +51,15 @@ impl RiskMap {
     /// changes the map, and may do so between calls. Raises `TypeError` for another type of number, `ValueError` for
     /// another shape, and for values out of range with their place.
     #[staticmethod]
-    #[pyo3(signature = (risks, resolution_m, *, origin=(0, 0), gradient=None, terrain_class=None, flags=None))]
+    #[pyo3(signature = (
+        risks: "_Float32",
+        resolution_m,
+        *,
+        origin=(0, 0),
+        gradient: "_Float32 | None" = None,
+        terrain_class: "_Uint8 | None" = None,
+        flags: "_Uint8 | None" = None,
+    ))]
     #[expect(clippy::too_many_arguments, reason = "keywords in Python")]
     fn from_arrays(
         py: Python<'_>,
@@ -108,32 +117,33 @@ impl RiskMap {
 
     /// The risks that the map reads, float32 (row, col, yaw, 4), to be read: the same memory, no copy.
     #[getter]
-    fn risks<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+    fn risks(&self, py: Python<'_>) -> PyResult<Array<f32, Ix4>> {
         let view = self.risks.bind(py).call_method0("view")?;
         view.getattr("flags")?.setattr("writeable", false)?;
-        Ok(view)
+        Ok(Array(view.cast_into::<PyArray4<f32>>()?.unbind()))
     }
 
     /// Height change per metre east and north: float32 (row, col, 2), a copy.
     #[getter]
-    fn gradient<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f32>>> {
+    fn gradient(&self, py: Python<'_>) -> PyResult<Array<f32, Ix3>> {
         let GridGeometry { n_rows, n_cols, .. } = self.geometry;
         owned(py, self.ground.iter().flat_map(|ground| ground.gradient).collect(), [n_rows, n_cols, 2])
     }
 
     /// What covers the ground: uint8 (row, col), 0 open, 1 loose, 2 vegetation, 3 obstacle, a copy.
     #[getter]
-    fn terrain_class<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<u8>>> {
+    fn terrain_class(&self, py: Python<'_>) -> PyResult<Array<u8, Ix2>> {
         self.cells(py, |ground| ground.class)
     }
 
     /// The sum of 1 obstacle, 2 unknown, 4 out of distribution: uint8 (row, col), a copy.
     #[getter]
-    fn flags<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<u8>>> {
+    fn flags(&self, py: Python<'_>) -> PyResult<Array<u8, Ix2>> {
         self.cells(py, |ground| ground.flags.0)
     }
 
     /// The risk of a pose: linear traction, angular traction, |roll|, |pitch|; all zero beyond the map.
+    #[pyo3(signature = (pose: "_Floats"))]
     fn risk_at(&self, py: Python<'_>, pose: &Bound<'_, PyAny>) -> PyResult<(f32, f32, f32, f32)> {
         let [x_m, y_m, yaw_rad] = numbers("pose", pose, ["x_m", "y_m", "yaw_rad"])?;
         let risk = self.with_view(py, |view| view.risk_at(x_m, y_m, yaw_rad))?;
@@ -147,7 +157,7 @@ impl RiskMap {
         layers.set_item("terrain_class", self.terrain_class(py)?)?;
         layers.set_item("flags", self.flags(py)?)?;
         let make = with_keywords(&py.get_type::<Self>().getattr("from_arrays")?, &layers)?;
-        Ok((make, (self.risks(py)?, self.resolution_m())))
+        Ok((make, (self.risks(py)?.0.into_bound(py).into_any(), self.resolution_m())))
     }
 
     fn __repr__(&self) -> String {
@@ -182,11 +192,7 @@ impl RiskMap {
         view.map(work).map_err(refused_value)
     }
 
-    fn cells<'py, T: numpy::Element>(
-        &self,
-        py: Python<'py>,
-        of: impl Fn(&Ground) -> T,
-    ) -> PyResult<Bound<'py, PyArray2<T>>> {
+    fn cells<T: Scalar>(&self, py: Python<'_>, of: impl Fn(&Ground) -> T) -> PyResult<Array<T, Ix2>> {
         let GridGeometry { n_rows, n_cols, .. } = self.geometry;
         owned(py, self.ground.iter().map(of).collect(), [n_rows, n_cols])
     }
@@ -215,7 +221,7 @@ impl Copied {
     pub fn into_python(self, py: Python<'_>) -> PyResult<RiskMap> {
         let Self { geometry, n_yaws, risks, ground } = self;
         let risks = owned(py, risks, [geometry.n_rows, geometry.n_cols, n_yaws, N_PARAMETERS])?;
-        Ok(RiskMap { geometry, n_yaws, risks: risks.unbind(), ground })
+        Ok(RiskMap { geometry, n_yaws, risks: risks.0, ground })
     }
 }
 

@@ -18,11 +18,13 @@ use pyo3::types::PyDict;
 use runtime::operator;
 use traversability::CvarLevel;
 
+use crate::arrays::Reals;
 use crate::failure::{refused, refused_value};
 use crate::ground::Surface;
 use crate::keeper::Keeper;
 use crate::recording::scan_dict;
 use crate::risk_map::{Copied, RiskMap};
+use crate::typed::Fields;
 
 /// Where an order leaves the tolerance to the run, its own is checked with any that would do.
 const ANY_TOLERANCE_M: f64 = 1.0;
@@ -152,19 +154,14 @@ impl Run {
         }
     }
 
-    fn tell<'py>(&self, py: Python<'py>, order: Order) -> PyResult<Bound<'py, PyDict>> {
+    fn tell<'py>(&self, py: Python<'py>, order: Order) -> PyResult<Fields<'py>> {
         let answered = self.ears.ask(py, move |ears| operator::tell(&ears.bus, &order))?;
         let record =
             answered.map_err(|error| PyRuntimeError::new_err(format!("run {}: {error}", self.name)))?;
         mission_dict(py, &record)
     }
 
-    fn drive<'py>(
-        &self,
-        py: Python<'py>,
-        route: Route,
-        tolerance_m: Option<f64>,
-    ) -> PyResult<Bound<'py, PyDict>> {
+    fn drive<'py>(&self, py: Python<'py>, route: Route, tolerance_m: Option<f64>) -> PyResult<Fields<'py>> {
         let route = if tolerance_m.is_some() { route } else { route.without_tolerance() };
         self.tell(py, Order::Drive(route))
     }
@@ -181,7 +178,7 @@ impl Run {
     /// Where the vehicle is: a dict with "position_m" (x, y, z), "attitude_rad" (roll, pitch, yaw), "velocity_mps" (forward,
     /// leftward), "yaw_rate_radps", "wheel_speed_mps", "steering_rad", and what the actuators were told last,
     /// "applied_speed_mps", "applied_steering_rad".
-    fn odometry<'py>(&self, py: Python<'py>) -> PyResult<Option<(u64, Bound<'py, PyDict>)>> {
+    fn odometry<'py>(&self, py: Python<'py>) -> PyResult<Option<(u64, Fields<'py>)>> {
         let found = self.heard(py, |ears| Ears::newest(&ears.bus, &ODOMETRY, &mut ears.odometry))?;
         let told = |(at_ns, record): (u64, OdometryRecord)| -> PyResult<_> {
             let dict = PyDict::new(py);
@@ -193,14 +190,14 @@ impl Run {
             dict.set_item("steering_rad", record.steering_rad)?;
             dict.set_item("applied_speed_mps", record.applied_speed_mps)?;
             dict.set_item("applied_steering_rad", record.applied_steering_rad)?;
-            Ok((at_ns, dict))
+            Ok((at_ns, Fields(dict)))
         };
         found.map(told).transpose()
     }
 
     /// A sweep of the range sensor: a dict with "points", float32 (point, 3) [m], "terrain_class", uint8 (point,), and
     /// "sensor", whose frame the points are of: 0 the vehicle's body, else the sensor of this number.
-    fn scan<'py>(&self, py: Python<'py>) -> PyResult<Option<(u64, Bound<'py, PyDict>)>> {
+    fn scan<'py>(&self, py: Python<'py>) -> PyResult<Option<(u64, Fields<'py>)>> {
         let found = self.heard(py, |ears| {
             let mut newest = None;
             opened(&ears.bus, &SCAN, &mut ears.scans)?.poll(|header, points| {
@@ -211,7 +208,7 @@ impl Run {
         let told = |(at_ns, sensor, scan): (u64, u32, terrain::Scan)| -> PyResult<_> {
             let dict = scan_dict(py, &scan)?;
             dict.set_item("sensor", sensor)?;
-            Ok((at_ns, dict))
+            Ok((at_ns, Fields(dict)))
         };
         found.map(told).transpose()
     }
@@ -250,7 +247,7 @@ impl Run {
 
     /// What the vehicle shall do: a dict with "decision" (drive, hold or stop), "speed_mps" and "steering_rad", which count
     /// only when driving, and "odometry_at_ns" and "scan_at_ns", of when that was which it was decided on.
-    fn command<'py>(&self, py: Python<'py>) -> PyResult<Option<(u64, Bound<'py, PyDict>)>> {
+    fn command<'py>(&self, py: Python<'py>) -> PyResult<Option<(u64, Fields<'py>)>> {
         let found = self.heard(py, |ears| Ears::newest(&ears.bus, &COMMAND, &mut ears.commands))?;
         let told = |(at_ns, record): (u64, CommandRecord)| -> PyResult<_> {
             let decision = match record.decision() {
@@ -264,7 +261,7 @@ impl Run {
             dict.set_item("steering_rad", record.steering_rad)?;
             dict.set_item("odometry_at_ns", record.odometry_at_ns)?;
             dict.set_item("scan_at_ns", record.scan_at_ns)?;
-            Ok((at_ns, dict))
+            Ok((at_ns, Fields(dict)))
         };
         found.map(told).transpose()
     }
@@ -272,69 +269,71 @@ impl Run {
     /// What the vehicle is told to do: a dict with "goal_m", "tolerance_m", "state" (0 drive, 1 no mission, 2 paused, 3
     /// manual, 4 emergency stop), "outcome" (0 under way, 1 goal reached, see docs/runtime.md), "time_s", "leg", "n_legs",
     /// "alpha" and "told", all that in words.
-    fn mission<'py>(&self, py: Python<'py>) -> PyResult<Option<(u64, Bound<'py, PyDict>)>> {
+    fn mission<'py>(&self, py: Python<'py>) -> PyResult<Option<(u64, Fields<'py>)>> {
         let found = self.heard(py, |ears| Ears::newest(&ears.bus, &MISSION, &mut ears.missions))?;
         found.map(|(at_ns, record)| Ok((at_ns, mission_dict(py, &record)?))).transpose()
     }
 
     /// Drive to these places, one after the other: goals is a list of (x, y) in the map frame [m]. tolerance_m: how near
     /// counts as there; without it as the run was started.
-    #[pyo3(signature = (goals, *, tolerance_m=None))]
+    #[pyo3(signature = (goals: "Sequence[tuple[float, float]]", *, tolerance_m=None))]
     fn goal<'py>(
         &self,
         py: Python<'py>,
-        goals: Vec<[f64; 2]>,
+        goals: Vec<Reals<f64, 2>>,
         tolerance_m: Option<f64>,
-    ) -> PyResult<Bound<'py, PyDict>> {
+    ) -> PyResult<Fields<'py>> {
+        let goals = goals.into_iter().map(|Reals(goal_m)| goal_m).collect();
         let route = Route::goals(goals, tolerance_m.unwrap_or(ANY_TOLERANCE_M)).map_err(refused_value)?;
         self.drive(py, route, tolerance_m)
     }
 
     /// Drive along these corners [m] at a speed [m/s].
-    #[pyo3(signature = (corners, speed_mps, *, tolerance_m=None))]
+    #[pyo3(signature = (corners: "Sequence[tuple[float, float]]", speed_mps, *, tolerance_m=None))]
     fn path<'py>(
         &self,
         py: Python<'py>,
-        corners: Vec<[f64; 2]>,
+        corners: Vec<Reals<f64, 2>>,
         speed_mps: f64,
         tolerance_m: Option<f64>,
-    ) -> PyResult<Bound<'py, PyDict>> {
+    ) -> PyResult<Fields<'py>> {
+        let corners = corners.into_iter().map(|Reals(corner_m)| corner_m).collect();
         let route = Route::path(corners, speed_mps, tolerance_m.unwrap_or(ANY_TOLERANCE_M));
         self.drive(py, route.map_err(refused_value)?, tolerance_m)
     }
 
     /// Stand until told to go on.
-    fn pause<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+    fn pause<'py>(&self, py: Python<'py>) -> PyResult<Fields<'py>> {
         self.tell(py, Order::Pause)
     }
 
     /// Go on; also when an operator gives the wheel back.
-    fn resume<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+    fn resume<'py>(&self, py: Python<'py>) -> PyResult<Fields<'py>> {
         self.tell(py, Order::Resume)
     }
 
     /// Stand; the mission is over.
-    fn cancel<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+    fn cancel<'py>(&self, py: Python<'py>) -> PyResult<Fields<'py>> {
         self.tell(py, Order::Cancel)
     }
 
     /// An operator takes the wheel.
-    fn manual<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+    fn manual<'py>(&self, py: Python<'py>) -> PyResult<Fields<'py>> {
         self.tell(py, Order::TakeOver)
     }
 
     /// Stop, until reset.
-    fn estop<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+    fn estop<'py>(&self, py: Python<'py>) -> PyResult<Fields<'py>> {
         self.tell(py, Order::EmergencyStop)
     }
 
     /// The emergency is over; what was under way is paused.
-    fn reset<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+    fn reset<'py>(&self, py: Python<'py>) -> PyResult<Fields<'py>> {
         self.tell(py, Order::Reset)
     }
 
     /// Plan for this share of the worst outcomes, in (0, 1].
-    fn alpha<'py>(&self, py: Python<'py>, level: f64) -> PyResult<Bound<'py, PyDict>> {
+    fn alpha<'py>(&self, py: Python<'py>, level: f64) -> PyResult<Fields<'py>> {
         let level = CvarLevel::new(level).map_err(|error| refused_value(format!("level: {error}")))?;
         self.tell(py, Order::Tolerate(level))
     }
@@ -344,7 +343,7 @@ impl Run {
     }
 }
 
-fn mission_dict<'py>(py: Python<'py>, record: &MissionRecord) -> PyResult<Bound<'py, PyDict>> {
+fn mission_dict<'py>(py: Python<'py>, record: &MissionRecord) -> PyResult<Fields<'py>> {
     let dict = PyDict::new(py);
     dict.set_item("goal_m", (record.goal_m[0], record.goal_m[1]))?;
     dict.set_item("tolerance_m", record.tolerance_m)?;
@@ -355,7 +354,7 @@ fn mission_dict<'py>(py: Python<'py>, record: &MissionRecord) -> PyResult<Bound<
     dict.set_item("n_legs", record.n_legs)?;
     dict.set_item("alpha", record.alpha)?;
     dict.set_item("told", record.to_string())?;
-    Ok(dict)
+    Ok(Fields(dict))
 }
 
 /// The time now on the clock of all processes [ns]: that of `time.monotonic_ns()`.

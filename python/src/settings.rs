@@ -6,12 +6,13 @@ use std::path::PathBuf;
 use formats::{ConfigError, ConfigText, overlay};
 use navigator::Config;
 use pyo3::prelude::*;
-use pyo3::types::{PyBool, PyDict, PyFloat, PyList, PyString, PyTuple};
+use pyo3::types::{PyBool, PyDict, PyFloat, PyList, PyString, PyTuple, PyType};
 use serde::Serialize;
 use toml::{Table, Value};
 
 use crate::arrays::kind;
 use crate::failure::{refused, refused_config, refused_type, refused_value};
+use crate::typed::Fields;
 use crate::vehicle::AnyVehicle;
 
 /// Tables within tables: no settings have more, and a dict that holds itself has no end.
@@ -24,16 +25,16 @@ pub struct Source {
 }
 
 impl Source {
-    /// A dict, TOML text, or a path (`os.PathLike`) of a file with it; `what` names it in errors.
+    /// A dict, a dataclass, TOML text, or a path (`os.PathLike`) of a file with it; `what` names it in errors.
     pub fn new(what: &str, found: &Bound<'_, PyAny>) -> PyResult<Self> {
-        if let Ok(dict) = found.cast::<PyDict>() {
-            return Self::of_dict(what, dict);
+        if let Some(fields) = fields_of(found)? {
+            return Self::of_fields(what, &fields);
         }
         if let Ok(text) = found.cast::<PyString>() {
             return Ok(Self::of_text(what, &text.to_cow()?));
         }
         let Ok(path) = found.extract::<PathBuf>() else {
-            return Err(refused_type(what, "a dict, TOML text or a path", kind(found)));
+            return Err(refused_type(what, "a dict, a dataclass, TOML text or a path", kind(found)));
         };
         let text = ConfigText::read(&path).map_err(refused_config)?;
         Ok(Self { text, dict_of: None })
@@ -44,9 +45,16 @@ impl Source {
         Self { text: ConfigText::new(name, text), dict_of: None }
     }
 
-    /// A dict of what stands in a file.
-    pub fn of_dict(what: &str, dict: &Bound<'_, PyDict>) -> PyResult<Self> {
-        let text = toml::to_string(&table(&Place::of(what), dict)?).map_err(refused_value)?;
+    /// A dict or a dataclass of what stands in a file.
+    pub fn of_description(what: &str, found: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let fields = fields_of(found)?;
+        let fields = fields.ok_or_else(|| refused_type(what, "a dict or a dataclass", kind(found)))?;
+        Self::of_fields(what, &fields)
+    }
+
+    /// What [`fields_of`] gives.
+    pub fn of_fields(what: &str, fields: &Bound<'_, PyDict>) -> PyResult<Self> {
+        let text = toml::to_string(&table(&Place::of(what), fields)?).map_err(refused_value)?;
         Ok(Self { text: ConfigText::new(what, text), dict_of: Some(what.to_owned()) })
     }
 
@@ -67,17 +75,37 @@ impl Source {
     }
 }
 
+/// A dict as it is; of a dataclass its fields, but those that are None, which no file can say.
+pub fn fields_of<'py>(found: &Bound<'py, PyAny>) -> PyResult<Option<Bound<'py, PyDict>>> {
+    if let Ok(dict) = found.cast::<PyDict>() {
+        return Ok(Some(dict.clone()));
+    }
+    // Of the class itself nothing is set yet.
+    if found.is_instance_of::<PyType>() || !found.get_type().hasattr("__dataclass_fields__")? {
+        return Ok(None);
+    }
+    let dict = PyDict::new(found.py());
+    for field in found.py().import("dataclasses")?.call_method1("fields", (found,))?.try_iter()? {
+        let name = field?.getattr("name")?.cast_into::<PyString>()?;
+        let value = found.getattr(&name)?;
+        if !value.is_none() {
+            dict.set_item(name, value)?;
+        }
+    }
+    Ok(Some(dict))
+}
+
 /// The settings of the whole pipeline that fit a vehicle, with what `changes` says in place of theirs.
 ///
 /// vehicle: `Vehicle` or `SkidSteerVehicle`. changes: a dict, TOML text or a path, of which only what differs need stand
 /// there. Returns a dict whose parts the other classes take: "elevation", "risk_map", "prior", "cost_to_go",
 /// "controller" and so on; what it cannot hold raises `ValueError`.
-#[pyfunction(signature = (vehicle, changes=None))]
+#[pyfunction(signature = (vehicle, changes: "_Settings | None" = None))]
 pub fn settings_for<'py>(
     py: Python<'py>,
     vehicle: AnyVehicle<'py>,
     changes: Option<&Bound<'py, PyAny>>,
-) -> PyResult<Bound<'py, PyDict>> {
+) -> PyResult<Fields<'py>> {
     let fitting = vehicle.config();
     let config = match changes {
         Some(changes) => Source::new("changes", changes)?.parse(|text| overlay(text, &fitting))?,
@@ -91,8 +119,14 @@ pub fn settings_for<'py>(
 }
 
 /// Whatever can be written as TOML as a dict.
-pub fn dict<'py>(py: Python<'py>, settings: &impl Serialize) -> PyResult<Bound<'py, PyDict>> {
-    of_table(py, Table::try_from(settings).map_err(refused_value)?)
+pub fn dict<'py>(py: Python<'py>, settings: &impl Serialize) -> PyResult<Fields<'py>> {
+    of_table(py, Table::try_from(settings).map_err(refused_value)?).map(Fields)
+}
+
+/// JSON as a dict.
+pub fn json_dict<'py>(py: Python<'py>, text: &[u8]) -> PyResult<Fields<'py>> {
+    let read = py.import("json")?.call_method1("loads", (text,))?;
+    Ok(Fields(read.cast_into::<PyDict>()?))
 }
 
 fn of_table(py: Python<'_>, table: Table) -> PyResult<Bound<'_, PyDict>> {
@@ -167,8 +201,8 @@ fn value(place: &Place<'_>, found: &Bound<'_, PyAny>) -> PyResult<Value> {
     if let Ok(value) = found.cast::<PyBool>() {
         return Ok(Value::Boolean(value.is_true()));
     }
-    if let Ok(dict) = found.cast::<PyDict>() {
-        return Ok(Value::Table(table(place, dict)?));
+    if let Some(fields) = fields_of(found)? {
+        return Ok(Value::Table(table(place, &fields)?));
     }
     if let Ok(text) = found.cast::<PyString>() {
         return Ok(Value::String(text.to_cow()?.into_owned()));
@@ -177,7 +211,11 @@ fn value(place: &Place<'_>, found: &Bound<'_, PyAny>) -> PyResult<Value> {
         return list(place, found);
     }
     number(found).ok_or_else(|| {
-        refused_type(&place.to_string(), "a number, a bool, a string, a list or a dict", kind(found))
+        refused_type(
+            &place.to_string(),
+            "a number, a bool, a string, a list, a dict or a dataclass",
+            kind(found),
+        )
     })
 }
 

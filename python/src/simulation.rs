@@ -6,11 +6,10 @@ mod view;
 
 use std::path::PathBuf;
 
-use numpy::ndarray::Ix2;
-use numpy::{PyArray1, PyArray2, PyArray3, PyArray4, PyUntypedArrayMethods};
+use numpy::PyUntypedArrayMethods;
+use numpy::ndarray::{Ix1, Ix2, Ix3, Ix4};
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
 use rayon::prelude::*;
 
 use crate::arrays::{array, kind, owned, require_shape, values};
@@ -19,6 +18,7 @@ use crate::failure::{refused, refused_type};
 use crate::ground::Surface;
 use crate::settings::dict;
 use crate::task::{Task, changed};
+use crate::typed::{Array, Fields};
 use crate::vehicle::Vehicle;
 use drive::{Drive, DriveFault, N_CHANNELS, N_GOAL, N_MEASURED, Settings};
 use view::Frame;
@@ -63,7 +63,7 @@ impl Simulation {
     const LAYER_NAMES: [&'static str; N_CHANNELS] = LAYER_NAMES;
 
     #[new]
-    #[pyo3(signature = (vehicle, task, *, seed=1, ground="sensed", settings=None))]
+    #[pyo3(signature = (vehicle, task, *, seed=1, ground="sensed", settings: "_Settings | None" = None))]
     fn new(
         py: Python<'_>,
         vehicle: &Bound<'_, Vehicle>,
@@ -91,11 +91,11 @@ impl Simulation {
 
     /// The settings that a simulation of a vehicle would have, with what differs: a dict.
     #[staticmethod]
-    #[pyo3(signature = (vehicle, settings=None))]
+    #[pyo3(signature = (vehicle, settings: "_Settings | None" = None))]
     fn settings_for<'py>(
         vehicle: &Bound<'py, Vehicle>,
         settings: Option<&Bound<'py, PyAny>>,
-    ) -> PyResult<Bound<'py, PyDict>> {
+    ) -> PyResult<Fields<'py>> {
         let settings = changed(Settings::for_vehicle(&vehicle.get().0), settings)?;
         settings.check_patch()?;
         dict(vehicle.py(), &settings)
@@ -135,7 +135,7 @@ impl Simulation {
 
     /// True poses so far, the last one now: float64 (pose, 6), x_m, y_m, z_m, roll_rad, pitch_rad, yaw_rad.
     #[getter]
-    fn poses<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    fn poses(&self, py: Python<'_>) -> PyResult<Array<f64, Ix2>> {
         let poses = self.drive.take(py, |drive| drive.poses())?;
         let n_poses = poses.len();
         owned(py, poses.into_flattened(), [n_poses, 6])
@@ -149,7 +149,7 @@ impl Simulation {
     /// The way so far on its ground as a picture: uint8 (row, col, 3), red, green, blue, row 0 in the north. All pictures
     /// of a task have the same size; neither side exceeds side_px, which is from 64 to 2048.
     #[pyo3(signature = (side_px=640))]
-    fn frame<'py>(&self, py: Python<'py>, side_px: u32) -> PyResult<Bound<'py, PyArray3<u8>>> {
+    fn frame(&self, py: Python<'_>, side_px: u32) -> PyResult<Array<u8, Ix3>> {
         if !FRAME_PX.contains(&side_px) {
             return Err(refused("side_px", "from 64 to 2048 pixels", side_px));
         }
@@ -171,7 +171,7 @@ impl Simulation {
 
     /// Its settings as a dict.
     #[getter]
-    fn settings<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+    fn settings<'py>(&self, py: Python<'py>) -> PyResult<Fields<'py>> {
         dict(py, &self.settings)
     }
 
@@ -186,13 +186,13 @@ impl Simulation {
 pub struct Observations {
     /// Float32 (simulation, layer, row, col), `Simulation.LAYER_NAMES`: the ground around the vehicle, turned with it; rows go
     /// forward, columns left. Heights are above the mean under the wheels, zero where nothing is known.
-    ground: Py<PyArray4<f32>>,
+    ground: Array<f32, Ix4>,
     /// Float32 (simulation, 7): what is measured of the motion, `Simulation.STATE_NAMES`.
-    state: Py<PyArray2<f32>>,
+    state: Array<f32, Ix2>,
     /// Float32 (simulation, 2): the goal from the vehicle, forward_m, left_m.
-    goal: Py<PyArray2<f32>>,
+    goal: Array<f32, Ix2>,
     /// Float64 (simulation,): true distance to the goal [m].
-    distance_m: Py<PyArray1<f64>>,
+    distance_m: Array<f64, Ix1>,
     /// How each drive ended, None while it goes on.
     outcomes: Vec<Option<String>>,
 }
@@ -202,7 +202,7 @@ pub struct Observations {
 /// simulations: a sequence of `Simulation`, of the same patch. commands: float32 (simulation, 2), speed [m/s] and steering
 /// angle [rad], each limited by what its vehicle can do; None to look without stepping. A drive that has ended stays as it
 /// is. Raises `ValueError` for commands that are not finite; no simulation has moved then.
-#[pyfunction(signature = (simulations, commands=None))]
+#[pyfunction(signature = (simulations: "Sequence[Simulation]", commands: "_Float32 | None" = None))]
 pub fn step_together(
     py: Python<'_>,
     simulations: &Bound<'_, PyAny>,
@@ -247,10 +247,10 @@ impl Observations {
             outcomes.push(one.outcome);
         }
         Ok(Self {
-            ground: owned(py, ground, [n, N_CHANNELS, n_rows, n_cols])?.unbind(),
-            state: owned(py, state, [n, N_MEASURED])?.unbind(),
-            goal: owned(py, goal, [n, N_GOAL])?.unbind(),
-            distance_m: owned(py, distance_m, [n])?.unbind(),
+            ground: owned(py, ground, [n, N_CHANNELS, n_rows, n_cols])?,
+            state: owned(py, state, [n, N_MEASURED])?,
+            goal: owned(py, goal, [n, N_GOAL])?,
+            distance_m: owned(py, distance_m, [n])?,
             outcomes,
         })
     }

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use bench::closed_loop::layers_of;
 use formats::{overlay, read_elevation};
-use numpy::PyArray2;
+use numpy::ndarray::Ix2;
 use pyo3::prelude::*;
 use scenarios::{ArenaConfig, PairWish, RockFieldConfig, WorldLayers};
 use terrain::{GridGeometry, GridMap};
@@ -14,6 +14,7 @@ use crate::detached::{detached, pool};
 use crate::failure::{refused_elevation, refused_type, refused_value};
 use crate::ground::Surface;
 use crate::settings::Source;
+use crate::typed::Array;
 use crate::vehicle::Vehicle;
 
 /// A drive to be done: a world, a start, a goal.
@@ -31,7 +32,7 @@ impl Task {
     /// test_height_scale, and for "small", "medium", "boulders" and "ridges" density_per_m2, height_m, height_to_radius and
     /// elongation. Raises `ValueError` for a setting out of range.
     #[staticmethod]
-    #[pyo3(signature = (seed, settings=None))]
+    #[pyo3(signature = (seed, settings: "_Settings | None" = None))]
     fn rock_field(py: Python<'_>, seed: u64, settings: Option<&Bound<'_, PyAny>>) -> PyResult<Self> {
         let config = changed(RockFieldConfig::default(), settings)?;
         detached(py, || scenarios::Task::rock_field(&config, seed))?.map(Self).map_err(refused_value)
@@ -41,7 +42,7 @@ impl Task {
     ///
     /// settings: bush_height_m, ramp_height_m, ramp_slope_length_m. Raises `ValueError` for a setting out of range.
     #[staticmethod]
-    #[pyo3(signature = (settings=None))]
+    #[pyo3(signature = (settings: "_Settings | None" = None))]
     fn arena(py: Python<'_>, settings: Option<&Bound<'_, PyAny>>) -> PyResult<Self> {
         let config = changed(ArenaConfig::default(), settings)?;
         detached(py, || scenarios::Task::arena(&config))?.map(Self).map_err(refused_value)
@@ -55,7 +56,15 @@ impl Task {
     /// vehicle can stand and a way is between. Raises `ValueError` for ground without such a pair, `OSError` for a file that
     /// cannot be read.
     #[staticmethod]
-    #[pyo3(signature = (ground, vehicle, *, start=None, goal_m=None, distance_m=None, seed=1))]
+    #[pyo3(signature = (
+        ground: "Surface | _Path",
+        vehicle,
+        *,
+        start: "_Floats | None" = None,
+        goal_m: "_Floats | None" = None,
+        distance_m=None,
+        seed=1,
+    ))]
     #[expect(clippy::too_many_arguments, reason = "keywords in Python")]
     fn terrain(
         py: Python<'_>,
@@ -118,7 +127,7 @@ impl Task {
 
     /// The true height of the ground [m]: float32 (row, col), a copy.
     #[getter]
-    fn height_m<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f32>>> {
+    fn height_m(&self, py: Python<'_>) -> PyResult<Array<f32, Ix2>> {
         let GridGeometry { n_rows, n_cols, .. } = *self.0.world.geometry();
         owned(py, self.0.world.heights.values().to_vec(), [n_rows, n_cols])
     }

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use bench::collection::{CollectionError, Place, Recorded, Request, collect, collect_recorded};
 use evidential::{Epoch, Method, Settings, TrainError, TrainingEnd};
 use formats::{DriveFileError, DriveLogFileError, McapReadError, read_drive};
-use numpy::{PyArray1, PyArray2};
+use numpy::ndarray::{Ix1, Ix2};
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
@@ -17,6 +17,7 @@ use crate::detached::{detached, pool};
 use crate::failure::{refused, refused_by_system, refused_type, refused_value};
 use crate::settings::dict;
 use crate::task::{Task, changed, layers};
+use crate::typed::Array;
 use crate::vehicle::Vehicle;
 
 /// Footprints of a vehicle's drives, with what was measured on them: what networks learn from.
@@ -33,6 +34,7 @@ impl Dataset {
     /// that was driven, a `Surface`, or the path of an elevation file. Raises `ValueError` where ground is known under less
     /// than half of the drive, or nothing can be labelled; `OSError` for a file that cannot be read.
     #[staticmethod]
+    #[pyo3(signature = (vehicle, log, ground: "Task | Surface | _Path"))]
     fn from_recording(
         py: Python<'_>,
         vehicle: &Bound<'_, Vehicle>,
@@ -91,6 +93,10 @@ impl Dataset {
         self.0.to_bytes().map(|bytes| PyBytes::new(py, &bytes)).map_err(refused_value)
     }
 
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, (Bound<'py, PyBytes>,))> {
+        Ok((py.get_type::<Self>().getattr("from_bytes")?, (self.to_bytes(py)?,)))
+    }
+
     /// The examples of both. Raises `ValueError` for another vehicle.
     fn joined(&self, other: &Self) -> PyResult<Self> {
         self.0.clone().joined(other.0.clone()).map(Self).map_err(refused_value)
@@ -107,21 +113,21 @@ impl Dataset {
     /// What was measured: float32 (example, 4), linear and angular traction, |roll|, |pitch| [rad]; NaN where it means
     /// nothing.
     #[getter]
-    fn measured<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f32>>> {
+    fn measured(&self, py: Python<'_>) -> PyResult<Array<f32, Ix2>> {
         let values = self.0.examples.iter().flat_map(|example| example.measured).collect();
         owned(py, values, [self.0.examples.len(), 4])
     }
 
     /// Where: float64 (example, 3), x_m, y_m, yaw_rad.
     #[getter]
-    fn poses<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    fn poses(&self, py: Python<'_>) -> PyResult<Array<f64, Ix2>> {
         let values = self.0.examples.iter().flat_map(|example| example.pose).collect();
         owned(py, values, [self.0.examples.len(), 3])
     }
 
     /// How uneven the ground is [m]: float32 (example,), standard deviation of its height.
     #[getter]
-    fn unevenness_m<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f32>>> {
+    fn unevenness_m(&self, py: Python<'_>) -> PyResult<Array<f32, Ix1>> {
         let values = self.0.examples.iter().map(|example| example.unevenness_m).collect();
         owned(py, values, [self.0.examples.len()])
     }
@@ -155,7 +161,7 @@ pub struct Training {
 /// a dict, TOML text or a path with what differs: seed, epochs_max, patience, batch, learning_rate, encoder_hidden and so
 /// on. progress: a function that is called with the dict of every pass; what it raises ends the training and comes out.
 /// Works on one thread. Raises `ValueError` for data that nothing can be learned from and for settings out of range.
-#[pyfunction(signature = (dataset, validation, method="pietra", settings=None, *, progress=None))]
+#[pyfunction(signature = (dataset, validation, method="pietra", settings: "_Settings | None" = None, *, progress: "Callable[[dict[str, Any]], object] | None" = None))]
 pub fn train(
     py: Python<'_>,
     dataset: &Bound<'_, Dataset>,
@@ -196,7 +202,7 @@ impl Training {
         let weights = outcome.checkpoint.weights_bytes().map_err(refused_value)?;
         let sidecar = outcome.checkpoint.sidecar_bytes().map_err(refused_value)?;
         let curves: PyResult<Vec<_>> =
-            outcome.curves.iter().map(|epoch| dict(py, epoch).map(Bound::unbind)).collect();
+            outcome.curves.iter().map(|epoch| dict(py, epoch).map(|fields| fields.0.unbind())).collect();
         Ok(Self {
             weights: PyBytes::new(py, &weights).unbind(),
             sidecar: PyBytes::new(py, &sidecar).unbind(),

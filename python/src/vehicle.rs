@@ -5,13 +5,15 @@ use formats::{
     parse_skid_steer_vehicle, parse_vehicle, read_skid_steer_vehicle, read_vehicle, shipped_vehicle_names,
 };
 use navigator::Config;
+use pyo3::inspect::PyStaticExpr;
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
+use pyo3::{PyTypeInfo, type_hint_union};
 
 use crate::arrays::kind;
 use crate::failure::{refused_config, refused_type};
 use crate::model::{Model, SkidSteerModel};
 use crate::settings::{Source, dict};
+use crate::typed::Fields;
 
 /// A vehicle with four wheels that steers the front ones, as a file `vehicle.toml` describes it.
 ///
@@ -42,14 +44,15 @@ impl Vehicle {
         Source::of_text(name, text).parse(parse_vehicle).map(Self)
     }
 
-    /// From a dict of what stands in the file.
+    /// From a dict of what stands in the file, or a dataclass with such fields, of which those that are None count as absent.
     #[staticmethod]
-    fn from_dict(description: &Bound<'_, PyDict>) -> PyResult<Self> {
-        Source::of_dict("vehicle", description)?.parse(parse_vehicle).map(Self)
+    #[pyo3(signature = (description: "_Description"))]
+    fn from_dict(description: &Bound<'_, PyAny>) -> PyResult<Self> {
+        Source::of_description("vehicle", description)?.parse(parse_vehicle).map(Self)
     }
 
     /// A dict of what stands in the file.
-    fn to_dict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+    fn to_dict<'py>(&self, py: Python<'py>) -> PyResult<Fields<'py>> {
         dict(py, &self.0)
     }
 
@@ -72,7 +75,7 @@ impl Vehicle {
         self.0 == other.0
     }
 
-    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, (Bound<'py, PyDict>,))> {
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, (Fields<'py>,))> {
         Ok((py.get_type::<Self>().getattr("from_dict")?, (self.to_dict(py)?,)))
     }
 }
@@ -97,14 +100,15 @@ impl SkidSteerVehicle {
         Source::of_text(name, text).parse(parse_skid_steer_vehicle).map(Self)
     }
 
-    /// From a dict of what stands in the file.
+    /// From a dict of what stands in the file, or a dataclass with such fields, of which those that are None count as absent.
     #[staticmethod]
-    fn from_dict(description: &Bound<'_, PyDict>) -> PyResult<Self> {
-        Source::of_dict("vehicle", description)?.parse(parse_skid_steer_vehicle).map(Self)
+    #[pyo3(signature = (description: "_Description"))]
+    fn from_dict(description: &Bound<'_, PyAny>) -> PyResult<Self> {
+        Source::of_description("vehicle", description)?.parse(parse_skid_steer_vehicle).map(Self)
     }
 
     /// A dict of what stands in the file.
-    fn to_dict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+    fn to_dict<'py>(&self, py: Python<'py>) -> PyResult<Fields<'py>> {
         dict(py, &self.0)
     }
 
@@ -127,7 +131,7 @@ impl SkidSteerVehicle {
         self.0 == other.0
     }
 
-    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, (Bound<'py, PyDict>,))> {
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, (Fields<'py>,))> {
         Ok((py.get_type::<Self>().getattr("from_dict")?, (self.to_dict(py)?,)))
     }
 }
@@ -142,6 +146,8 @@ pub enum AnyVehicle<'py> {
 
 impl<'py> FromPyObject<'_, 'py> for AnyVehicle<'py> {
     type Error = PyErr;
+
+    const INPUT_TYPE: PyStaticExpr = type_hint_union!(Vehicle::TYPE_HINT, SkidSteerVehicle::TYPE_HINT);
 
     fn extract(found: Borrowed<'_, 'py, PyAny>) -> PyResult<Self> {
         if let Ok(vehicle) = found.cast::<Vehicle>() {

@@ -92,6 +92,27 @@ def test_the_ground_under_a_map_comes_back():
     assert (risk_map.shape, risk_map.resolution_m, risk_map.origin) == ((5, 6, 4), 0.5, (-7, 3))
 
 
+def root(array):
+    """Whoever keeps the memory of an array."""
+    while isinstance(array, np.ndarray) and array.base is not None:
+        array = array.base
+    return array
+
+
+def test_results_are_the_memory_that_they_were_computed_into():
+    risk_map = ground.level_map()
+    controller = surefoot.Mppi(surefoot.Vehicle("rc_car").model(), {"n_rollouts": 64})
+    controller.decide(np.zeros(5), risk_map, (5.0, 0.0))
+    rollouts = controller.rollouts(risk_map)
+    for name in ("states", "costs_s", "weights"):
+        array = getattr(rollouts, name)
+        # NumPy owns what was copied into an array of its own.
+        assert not isinstance(root(array), np.ndarray), f"{name} was copied"
+        assert address(getattr(rollouts, name)) == address(array), f"{name} is copied at every look"
+    for array in (controller.plan, controller.trajectory(risk_map)):
+        assert not isinstance(root(array), np.ndarray)
+
+
 def with_risk(place, value):
     risks = ground.level_risks(n_rows=5, n_cols=6)
     risks[place] = value

@@ -178,7 +178,9 @@ def test_drives_that_would_be_misread_are_told(sim, real):
 
 def test_ctrl_c_ends_a_long_diagnosis(tmp_path):
     script = """
-        import sys
+        import signal, sys
+        # Whoever is started in the background of a shell would pay it no heed.
+        signal.signal(signal.SIGINT, signal.default_int_handler)
         sys.path.insert(0, sys.argv[1])
         from surefoot import gap
         from toy_drives import VEHICLE, drive

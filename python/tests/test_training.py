@@ -1,5 +1,7 @@
 """Learning from Python: footprints of recorded drives become networks, the same every time."""
 
+import pickle
+
 import numpy as np
 import pytest
 import surefoot
@@ -34,6 +36,7 @@ def test_datasets_join_and_come_back_from_bytes(datasets):
     assert len(joined) == len(one) + len(other) and joined.measured.shape == (len(joined), 4)
     assert np.array_equal(joined.poses, np.concatenate([one.poses, other.poses]))
     assert surefoot.Dataset.from_bytes(joined.to_bytes()).to_bytes() == joined.to_bytes()
+    assert pickle.loads(pickle.dumps(joined)).to_bytes() == joined.to_bytes()
 
 
 def test_even_ground_is_what_is_less_uneven():

@@ -1,6 +1,7 @@
 """Vehicles, models and settings: names, files, texts, dicts, and what is said of those that cannot be."""
 
 import copy
+import dataclasses
 import pickle
 
 import numpy as np
@@ -47,6 +48,63 @@ def test_text_file_and_dict_make_the_same_model(tmp_path):
     assert surefoot.Model.from_dict(faster) != of_text
 
 
+@dataclasses.dataclass
+class Limits:
+    speed_max_mps: float = 1.5
+    reverse_speed_max_mps: float = 0.75
+    steering_max_rad: float = 0.5
+    steering_rate_max_radps: float = 3.0
+    acceleration_max_mps2: float = 2.0
+    lateral_acceleration_max_mps2: float = 4.0
+    roll_max_rad: float = 0.5
+    pitch_max_rad: float = 0.7
+
+
+@dataclasses.dataclass(frozen=True, slots=True)
+class SteerLag:
+    id: str = "steer_lag"
+    time_constant_s: float = 0.15
+
+
+@dataclasses.dataclass
+class Bicycle:
+    wheelbase_m: float = 0.18
+    limits: object = dataclasses.field(default_factory=Limits)
+    effects: list[SteerLag] | None = None
+
+
+def test_a_dataclass_makes_what_its_file_makes():
+    lagging = surefoot.Model.from_dict(Bicycle(effects=[SteerLag()]))
+    assert lagging == surefoot.Model.from_toml(TEXT)
+    # What is None stands in no file.
+    assert surefoot.Model.from_dict(Bicycle()).to_dict().get("effects", []) == []
+    shipped = surefoot.Vehicle("rc_car")
+    description = shipped.to_dict()
+    vehicle = dataclasses.make_dataclass("Car", description)(**description)
+    assert surefoot.Vehicle.from_dict(vehicle) == shipped
+
+    @dataclasses.dataclass
+    class Changes:
+        controller: dict[str, int]
+
+    settings = surefoot.settings_for(shipped, Changes({"n_rollouts": 256}))
+    assert settings == surefoot.settings_for(shipped, {"controller": {"n_rollouts": 256}})
+
+
+def test_a_refused_dataclass_is_told_by_its_path():
+    with pytest.raises(ValueError) as refusal:
+        surefoot.Model.from_dict(Bicycle(limits=Limits(roll_max_rad=-1.0)))
+    assert str(refusal.value).startswith("model: limits.roll_max_rad: expected "), refusal.value
+    with pytest.raises(TypeError, match="^model: expected a dict or a dataclass, found type$"):
+        surefoot.Model.from_dict(Bicycle)
+    with pytest.raises(TypeError, match="^model: expected a dict or a dataclass, found int$"):
+        surefoot.Model.from_dict(3)
+    endless = Bicycle()
+    endless.limits = endless
+    with pytest.raises(ValueError, match="within each other"):
+        surefoot.Model.from_dict(endless)
+
+
 @pytest.mark.parametrize(
     "thing",
     [
@@ -84,7 +142,7 @@ def test_a_refused_dict_is_told_by_its_path():
     with pytest.raises(TypeError) as refusal:
         surefoot.Vehicle.from_dict(description)
     assert str(refusal.value) == (
-        "vehicle: geometry.track_m: expected a number, a bool, a string, a list or a dict, found ndarray"
+        "vehicle: geometry.track_m: expected a number, a bool, a string, a list, a dict or a dataclass, found ndarray"
     )
     with pytest.raises(ValueError, match=r"limits\.speed_max_mps: expected a value, found no such key"):
         broken = surefoot.Model.from_toml(TEXT).to_dict()

@@ -1,7 +1,7 @@
 //! A cost of whole rollouts that is written in Python.
 
 use mppi::{Future, RolloutCost, Trace};
-use numpy::{PyArray2, PyArray3};
+use numpy::ndarray::{Ix2, Ix3};
 use pyo3::prelude::*;
 
 use super::Called;
@@ -9,20 +9,21 @@ use super::answer::{numbers, place};
 use crate::arrays::owned;
 use crate::failure::refused;
 use crate::planner::N_STATE;
+use crate::typed::Array;
 
 /// What a cost written in Python is called with: every step of all rollouts that were sampled.
 #[pyclass(frozen, get_all, module = "surefoot")]
 pub struct SampledRollouts {
     /// Float64 (rollout, step + 1, 5), the start first; see `Mppi.state_names`. Single precision within the map.
-    states: Py<PyArray3<f64>>,
+    states: Array<f64, Ix3>,
     /// Float32 (rollout, step, 2): what is asked for, see `Decision.command`.
-    commands: Py<PyArray3<f32>>,
+    commands: Array<f32, Ix3>,
     /// Float32 (rollout, step, 2): speed before the ground takes its share [m/s], yaw rate after [rad/s].
-    rates: Py<PyArray3<f32>>,
+    rates: Array<f32, Ix3>,
     /// Float32 (rollout, step, 4): the risk where the step begins, as `RiskMap.risks`.
-    risks: Py<PyArray3<f32>>,
+    risks: Array<f32, Ix3>,
     /// Bool (rollout, step): whether the goal was not reached before the step.
-    is_under_way: Py<PyArray2<bool>>,
+    is_under_way: Array<bool, Ix2>,
 }
 
 /// Every step of all rollouts, one after the other.
@@ -56,11 +57,11 @@ impl Steps {
 
     fn into_python(self, py: Python<'_>, [n, n_steps]: [usize; 2]) -> PyResult<SampledRollouts> {
         Ok(SampledRollouts {
-            states: owned(py, self.states, [n, n_steps + 1, N_STATE])?.unbind(),
-            commands: owned(py, self.commands, [n, n_steps, 2])?.unbind(),
-            rates: owned(py, self.rates, [n, n_steps, 2])?.unbind(),
-            risks: owned(py, self.risks, [n, n_steps, 4])?.unbind(),
-            is_under_way: owned(py, self.is_under_way, [n, n_steps])?.unbind(),
+            states: owned(py, self.states, [n, n_steps + 1, N_STATE])?,
+            commands: owned(py, self.commands, [n, n_steps, 2])?,
+            rates: owned(py, self.rates, [n, n_steps, 2])?,
+            risks: owned(py, self.risks, [n, n_steps, 4])?,
+            is_under_way: owned(py, self.is_under_way, [n, n_steps])?,
         })
     }
 }

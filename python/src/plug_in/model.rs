@@ -33,6 +33,7 @@ pub struct PythonModel {
 #[pymethods]
 impl PythonModel {
     #[new]
+    #[pyo3(signature = (model, step: "Callable[[_Float64, _Float64, _Float64, float], _Answer]"))]
     fn new(model: &Bound<'_, Model>, step: &Bound<'_, PyAny>) -> PyResult<Self> {
         if !step.is_callable() {
             return Err(refused_type("step", "a function of states, commands, traction, step_s", kind(step)));
