@@ -17,7 +17,7 @@ use crate::arguments::{Pace, PlayArguments, UpArguments};
 use crate::drive::scene::Machine;
 use crate::up::robot;
 use crate::{UsageError, interrupt};
-use kept::{Kept, PlaySummary};
+use kept::{Ending, Kept, PlaySummary};
 use player::{Player, PlayerSetup};
 
 /// The files that are left.
@@ -48,7 +48,9 @@ pub(crate) fn run(arguments: &PlayArguments) -> anyhow::Result<()> {
     let ended_early = play(arguments.pace, &bag, &mut player)?;
     let (mut kept, goal_m) = player.finish();
     kept.finish_recording()?;
-    let summary = kept.summary(arguments, goal_m, ended_early);
+    let is_interrupted = interrupt::interrupted();
+    let ended_early = ended_early.filter(|_| !is_interrupted);
+    let summary = kept.summary(arguments, goal_m, Ending { ended_early, is_interrupted });
     results.write_json(SUMMARY, &summary)?;
     results.write(PICTURE, &drawn(&machine, &kept, &summary)?)?;
     show(arguments, &driven, &summary);
@@ -92,8 +94,7 @@ fn play(pace: Pace, bag: &Bag, player: &mut Player<'_>) -> anyhow::Result<Option
         }
         if pace == Pace::Real {
             let since_ns = message.log_time_ns.saturating_sub(*first_ns.get_or_insert(message.log_time_ns));
-            let due = began + Duration::from_nanos(since_ns);
-            std::thread::sleep(due.saturating_duration_since(Instant::now()));
+            wait_until(began, Duration::from_nanos(since_ns));
         }
         player.take(&message).map_err(|error| {
             let told = error.to_string();
@@ -104,13 +105,23 @@ fn play(pace: Pace, bag: &Bag, player: &mut Player<'_>) -> anyhow::Result<Option
     failure.map_or(Ok(ended_early), Err)
 }
 
+/// Waits in short stretches, so that an interruption is met.
+fn wait_until(began: Instant, since: Duration) {
+    while !interrupt::interrupted() {
+        let left = since.saturating_sub(began.elapsed());
+        if left.is_zero() {
+            break;
+        }
+        std::thread::sleep(left.min(Duration::from_millis(100)));
+    }
+}
+
 fn drawn(machine: &Machine, kept: &Kept, summary: &PlaySummary) -> anyhow::Result<Vec<u8>> {
     let world = kept.world()?;
     let known = kept.known();
     let subtitles = [
         summary.to_string().replace("\n  ", ", "),
-        "white: driven, as the bag says; the colour of the ground: what the pipeline believed of it"
-            .to_owned(),
+        "the way: driven, as the bag says; the ground: what the pipeline believed of it".to_owned(),
     ];
     let driven = kept.driven();
     let start_m = driven.first().map_or(summary.goal_m, |first| [first.x_m, first.y_m]);
@@ -139,12 +150,19 @@ fn drawn(machine: &Machine, kept: &Kept, summary: &PlaySummary) -> anyhow::Resul
     })?)
 }
 
+/// Whether a topic is a word of a note.
+fn speaks_of(note: &str, topic: &str) -> bool {
+    note.split_whitespace().any(|word| word == topic)
+}
+
 fn show(arguments: &PlayArguments, driven: &BagDrive, summary: &PlaySummary) {
     let bag = arguments.bag.display();
-    let early = summary.ended_early.iter().map(|problem| format!("the bag ends early, {problem}"));
+    let Ending { ended_early, is_interrupted } = &summary.ending;
+    let early = ended_early.iter().map(|problem| format!("the bag ends early, {problem}"));
+    let early = early.chain(is_interrupted.then(|| "interrupted before its end".to_owned()));
     let notes = summary.left_out.iter().map(|(topic, note)| format!("{topic}: {note}"));
     let of_commands =
-        driven.notes.iter().filter(|note| !summary.left_out.keys().any(|topic| note.contains(topic)));
+        driven.notes.iter().filter(|note| !summary.left_out.keys().any(|topic| speaks_of(note, topic)));
     for line in early.chain(notes).chain(of_commands.cloned()) {
         eprintln!("surefoot: {bag}: {line}");
     }

@@ -51,6 +51,9 @@ impl Storage {
     }
 }
 
+/// No recorder's clock is later: the year 2116 [ns].
+const TIME_MAX_NS: u64 = 1 << 62;
+
 /// A bag: its files in their order.
 #[derive(Clone, Debug)]
 pub struct Bag {
@@ -84,7 +87,7 @@ impl Bag {
     pub fn is_at(path: &Path) -> bool {
         let Ok(bag) = Self::open(path) else { return false };
         match bag.files.first().map(|file| (file, Storage::of(file))) {
-            Some((file, Some(Storage::Mcap))) if !path.is_dir() => is_of_ros(file),
+            Some((file, Some(Storage::Mcap))) if !matches!(bag.metadata, Ok(Some(_))) => is_of_ros(file),
             first => first.is_some(),
         }
     }
@@ -105,6 +108,9 @@ impl Bag {
         let mut n_taken = 0;
         for file in &self.files {
             let problem = messages_of(file, &mut |message| {
+                if message.log_time_ns > TIME_MAX_NS {
+                    return Err(format!("expected a time before 2116, found {} ns", message.log_time_ns));
+                }
                 take(message)?;
                 n_taken += 1;
                 Ok(())

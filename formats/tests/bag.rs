@@ -196,6 +196,53 @@ fn what_is_no_bag_is_refused() {
     assert!(read(&other).1.unwrap().contains("not a database"));
 }
 
+/// A view may never end, and a message may claim more memory than there is: neither is tried.
+#[test]
+fn a_database_that_is_meant_to_harm_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("endless.db3");
+    let endless = "CREATE TABLE topics(id, name, type, serialization_format); CREATE VIEW messages AS WITH RECURSIVE \
+                   n(id) AS (SELECT 1 UNION ALL SELECT id + 1 FROM n) SELECT id, 1 AS topic_id, 0 AS timestamp, \
+                   x'00' AS data FROM n";
+    Connection::open(&path).unwrap().execute_batch(endless).unwrap();
+    let told = |path: &Path| Bag::open(path).unwrap().take_all(|_| Ok(())).unwrap();
+    assert!(told(&path).ends_with("expected a table messages, found a view"), "{}", told(&path));
+    let path = folder.path().join("huge.db3");
+    write_database(&path, 0..1);
+    let huge = "INSERT INTO messages(topic_id, timestamp, data) VALUES (1, 30, zeroblob(300000000))";
+    Connection::open(&path).unwrap().execute_batch(huge).unwrap();
+    assert!(told(&path).starts_with("after 1 messages, in huge.db3: "), "{}", told(&path));
+}
+
+#[test]
+fn a_time_that_no_recorder_tells_ends_the_bag() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("late.db3");
+    write_database(&path, 0..2);
+    let late = "INSERT INTO messages(topic_id, timestamp, data) VALUES (1, 4611686018427387905, x'00')";
+    Connection::open(&path).unwrap().execute_batch(late).unwrap();
+    let told = Bag::open(&path).unwrap().take_all(|_| Ok(())).unwrap();
+    assert!(told.ends_with("expected a time before 2116, found 4611686018427387905 ns"), "{told}");
+}
+
+/// Folders of our own recordings end in .mcap, too.
+#[test]
+fn a_folder_of_other_recordings_is_no_bag() {
+    let folder = tempfile::tempdir().unwrap();
+    let own = mcap::WriteOptions::new().profile("");
+    let file = BufWriter::new(File::create(folder.path().join("drive.mcap")).unwrap());
+    let mut writer = own.create(file).unwrap();
+    let channel = writer.add_channel(0, "/pose", "json", &BTreeMap::new()).unwrap();
+    let header =
+        mcap::records::MessageHeader { channel_id: channel, sequence: 0, log_time: 1, publish_time: 1 };
+    writer.write_to_known_channel(&header, b"{}").unwrap();
+    writer.finish().unwrap();
+    assert!(!Bag::is_at(folder.path()) && !Bag::is_at(&folder.path().join("drive.mcap")));
+    std::fs::remove_file(folder.path().join("drive.mcap")).unwrap();
+    write_mcap(&folder.path().join("drive.mcap"), 0..3, None);
+    assert!(Bag::is_at(folder.path()) && Bag::is_at(&folder.path().join("drive.mcap")));
+}
+
 #[test]
 fn a_message_of_no_topic_ends_the_bag() {
     let folder = tempfile::tempdir().unwrap();

@@ -121,7 +121,8 @@ pub fn arrival(message: &RecordedMessage) -> Arrival {
 /// # Errors
 /// Labels that mean nothing.
 pub fn intake(ros: &RobotRos, vehicle: &Vehicle, sensors: Vec<String>) -> Result<Intake, LabelsError> {
-    let frames = Frames { map: ros.map_frame.clone(), vehicle: ros.vehicle_frame.clone() };
+    let frames = Frames { map: ros.frame(&ros.map_frame), vehicle: ros.frame(&ros.vehicle_frame) };
+    let sensors = sensors.iter().map(|sensor| ros.frame(sensor)).collect();
     let transforms = Transforms::new(clock::nanoseconds(ros.transform_age_max_s));
     let stamps = StampClock::new(bridge::source_of(ros.clock));
     Ok(Intake::new(frames, bridge::classes(ros, vehicle)?, sensors, stamps, transforms))

@@ -137,27 +137,22 @@ impl<M: Serialize> Voice<M> {
 
 /// A service that is offered.
 pub(crate) struct Service<Q: Message, A: Message> {
-    name: String,
     server: Server<Q, A>,
 }
 
 impl<Q: Message + 'static, A: Message + 'static> Service<Q, A> {
     /// Answers what has been asked. What cannot be read is asked in vain: nobody knows whom to answer.
-    pub(crate) fn answer(&self, mut reply: impl FnMut(Q) -> A) -> Result<(), NodeError> {
+    pub(crate) fn answer(&self, mut reply: impl FnMut(Q) -> A) {
         for _ in 0..BATCH {
             match self.server.receive_request() {
-                Ok(Some((id, asked))) => {
-                    let sent = self.server.send_response(id, reply(asked));
-                    sent.map_err(|error| NodeError::Topic {
-                        topic: self.name.clone(),
-                        problem: error.to_string(),
-                    })?;
-                }
+                Ok(Some((id, asked))) => match self.server.send_response(id, reply(asked)) {
+                    // Who asked and takes no answer waits no longer: no robot stops for it.
+                    Ok(()) | Err(_) => {}
+                },
                 Ok(None) => break,
                 Err(_) => {}
             }
         }
-        Ok(())
     }
 }
 
@@ -266,7 +261,7 @@ impl Node {
         let server = self.node.create_server(mapping, &path, &kind, profile.clone(), profile.clone());
         let mut server = server.map_err(|error| failed(error.to_string()))?;
         self.wake_for(&mut server).map_err(|error| failed(error.to_string()))?;
-        Ok(Service { name, server })
+        Ok(Service { server })
     }
 
     /// Ends a wait when there is something to be read.

@@ -209,8 +209,9 @@ Examples:
       Your own simulator decides: what it lacks, which of its parameters are off, and how
       far the gap shrinks in it.
   surefoot gap diagnose cases/own --map t=stamp,vx=wheel_speed
-  surefoot gap diagnose --vehicle rc_car --sim nominal_bag --real bag_1,bag_2 --map odometry=/odom,command=/drive
       Logs whose columns have names of their own.
+  surefoot gap diagnose --vehicle rc_car --sim nominal_bag --real bag_1,bag_2 --map odometry=/odom,command=/drive
+      Drives out of bags of ROS 2.
   surefoot gap diagnose cases/nightly --fail-above 1.5 --json answer.json
       A gate for a build: exit code 3 once simulator and robot have come apart.
   surefoot gap apply report/answer.json --model model.toml --out repaired.toml

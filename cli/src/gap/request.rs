@@ -51,7 +51,7 @@ impl Request {
         })
     }
 
-    /// Every drive's file stands where it is said to and is named once. The held-out ones are not opened for it.
+    /// Every drive's file stands where it is said to and is named once. No message of the held-out ones is read for it.
     fn check(&self) -> Result<(), UsageError> {
         let drives: Vec<&PathBuf> = self.sim.iter().chain(&self.real).chain(&self.heldout).collect();
         if let Some(missing) = drives.iter().find(|path| !path.is_file() && !Bag::is_at(path)) {

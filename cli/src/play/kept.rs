@@ -23,8 +23,12 @@ use crate::summary::revision;
 const N_ROLLOUTS: usize = 12;
 /// Decisions between two recorded maps.
 const DECISIONS_PER_MAP: usize = 10;
-/// Cells of the ground at the most: a drive that goes further is not drawn.
+/// Cells of the ground at the most: a drive that goes further is refused, as the picture shows all of it.
 const CELLS_MAX: f64 = 16e6;
+/// Farthest place that is believed [m].
+const CORNER_MAX_M: f64 = 1e8;
+/// Poses of the way that are shown with every map.
+const POSES_SHOWN: usize = 600;
 
 /// A decision, and what it was made from.
 pub(super) struct Cycle<'a> {
@@ -51,13 +55,23 @@ pub(super) struct Decided {
     was_steering_rad: f32,
 }
 
+/// How a bag ended.
+#[derive(Clone, Debug, Serialize)]
+pub(super) struct Ending {
+    /// Where and why it breaks off; null of one that is whole.
+    pub ended_early: Option<String>,
+    /// Whether the user ended it before.
+    pub is_interrupted: bool,
+}
+
 /// The result, as `play.json`.
 #[derive(Clone, Debug, Serialize)]
 pub(super) struct PlaySummary {
     /// The bag as it was named.
     pub bag: String,
-    /// Where and why it breaks off; null of one that is whole.
-    pub ended_early: Option<String>,
+    /// How it ended.
+    #[serde(flatten)]
+    pub ending: Ending,
     /// Time between the first and the last decision [s].
     duration_s: f64,
     odometry: u64,
@@ -105,16 +119,7 @@ impl Kept {
         bounds: Bounds,
     ) -> anyhow::Result<Self> {
         let resolution_m = machine.config.risk_resolution_m();
-        let n_cells = |axis: usize| (bounds.north_east_m[axis] - bounds.south_west_m[axis]) / resolution_m;
-        if n_cells(0) * n_cells(1) > CELLS_MAX {
-            return Err(UsageError(format!(
-                "expected a drive within at most {CELLS_MAX:e} cells of {resolution_m} m, found one over {:.0} x {:.0} of \
-                 them; cut the bag into parts",
-                n_cells(0),
-                n_cells(1)
-            ))
-            .into());
-        }
+        check_extent(&bounds, resolution_m)?;
         let risk = KnownRisk::new(bounds, resolution_m, &machine.vehicle.limits);
         let about = BTreeMap::from([("vehicle".to_owned(), machine.vehicle.name.clone())]);
         Ok(Self {
@@ -192,7 +197,8 @@ impl Kept {
         let Some(recorder) = &mut self.recorder else { return Ok(()) };
         let [x_m, y_m] = cycle.goal_m;
         recorder.goal(at_ns, &Pose { x_m, y_m, z_m: pose.z_m, ..Pose::default() })?;
-        recorder.path(at_ns, &self.poses)?;
+        let shown = self.poses.len().saturating_sub(POSES_SHOWN);
+        recorder.path(at_ns, &self.poses[shown..])?;
         recorder.elevation(at_ns, cycle.navigator.surface())?;
         if let Some(map) = cycle.navigator.risk_map() {
             recorder.risk(at_ns, &map, pose.yaw_rad)?;
@@ -250,12 +256,7 @@ impl Kept {
         })?)
     }
 
-    pub(super) fn summary(
-        &self,
-        arguments: &PlayArguments,
-        goal_m: [f64; 2],
-        ended_early: Option<String>,
-    ) -> PlaySummary {
+    pub(super) fn summary(&self, arguments: &PlayArguments, goal_m: [f64; 2], ending: Ending) -> PlaySummary {
         let mut counts: BTreeMap<String, u64> = BTreeMap::new();
         self.decided.iter().for_each(|decided| *counts.entry(decided.decision.clone()).or_default() += 1);
         let note = |(topic, (n, why)): (&String, &(u64, String))| {
@@ -268,7 +269,7 @@ impl Kept {
         };
         PlaySummary {
             bag: arguments.bag.display().to_string(),
-            ended_early,
+            ending,
             duration_s: self.decided.last().map_or(0.0, |last| last.time_s),
             odometry: self.n_odometry,
             scans: self.n_scans,
@@ -301,6 +302,19 @@ impl Display for PlaySummary {
         }
         Ok(())
     }
+}
+
+fn check_extent(bounds: &Bounds, resolution_m: f64) -> Result<(), UsageError> {
+    let n_cells = |axis: usize| (bounds.north_east_m[axis] - bounds.south_west_m[axis]) / resolution_m;
+    let [n_cols, n_rows] = [n_cells(0), n_cells(1)];
+    let mut corners_m = bounds.south_west_m.into_iter().chain(bounds.north_east_m);
+    if corners_m.all(|at_m| at_m.abs() <= CORNER_MAX_M) && n_cols.max(1.0) * n_rows.max(1.0) <= CELLS_MAX {
+        return Ok(());
+    }
+    Err(UsageError(format!(
+        "expected a drive within at most {CELLS_MAX:e} cells of {resolution_m} m and {CORNER_MAX_M:e} m from the origin, \
+         found one over {n_cols:.0} x {n_rows:.0} cells; cut the bag into parts"
+    )))
 }
 
 fn pose(odometry: &Odometry) -> Pose {

@@ -28,6 +28,8 @@ use crate::up::{robot, roles};
 
 /// Returns of a scan at the most, as on the bus.
 const POINTS_MAX: usize = 1 << 16;
+/// Silence of the bag after which nothing is decided until it says something [ns]: the vehicle has long been stopped.
+const SILENCE_MAX_NS: u64 = 10_000_000_000;
 /// Speed below which a yaw rate tells no steering angle [m/s].
 const SPEED_MIN_MPS: f64 = 0.05;
 
@@ -60,11 +62,13 @@ pub(super) struct Player<'a> {
     applied: Option<Applied>,
     /// Where the front wheels are by that [rad], and since when [ns].
     steering: (f64, u64),
+    /// What was said last of an emergency and of a pause: who repeats it orders nothing.
+    switched: BTreeMap<Topic, bool>,
     n_messages: u64,
 }
 
 /// What a topic tells.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum Topic {
     Odometry,
     Points,
@@ -123,6 +127,7 @@ impl<'a> Player<'a> {
             decides_at_ns: None,
             applied: None,
             steering: (0.0, 0),
+            switched: BTreeMap::from([(Topic::Emergency, false), (Topic::Pause, false)]),
             n_messages: 0,
         })
     }
@@ -132,10 +137,13 @@ impl<'a> Player<'a> {
         (self.kept, self.goal_m)
     }
 
-    /// Decides what is due before the message, and takes that over.
+    /// Decides what is due before the message, and takes that over. After a long silence nothing is decided until it comes.
     pub(super) fn take(&mut self, message: &RecordedMessage) -> anyhow::Result<()> {
+        let silent_ns = self.now_ns.saturating_add(SILENCE_MAX_NS);
         self.now_ns = self.now_ns.max(message.log_time_ns);
         while let Some(at_ns) = self.decides_at_ns.filter(|at_ns| *at_ns <= self.now_ns) {
+            let is_silent = at_ns > silent_ns;
+            let at_ns = if is_silent { self.now_ns } else { at_ns };
             self.decide(at_ns)?;
             self.decides_at_ns = Some(at_ns + self.period_ns);
         }
@@ -175,8 +183,8 @@ impl<'a> Player<'a> {
                     });
                 }
             }
-            Topic::Emergency => self.switch(message, [Order::Reset, Order::EmergencyStop]),
-            Topic::Pause => self.switch(message, [Order::Resume, Order::Pause]),
+            Topic::Emergency => self.switch(topic, message, [Order::Reset, Order::EmergencyStop]),
+            Topic::Pause => self.switch(topic, message, [Order::Resume, Order::Pause]),
             Topic::Command => self.command(message),
         }
         Ok(())
@@ -300,9 +308,12 @@ impl<'a> Player<'a> {
         }
     }
 
-    /// One order where the message says false, another where it says true.
-    fn switch(&mut self, message: &RecordedMessage, [no, yes]: [Order; 2]) {
+    /// One order where the message says false after true, another where it says true after false.
+    fn switch(&mut self, topic: Topic, message: &RecordedMessage, [no, yes]: [Order; 2]) {
         let Some(Bool { data }) = self.read::<Bool>(message) else { return };
+        if self.switched.insert(topic, data) == Some(data) {
+            return;
+        }
         let ordered = self.navigator.order(if data { yes } else { no }, self.now_ns);
         self.used(message, ordered);
     }

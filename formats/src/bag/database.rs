@@ -4,9 +4,13 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
 
+use rusqlite::limits::Limit;
 use rusqlite::{Connection, OpenFlags, Row};
 
 use crate::{RecordedChannel, RecordedMessage};
+
+/// Longest message that is believed: far above what sensors tell.
+const MESSAGE_BYTES_MAX: i32 = 1 << 28;
 
 type Topics = BTreeMap<i64, Arc<RecordedChannel>>;
 
@@ -25,6 +29,8 @@ pub(super) fn take_all(
 fn open(path: &Path) -> rusqlite::Result<Connection> {
     let flags = OpenFlags::SQLITE_OPEN_READ_ONLY | OpenFlags::SQLITE_OPEN_NO_MUTEX;
     let connection = Connection::open_with_flags(path, flags)?;
+    connection.set_limit(Limit::SQLITE_LIMIT_LENGTH, MESSAGE_BYTES_MAX)?;
+    // A schema that may be written is one that is read although the file is shorter than it says; nothing is written.
     connection.execute_batch(
         "PRAGMA writable_schema = ON; PRAGMA trusted_schema = OFF; PRAGMA cell_size_check = ON;",
     )?;
@@ -35,6 +41,9 @@ fn read(
     connection: &Connection,
     take: &mut dyn FnMut(RecordedMessage) -> Result<(), String>,
 ) -> rusqlite::Result<Option<String>> {
+    if let Some(name) = view(connection)? {
+        return Ok(Some(format!("expected a table {name}, found a view")));
+    }
     let topics = topics(connection)?;
     let mut query = connection.prepare("SELECT topic_id, timestamp, data FROM messages ORDER BY id")?;
     let mut rows = query.query([])?;
@@ -44,6 +53,14 @@ fn read(
         }
     }
     Ok(None)
+}
+
+/// One of the tables that are read which is a view: what it holds may never end.
+fn view(connection: &Connection) -> rusqlite::Result<Option<String>> {
+    let mut query = connection
+        .prepare("SELECT name FROM sqlite_schema WHERE type = 'view' AND name IN ('topics', 'messages')")?;
+    let mut names = query.query_map([], |row| row.get(0))?;
+    names.next().transpose()
 }
 
 fn topics(connection: &Connection) -> rusqlite::Result<Topics> {

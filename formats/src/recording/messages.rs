@@ -12,7 +12,7 @@ use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 
 /// Longest record or chunk that is believed: far above what recorders write.
 const RECORD_BYTES_MAX: u64 = 1 << 28;
-/// LZ4, by which recordings are packed, never unpacks to more than this many times its input.
+/// LZ4 never unpacks to more than this many times its input, and measurements packed with Zstandard do not either.
 const UNPACKED_MAX: u64 = 255;
 
 /// What the messages of a topic have in common.

@@ -66,7 +66,7 @@ impl<K: Kernel> Stage<K> for GoalTask<'_> {
         match &self.rest {
             Rest::Straight => self.end(end),
             // The field has an answer for whoever is nowhere: zero, or no number, is added to it.
-            Rest::Field(field) => field.time_to_go(x, y, turns) + ((x - x) + (y - y)),
+            Rest::Field(field) => field.time_to_go(x, y, turns) + (x + y) * x.0.real(0.0),
             Rest::StraightFacing(field) => self.end(end) + field.time_to_turn(x, y, turns),
         }
     }

@@ -53,16 +53,16 @@ impl Services {
         let known = self.parameters.clone();
         self.get.answer(|asked| GetParametersResponse {
             values: asked.names.iter().map(|name| known.value(name).into()).collect(),
-        })?;
+        });
         self.types.answer(|asked| GetParameterTypesResponse {
             values: asked.names.iter().map(|name| type_of(&known, name)).collect(),
-        })?;
+        });
         self.list.answer(|asked| ListParametersResponse {
             result: ListParametersResult { names: known.list(&asked.prefixes), prefixes: Vec::new() },
-        })?;
+        });
         self.describe.answer(|asked| DescribeParametersResponse {
             values: asked.names.iter().map(|name| known.describe(name)).collect(),
-        })?;
+        });
         let (mut changes, parameters) = (Vec::new(), &mut self.parameters);
         let mut set = |told: &[Parameter]| {
             let wanted = told.iter().map(|told| parameters.change(&told.name, &value_of(told)));
@@ -73,9 +73,9 @@ impl Services {
         };
         self.set.answer(|asked| SetParametersResponse {
             results: asked.parameter.iter().map(|told| result(set(std::slice::from_ref(told)))).collect(),
-        })?;
+        });
         self.set_all
-            .answer(|asked| SetParametersAtomicallyResponse { result: result(set(&asked.parameter)) })?;
+            .answer(|asked| SetParametersAtomicallyResponse { result: result(set(&asked.parameter)) });
         self.tell(changes, stamp_ns)
     }
 
