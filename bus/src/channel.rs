@@ -96,7 +96,7 @@ pub const RISK_PHYSICS: Channel<RiskHeader, [f32; 4]> =
     Channel { name: "risk_physics", n_readers: 3, ..RISK };
 /// What the vehicle shall do: control.
 pub const COMMAND: Channel<Stamp, CommandRecord> =
-    Channel { name: "command", depth: 4, history: 0, n_readers: 4, check: payload::check_command };
+    Channel { name: "command", depth: 32, history: 0, n_readers: 4, check: payload::check_command };
 /// What each decision was made from: control.
 pub const DECISION: Channel<Stamp, DecisionRecord> =
     Channel { name: "decision", depth: 16, history: 0, n_readers: 2, check: payload::check_anything };
