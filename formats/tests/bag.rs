@@ -19,6 +19,9 @@ const TABLES: &str = "
     CREATE INDEX timestamp_idx ON messages (timestamp ASC);
     INSERT INTO topics VALUES (1, '/odom', 'nav_msgs/msg/Odometry', 'cdr', '');";
 
+/// Writes a bag.
+type Write<'a> = &'a dyn Fn(&Path);
+
 /// What the message of a number holds: as much as odometry.
 fn payload(number: u64) -> Vec<u8> {
     number.to_le_bytes().repeat(90)
@@ -146,7 +149,7 @@ fn cut(path: &Path, share: f64) -> (Vec<u64>, String) {
 #[test]
 fn a_bag_that_is_cut_off_gives_what_is_whole() {
     let folder = tempfile::tempdir().unwrap();
-    let writers: [(&str, &dyn Fn(&Path)); 2] = [
+    let writers: [(&str, Write<'_>); 2] = [
         ("drive.mcap", &|path| write_mcap(path, 0..1000, None)),
         ("drive.db3", &|path| write_database(path, 0..1000)),
     ];
