@@ -34,7 +34,7 @@ CHANNELS = {
     "imu": (layout.Stamp, layout.ImuRecord, 32, 3, 0),
     "scan": (layout.ScanHeader, layout.PointRecord, 2, 2, 0),
     "risk": (layout.RiskHeader, Quad, 1, 4, 0),
-    "command": (layout.Stamp, layout.CommandRecord, 4, 4, 0),
+    "command": (layout.Stamp, layout.CommandRecord, 32, 4, 0),
     "mission": (layout.Stamp, layout.MissionRecord, 2, 8, 1),
 }
 
