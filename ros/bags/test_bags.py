@@ -61,8 +61,9 @@ def test_a_drive_is_diagnosed(bag, tmp_path):
     drives = ["--sim", tmp_path / "plain_1", tmp_path / "plain_2", "--real", tmp_path / "field"]
     told = surefoot("gap", "diagnose", "--vehicle", "rc_car", *drives, "--json", tmp_path / "answer.json")
     assert told.returncode == 0, told.stderr
-    answer = (tmp_path / "answer.json").read_text()
-    assert "steering_lag" in answer or "steering_delay" in answer, told.stdout
+    answer = json.loads((tmp_path / "answer.json").read_text())
+    found = [effect["id"] for effect in answer["effects"]]
+    assert (answer["verdict"], found) == ("effects", ["steer_lag"]), told.stdout
 
 
 def test_a_bag_that_is_cut_off_says_where(bag, tmp_path):
