@@ -406,20 +406,38 @@ unsafe fn weigh_at(shared: &mut Shared, least_s: V, temperature_s: f32) -> (f32,
     (total, total * total / _mm512_reduce_add_ps(_mm512_add_ps(squares[0], squares[1])))
 }
 
-/// Finds the temperature by halving, and weighs; returns the weights' sum.
+/// Finds the temperature as halving does, without those halvings that others decide, and weighs; returns the weights' sum.
 unsafe fn weigh(shared: &mut Shared) -> f32 {
     let mut least = s(f32::MAX);
     for k in (0..N_ROLLOUTS).step_by(WIDTH) {
         least = _mm512_min_ps(least, _mm512_load_ps(shared.costs.as_ptr().add(k)));
     }
     let least = s(_mm512_reduce_min_ps(least));
-    let (mut low, mut high) = (shared.temperature_s / 1024.0, shared.temperature_s * 1024.0);
-    for _ in 0..N_HALVINGS {
-        let middle = (low * high).sqrt();
-        let is_low = weigh_at(shared, least, middle).1 < WANTED_SAMPLES;
-        (low, high) = if is_low { (middle, high) } else { (low, middle) };
-    }
-    shared.temperature_s = (low * high).sqrt().clamp(1e-3, 1e4);
+    let span = [shared.temperature_s / 1024.0, shared.temperature_s * 1024.0];
+    let [mut too_cold, mut too_hot] = span;
+    let (mut guess, mut power, mut before) = (shared.temperature_s, 1.0, None::<[f32; 2]>);
+    shared.temperature_s = loop {
+        let [mut low, mut high] = span;
+        for _ in 0..N_HALVINGS {
+            let middle = (low * high).sqrt();
+            let is_low = middle <= too_cold || (middle < too_hot && middle < guess);
+            (low, high) = if is_low { (middle, high) } else { (low, middle) };
+        }
+        let tried = if low > too_cold { low } else { high };
+        if tried >= too_hot {
+            break (low * high).sqrt().clamp(1e-3, 1e4);
+        }
+        let samples = weigh_at(shared, least, tried).1;
+        *(if samples < WANTED_SAMPLES { &mut too_cold } else { &mut too_hot }) = tried;
+        if let Some([temperature, n]) = before {
+            power = ((samples / n).ln() / (tried / temperature).ln()).clamp(0.05, 20.0);
+        }
+        before = Some([tried, samples]);
+        guess = tried * (WANTED_SAMPLES / samples).powf(1.0 / power);
+        if !(too_cold < guess && guess < too_hot) {
+            guess = (too_cold * too_hot).sqrt();
+        }
+    };
     weigh_at(shared, least, shared.temperature_s).0
 }
 

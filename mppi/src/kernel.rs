@@ -77,6 +77,11 @@ pub(crate) trait Kernel: Lanes {
     fn words(self, bits: Self::Bits) -> [u32; 16];
     /// Sum of the lanes, the upper half added to the lower until one is left.
     fn sum(self, value: Self::Value) -> f32;
+    /// [`Kernel::sum`] of four at once, to the bit.
+    #[inline(always)]
+    fn sums(self, values: [Self::Value; 4]) -> [f32; 4] {
+        values.map(|value| self.sum(value))
+    }
     /// Smallest of the lanes.
     fn smallest(self, value: Self::Value) -> f32;
 

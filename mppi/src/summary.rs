@@ -53,22 +53,27 @@ impl Work for Accumulate<'_> {
         if chunk.is_negligible {
             return;
         }
-        for (rows, sums) in chunk.controls.iter().zip(&mut chunk.sums) {
-            *sums = [dot(kernel, &chunk.weights, &rows[0]), dot(kernel, &chunk.weights, &rows[1])];
+        let weights = &chunk.weights;
+        // Two steps of two controls at a time: a sum over the lanes is shuffling, which four share.
+        for (rows, sums) in chunk.controls.chunks(2).zip(chunk.sums.chunks_mut(2)) {
+            let [one, other] = [&rows[0], &rows[rows.len() - 1]];
+            let values = [&one[0], &one[1], &other[0], &other[1]].map(|row| dot(kernel, weights, row));
+            let [a, b, c, d] = kernel.sums(values);
+            sums.copy_from_slice(&[[a, b], [c, d]][..sums.len()]);
         }
     }
 }
 
-/// Sum of products, rollout i in the order of i mod 16, whatever the width of the packs.
+/// Products, added up until a pack is left: rollout i in the order of i mod 16, whatever the width of the packs.
 #[inline(always)]
-fn dot<K: Kernel>(kernel: K, weights: &Row, row: &Row) -> f32 {
+fn dot<K: Kernel>(kernel: K, weights: &Row, row: &Row) -> K::Value {
     let mut halves = [kernel.real(0.0); 2];
     for first in (0..CHUNK).step_by(K::WIDTH) {
         let half = usize::from(first % 16 >= K::WIDTH);
         let weight = Real(kernel, kernel.load(weights, first));
         halves[half] = weight.mul_add(Real(kernel, kernel.load(row, first)), halves[half]);
     }
-    kernel.sum((halves[0] + halves[1]).1)
+    (halves[0] + halves[1]).1
 }
 
 #[inline(always)]
@@ -90,8 +95,42 @@ fn total<K: Kernel>(kernel: K, chunk: &Chunk) -> Totals {
         n_feasible = n_feasible.add_where(feasible, one);
     }
     let mut terms_s = [0.0; CostTerm::COUNT];
-    for (term_s, sum) in terms_s.iter_mut().zip(sums) {
-        *term_s = kernel.sum(sum.1);
+    for (terms_s, sums) in terms_s.chunks_mut(4).zip(sums.chunks(4)) {
+        let values = std::array::from_fn(|place| sums.get(place).unwrap_or(&zero).1);
+        terms_s.copy_from_slice(&kernel.sums(values)[..sums.len()]);
     }
-    Totals { terms_s, n_finite: kernel.sum(n_finite.1), n_feasible: kernel.sum(n_feasible.1) }
+    let [n_finite, n_feasible, ..] = kernel.sums([n_finite.1, n_feasible.1, zero.1, zero.1]);
+    Totals { terms_s, n_finite, n_feasible }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::{RngExt, SeedableRng};
+    use rand_xoshiro::Xoshiro256PlusPlus;
+
+    /// Each of four packs added up by itself, and all of them at once.
+    struct Sums<'a>(&'a [Row; 4]);
+
+    impl Work for Sums<'_> {
+        type Output = [[f32; 4]; 2];
+        fn run<K: Kernel>(self, kernel: K) -> [[f32; 4]; 2] {
+            let values = self.0.each_ref().map(|row| kernel.load(row, 0));
+            [values.map(|value| kernel.sum(value)), kernel.sums(values)]
+        }
+    }
+
+    #[test]
+    fn four_sums_at_once_are_those_of_one_after_the_other_to_the_bit() {
+        let mut generator = Xoshiro256PlusPlus::seed_from_u64(7);
+        for _ in 0..200 {
+            let rows: [Row; 4] = std::array::from_fn(|_| {
+                Row(std::array::from_fn(|_| generator.random_range(-9.0..9.0_f32).exp2()))
+            });
+            for instructions in Instructions::all() {
+                let [singly, at_once] = kernel::run(instructions, Sums(&rows));
+                assert_eq!(singly.map(f32::to_bits), at_once.map(f32::to_bits), "{instructions:?}");
+            }
+        }
+    }
 }

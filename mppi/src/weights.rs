@@ -1,5 +1,7 @@
 //! From costs to weights: the information-theoretic soft minimum (Williams et al. 2017) and its temperature.
 
+mod temperature;
+
 use crate::chunk::Chunk;
 use crate::config::Temperature;
 use crate::kernel::functions::exp_of_negative;
@@ -8,10 +10,6 @@ use bicycle::lanes::{Instructions, Real};
 
 /// Costs above this count as not finite.
 const WORST_COST_S: f64 = 1e30;
-/// Halvings of the search for the temperature: the effective sample size is then met within one rollout in 1000.
-const N_HALVINGS: usize = 14;
-/// The search spans this factor around the last temperature.
-const SEARCH_FACTOR: f32 = 1024.0;
 
 /// What the weights of an iteration came to.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -69,7 +67,9 @@ impl Work for Weigh<'_> {
             Temperature::Fixed { temperature_s } => temperature_s as f32,
             Temperature::EffectiveSampleSize { fraction } => {
                 let wanted = fraction as f32 * (self.chunks.len() * CHUNK) as f32;
-                search(kernel, self.chunks, baseline_s, (wanted, self.last_s))
+                let sample_size = |temperature_s| weigh_all(kernel, self.chunks, baseline_s, temperature_s).1;
+                let found_s = temperature::find(wanted, self.last_s, sample_size);
+                found_s.clamp(Temperature::LOWEST_S, Temperature::HIGHEST_S)
             }
         };
         let (normalizer, effective_sample_size) = weigh_all(kernel, self.chunks, baseline_s, temperature_s);
@@ -114,22 +114,6 @@ fn weigh_all<K: Kernel>(kernel: K, chunks: &mut [Chunk], baseline_s: f32, temper
     }
     let sum = kernel.sum(sum.1);
     (sum, sum * sum / kernel.sum(squares.1))
-}
-
-/// The temperature at which the effective sample size is the wanted one; it grows with the temperature, so its
-/// logarithm is halved towards it.
-#[inline(always)]
-fn search<K: Kernel>(kernel: K, chunks: &mut [Chunk], baseline_s: f32, (wanted, last_s): (f32, f32)) -> f32 {
-    let (mut low, mut high) = (last_s / SEARCH_FACTOR, last_s * SEARCH_FACTOR);
-    for _ in 0..N_HALVINGS {
-        let middle = (low * high).sqrt();
-        if weigh_all(kernel, chunks, baseline_s, middle).1 < wanted {
-            low = middle;
-        } else {
-            high = middle;
-        }
-    }
-    (low * high).sqrt().clamp(Temperature::LOWEST_S, Temperature::HIGHEST_S)
 }
 
 #[cfg(test)]

@@ -107,6 +107,25 @@ impl Kernel for V4 {
         (four[0] + four[2]) + (four[1] + four[3])
     }
     #[inline(always)]
+    fn sums(self, values: [f32x16; 4]) -> [f32; 4] {
+        let avx512f = self.avx512f;
+        let [a, b, c, d] = values.map(|value| cast!(value));
+        let add = |x, y| avx512f._mm512_add_ps(x, y);
+        // Quarters of a register: the upper half of each value onto its lower, then the upper quarter.
+        let halved = |x, y| {
+            let (low, high) =
+                (avx512f._mm512_shuffle_f32x4::<0x44>(x, y), avx512f._mm512_shuffle_f32x4::<0xEE>(x, y));
+            add(low, high)
+        };
+        let (ab, cd) = (halved(a, b), halved(c, d));
+        let low = avx512f._mm512_shuffle_f32x4::<0x88>(ab, cd);
+        let quarters = add(low, avx512f._mm512_shuffle_f32x4::<0xDD>(ab, cd));
+        // What is left of a value is a quarter of its own.
+        let pairs = add(quarters, avx512f._mm512_permute_ps::<0b01_00_11_10>(quarters));
+        let sums: [f32; 16] = cast!(add(pairs, avx512f._mm512_permute_ps::<0b10_11_00_01>(pairs)));
+        [sums[0], sums[4], sums[8], sums[12]]
+    }
+    #[inline(always)]
     fn smallest(self, value: f32x16) -> f32 {
         let lanes: [f32; 16] = cast!(value);
         lanes.into_iter().fold(f32::INFINITY, f32::min)
