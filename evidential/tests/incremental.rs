@@ -138,6 +138,7 @@ proptest! {
             fading_m2ps: 1e-4,
             gap_radius_m: 0.2,
             publish_turns: 2,
+            publish_near_m: 0.5,
             ..ElevationConfig::scaled_to(CAR.length_m)
         };
         let mut elevation = ElevationMap::new(config).unwrap();

@@ -14,6 +14,10 @@ const SMALL_LENGTH_M: f64 = 1.0;
 
 /// Poses of a risk map: a gigabyte.
 const MOST_RISKS: usize = 1 << 26;
+/// Scans within which every row of the map of the ground has its turn to tell what is not urgent.
+const PUBLISH_TURNS: u8 = 8;
+/// How long that takes a sensor of 5 Hz [s]: what is not urgent yet is told before the vehicle comes near.
+const PUBLISH_WAIT_S: f64 = 0.2 * PUBLISH_TURNS as f64;
 
 /// Settings of the pipeline. A file gives only what differs from [`Config::for_vehicle`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -98,6 +102,8 @@ impl Config {
                 n_cols: elevation_n,
                 recentre_m: 4.0 * risk_m,
                 gap_radius_m: fitting.gap_radius_m.max(gap_cells(length_m) * risk_m),
+                publish_turns: PUBLISH_TURNS,
+                publish_near_m: fitting.publish_near_m + speed_max_mps * PUBLISH_WAIT_S,
                 ..fitting
             },
             risk_map: RiskMapConfig {

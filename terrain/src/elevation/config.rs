@@ -54,15 +54,19 @@ pub struct ElevationConfig {
     pub visibility_margin_m: f32,
     /// Scans that must contradict a height, none confirming it, before it is forgotten, > 0.
     pub ghost_scans: u8,
-    /// A change of a height below this is not published [m], nor are changes of a variance by less than a fifth
-    /// or of a probability by less than a twentieth; 0 = every change is.
+    /// A change of a height below this, or below half of the standard deviation that was told with it, is not published
+    /// [m], nor are changes of a variance by less than a fifth or of a probability by less than a twentieth; 0 = every
+    /// change is.
     pub publish_step_m: f32,
-    /// What tells little is published when the turn of its row comes, at the latest after so many scans, > 0; 1 = at once.
-    /// Little is a height that stays within two of the standard deviations that were told with it and within
-    /// `visibility_margin_m` (a tenth of it where the ground was filled in), a variance, and a probability that moves by
-    /// less than a fifth and leaves the likeliest class as it is. Whatever else changes, and what is known for the first
-    /// time or no more, is published at once.
+    /// What is published when the turn of its row comes is so at the latest after so many scans, > 0; 1 = everything at
+    /// once. Near the vehicle, within `publish_near_m`, that is what tells little: a height that stays within two of the
+    /// standard deviations that were told with it and within `visibility_margin_m` (a tenth of it where the ground was
+    /// filled in), a variance, and a probability that moves by less than a fifth and leaves the likeliest class as it is.
+    /// Whatever else changes there, and what is known for the first time or no more, is urgent and published at once.
+    /// Farther away everything waits.
     pub publish_turns: u8,
+    /// How far from the vehicle what is urgent does not wait for its turn [m].
+    pub publish_near_m: f64,
     /// The box that the vehicle takes up, with a margin: points inside are the vehicle itself. Empty = the sensor sees
     /// nothing of it.
     pub own_body: BodyBox,
@@ -92,6 +96,7 @@ impl Default for ElevationConfig {
             ghost_scans: 2,
             publish_step_m: 0.003,
             publish_turns: 1,
+            publish_near_m: 5.1,
         }
     }
 }
@@ -114,6 +119,7 @@ impl ElevationConfig {
             gap_radius_m: default.gap_radius_m * scale,
             visibility_margin_m: scaled(default.visibility_margin_m),
             publish_step_m: scaled(default.publish_step_m),
+            publish_near_m: default.publish_near_m * scale,
             ..default
         }
     }
@@ -142,6 +148,7 @@ impl ElevationConfig {
             ("fading_m2ps", self.fading_m2ps),
             ("gap_radius_m", self.gap_radius_m),
             ("publish_step_m", f64::from(self.publish_step_m)),
+            ("publish_near_m", self.publish_near_m),
         ];
         SettingError::check(&positive, "a finite number > 0", |v| v.is_finite() && v > 0.0)?;
         let n_cells = self.n_rows.saturating_mul(self.n_cols);

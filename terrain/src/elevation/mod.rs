@@ -161,7 +161,7 @@ impl ElevationMap {
         self.fade(scan.valid_at_ns);
         self.points.sort(scan, pose, self.states.geometry(), &self.config);
         self.fuse_points();
-        self.publish(Turns::of_scan(self.n_fused, &self.config));
+        self.publish(Turns::of_scan(self.n_fused, pose, &self.config));
         self.n_fused += 1;
         let report = FuseReport {
             n_points: scan.points.len(),

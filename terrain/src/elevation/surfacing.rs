@@ -3,7 +3,7 @@
 use super::cell::{CellState, Ground};
 use super::gaps::{Enclosure, Inferred, infer};
 use super::{ElevationConfig, ElevationMap};
-use crate::{CellRegion, GridMap, Knowledge, SurfaceCell, TerrainClass};
+use crate::{CellRegion, GridMap, Knowledge, Pose, SurfaceCell, TerrainClass};
 
 /// Buffers kept from scan to scan.
 #[derive(Clone, Debug, Default)]
@@ -13,6 +13,8 @@ pub(super) struct Scratch {
     enclosure: Enclosure,
 }
 
+/// A height is published anew when it moved by more than this share of the standard deviation that was told.
+const DEVIATION_SHARE: f32 = 0.5;
 /// A variance is published anew when it changed by more than this share.
 const VARIANCE_SHARE: f32 = 0.2;
 /// A class probability is published anew when it changed by more than this.
@@ -31,8 +33,8 @@ const GAP_MARGIN_SHARE: f32 = 0.25;
 
 impl ElevationMap {
     /// Brings the published surface up to date and notes what changed: in the rows whose turn it is all that is worth
-    /// telling, elsewhere what is urgent. Neighbouring rows have their turn together, so that whoever judges footprints
-    /// finds what changed in one place.
+    /// telling, near the vehicle also what is urgent. Neighbouring rows have their turn together, so that whoever judges
+    /// footprints finds what changed in one place.
     pub(super) fn publish(&mut self, turns: Turns) {
         let geometry = *self.surface.geometry();
         self.surfacing.draw(&self.states, &self.config);
@@ -40,10 +42,11 @@ impl ElevationMap {
         let next = &self.surfacing.next;
         for (index, (published, next)) in self.surface.values_mut().iter_mut().zip(next).enumerate() {
             let cell = geometry.cell(index);
-            let is_due = turns.have(y + cell.row as i64) || is_urgent(published, next, &self.config);
+            let place = [x + cell.col as i64, y + cell.row as i64];
+            let is_due =
+                turns.have(place) || turns.is_near(place) && is_urgent(published, next, &self.config);
             if is_due && differs(published, next, &self.config) {
                 *published = *next;
-                let place = [x + cell.col as i64, y + cell.row as i64];
                 self.changed.include(place, place);
             }
         }
@@ -53,7 +56,7 @@ impl ElevationMap {
 /// Whose turn it is to be published.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Turns {
-    /// Every row's.
+    /// Every cell's.
     All,
     /// That of some rows of the lattice.
     Of {
@@ -63,22 +66,45 @@ pub(super) enum Turns {
         n_turns: i64,
         /// Neighbouring rows that have it together.
         n_rows: i64,
+        /// The cell of the vehicle.
+        here: [i64; 2],
+        /// How far from it what is urgent does not wait [cells].
+        near: i64,
     },
 }
 
 impl Turns {
-    /// The turn of a scan, counted from the first one.
-    pub fn of_scan(n_before: u64, config: &ElevationConfig) -> Self {
+    /// The turn of a scan taken at `pose`, counted from the first one, which tells everything.
+    pub fn of_scan(n_before: u64, pose: &Pose, config: &ElevationConfig) -> Self {
         let n_turns = i64::from(config.publish_turns);
-        let turn = (n_before % u64::from(config.publish_turns)) as i64;
-        Self::Of { turn, n_turns, n_rows: (config.n_rows as i64 + n_turns - 1) / n_turns }
+        let cells = |length_m: f64| (length_m / config.resolution_m).floor() as i64;
+        if n_before == 0 {
+            return Self::All;
+        }
+        Self::Of {
+            turn: (n_before % u64::from(config.publish_turns)) as i64,
+            n_turns,
+            n_rows: (config.n_rows as i64 + n_turns - 1) / n_turns,
+            here: [pose.x_m, pose.y_m].map(cells),
+            near: cells(config.publish_near_m),
+        }
     }
 
-    /// Whether a row of the lattice has its turn.
-    fn have(self, row: i64) -> bool {
+    /// Whether a cell of the lattice has its turn.
+    fn have(self, [_, row]: [i64; 2]) -> bool {
         match self {
             Self::All => true,
-            Self::Of { turn, n_turns, n_rows } => row.div_euclid(n_rows).rem_euclid(n_turns) == turn,
+            Self::Of { turn, n_turns, n_rows, .. } => row.div_euclid(n_rows).rem_euclid(n_turns) == turn,
+        }
+    }
+
+    /// Whether a cell of the lattice is so near that what is urgent does not wait for its turn.
+    fn is_near(self, [col, row]: [i64; 2]) -> bool {
+        match self {
+            Self::All => true,
+            Self::Of { here: [x, y], near, .. } => {
+                (col - x).pow(2) + (row - y).pow(2) <= near.saturating_pow(2)
+            }
         }
     }
 }
@@ -209,11 +235,14 @@ fn is_urgent(published: &SurfaceCell, next: &SurfaceCell, config: &ElevationConf
 }
 
 fn differs(published: &SurfaceCell, next: &SurfaceCell, config: &ElevationConfig) -> bool {
-    let step_m = config.publish_step_m;
-    let (share, probability_step) =
-        if step_m > 0.0 { (VARIANCE_SHARE, PROBABILITY_STEP) } else { (0.0, 0.0) };
-    let moved = |a: f32, b: f32| (a - b).abs() > step_m;
     let variance_m2 = published.height_variance_m2;
+    let (step_m, share, probability_step) = if config.publish_step_m > 0.0 {
+        let step_m = config.publish_step_m.max(DEVIATION_SHARE * variance_m2.sqrt());
+        (step_m, VARIANCE_SHARE, PROBABILITY_STEP)
+    } else {
+        (0.0, 0.0, 0.0)
+    };
+    let moved = |a: f32, b: f32| (a - b).abs() > step_m;
     published.knowledge != next.knowledge
         || moved(published.height_m, next.height_m)
         || moved(published.vegetation_height_m, next.vegetation_height_m)
