@@ -11,6 +11,9 @@ use crate::{Jump, TracksMessage};
 /// Who leaves somebody who stands closer than he should may come closer by half of what is left, within these [m]: no way out
 /// of a narrow place leads straight away.
 const LEAVING_SLACK_M: [f64; 2] = [0.01, 0.05];
+/// Who stands nearer to the body than this may touch it, whatever is measured: the vehicle stays where it is until he has
+/// gone [m].
+const TOUCHING_M: f64 = 0.1;
 
 /// How moving obstacles are dealt with.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -94,7 +97,7 @@ pub(crate) struct Horizon<'a> {
 }
 
 /// Lays the places where tracked things will be over the steps of a plan. Who stands closer than the clearance may be left,
-/// but not come closer to.
+/// but not come closer to, and who may touch the vehicle keeps it where it is.
 pub(crate) fn lay_out(
     discs: &mut MovingDiscs,
     tracks: &TracksMessage,
@@ -110,7 +113,8 @@ pub(crate) fn lay_out(
         let gap_m = discs.distance_m(&horizon.vehicle, track.position_m) - track.radius_m;
         let [least_m, most_m] = LEAVING_SLACK_M;
         let slack_m = (0.5 * gap_m).clamp(least_m, most_m);
-        let clearance_max_m = if stands { gap_m - slack_m } else { f64::INFINITY };
+        let may_be_left = stands && gap_m > TOUCHING_M;
+        let clearance_max_m = if may_be_left { gap_m - slack_m } else { f64::INFINITY };
         discs.add(|t| {
             let place = track.predicted(horizon.begins_s + horizon.step_s * (t + 1) as f64, density_m2ps3);
             let uncertain_m = (config.place_std * place.std_m).min(config.uncertainty_max_m);
@@ -212,6 +216,13 @@ mod tests {
         let walks = Track { velocity_mps: [0.0, 0.3], ..close };
         lay_out(&mut discs, &message(&[walks]), &config(), &Horizon { vehicle, ..horizon() });
         assert!(forbidden(&discs, 0, [4.49, 0.0]), "0.3 m of radius, 0.2 of clearance, 0.2 unsure");
+        // 5 cm from his side: neither on nor back.
+        let vehicle = MotionState { x_m: 4.65, ..MotionState::default() };
+        lay_out(&mut discs, &message(&[close]), &config(), &Horizon { vehicle, ..horizon() });
+        assert!(
+            [4.4, 4.65, 4.7].iter().all(|x_m| forbidden(&discs, 4, [*x_m, 0.0])),
+            "he may touch the vehicle"
+        );
     }
 
     #[test]

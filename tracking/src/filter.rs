@@ -45,6 +45,18 @@ impl Estimate {
         Self { position_m, velocity_mps: [0.0; 2], variance }
     }
 
+    /// Of something that was measured twice, `elapsed_s` apart, and is at the second place: the difference of two points
+    /// (Bar-Shalom, Li and Kirubarajan 2001, section 5.5.3).
+    pub fn of_two([first_m, second_m]: [[f64; 2]; 2], elapsed_s: f64, noise_m2: f64) -> Self {
+        let variance = Variance {
+            position_m2: noise_m2,
+            cross_m2ps: noise_m2 / elapsed_s,
+            velocity_m2ps2: 2.0 * noise_m2 / (elapsed_s * elapsed_s),
+        };
+        let velocity_mps = [0, 1].map(|axis| (second_m[axis] - first_m[axis]) / elapsed_s);
+        Self { position_m: second_m, velocity_mps, variance }
+    }
+
     /// Lets time pass.
     pub fn predict(&mut self, time_s: f64, density_m2ps3: f64) {
         self.position_m = [0, 1].map(|axis| self.position_m[axis] + time_s * self.velocity_mps[axis]);
@@ -116,6 +128,25 @@ mod tests {
     }
 
     /// White acceleration in many small steps, each a kick to the velocity: variances of sums of independent numbers.
+    /// Two points are the line of least squares through two points.
+    #[test]
+    fn of_two_points_it_is_the_line_through_both() {
+        let two = Estimate::of_two([[1.0, 2.0], [1.5, 1.6]], 0.5, NOISE_M2);
+        let mut line = Estimate::new([1.0, 2.0], NOISE_M2, 1e9);
+        line.predict(0.5, 0.0);
+        line.update([1.5, 1.6], NOISE_M2);
+        let Variance { position_m2, cross_m2ps, velocity_m2ps2 } = line.variance;
+        // 0.01, 0.01 / 0.5 and 2 x 0.01 / 0.25.
+        assert_eq!(two.variance, Variance { position_m2: 0.01, cross_m2ps: 0.02, velocity_m2ps2: 0.08 });
+        for (found, expected) in [(position_m2, 0.01), (cross_m2ps, 0.02), (velocity_m2ps2, 0.08)] {
+            assert!((found - expected).abs() < 1e-6, "{found} {expected}");
+        }
+        for axis in 0..2 {
+            assert!((two.position_m[axis] - line.position_m[axis]).abs() < 1e-6);
+            assert!((two.velocity_mps[axis] - line.velocity_mps[axis]).abs() < 1e-6);
+        }
+    }
+
     #[test]
     fn without_measurements_it_grows_as_sums_of_kicks_do() {
         let (density, time_s, n) = (0.5, 2.0, 20_000);

@@ -15,6 +15,11 @@ const FOLLOWED_MAX: usize = 64;
 const BESIDE_M: f64 = 0.8;
 /// Where a thing stood for so long is where it may later be seen to have left [s].
 const SETTLED_S: f64 = 3.0;
+/// Things up to this radius, as people are, have no side that comes into view unseen so far [m].
+const COMPACT_M: f64 = 0.5;
+/// What has stood for a while sets off where two scans in a row show it farther from there than this, each by so much more
+/// than the one before [m]. What jumps once, because it is seen together with what is beside it, does not.
+const SETTING_OFF_M: f64 = 0.1;
 /// A scan that shows a point within this distance of a place has looked at it, however slim what stood there [m].
 const LOOKED_AT_M: f64 = 0.3;
 /// Shares by which a radius follows a larger and a smaller one: a scan may see one side of a thing only, or take it
@@ -51,6 +56,10 @@ struct Followed {
     /// Of that, while its place could be looked at.
     absent_s: f64,
     standing_s: f64,
+    /// Whether it has stood at its anchor for a while.
+    has_settled: bool,
+    /// Where the last scan that showed it did so [m].
+    shown_m: [f64; 2],
 }
 
 impl Tracker {
@@ -116,6 +125,7 @@ impl Tracker {
         };
         for followed in &mut self.followed {
             followed.anchor_m = place_m(followed.anchor_m);
+            followed.shown_m = place_m(followed.shown_m);
             followed.estimate.position_m = place_m(followed.estimate.position_m);
             followed.estimate.velocity_mps = turned(followed.estimate.velocity_mps);
         }
@@ -194,6 +204,8 @@ impl Tracker {
             unseen_s: 0.0,
             absent_s: 0.0,
             standing_s: 0.0,
+            has_settled: false,
+            shown_m: cluster.centre_m,
         });
     }
 
@@ -223,12 +235,29 @@ impl Followed {
     }
 
     fn see(&mut self, cluster: &Cluster, elapsed_s: f64, config: &TrackingConfig) {
-        self.estimate.update(cluster.centre_m, noise_m2(cluster, config));
+        let noise_m2 = noise_m2(cluster, config);
+        if self.sets_off(cluster, config) {
+            self.has_moved = true;
+            // What the filter learned is of something that stands.
+            self.estimate = Estimate::of_two([self.shown_m, cluster.centre_m], elapsed_s, noise_m2);
+        } else {
+            self.estimate.update(cluster.centre_m, noise_m2);
+        }
+        self.shown_m = cluster.centre_m;
         let growth_m = cluster.radius_m - self.radius_m;
         self.radius_m += growth_m * if growth_m > 0.0 { GROW_GAIN } else { SHRINK_GAIN };
         self.n_scans += 1;
         (self.unseen_s, self.absent_s) = (0.0, 0.0);
         self.judge_motion(elapsed_s, config);
+    }
+
+    /// Whether it leaves the place where it stood for a while, which two scans show sooner than the filter believes it.
+    fn sets_off(&self, cluster: &Cluster, config: &TrackingConfig) -> bool {
+        let away_m = |[x_m, y_m]: [f64; 2]| libm::hypot(x_m - self.anchor_m[0], y_m - self.anchor_m[1]);
+        let [before_m, now_m] = [self.shown_m, cluster.centre_m].map(away_m);
+        let goes_on = before_m > SETTING_OFF_M && now_m > before_m + SETTING_OFF_M;
+        let is_news = self.has_settled && !self.has_moved && self.unseen_s == 0.0;
+        is_news && self.radius_m <= COMPACT_M && goes_on && now_m > config.moved_min_m + SETTING_OFF_M
     }
 
     /// Whether it moves. What does has left the place where it was first seen, which neither a side that comes into view
@@ -242,7 +271,7 @@ impl Followed {
         self.standing_s = if is_fast { 0.0 } else { self.standing_s + elapsed_s };
         if !self.has_moved && self.standing_s > SETTLED_S {
             // Its centre wanders slowly as other sides of it come into view.
-            self.anchor_m = position_m;
+            (self.anchor_m, self.has_settled) = (position_m, true);
         }
     }
 
