@@ -69,8 +69,8 @@ pub use refusal::ArrayFileError;
 pub use results::{OutputError, config_hash, prepare_out_dir, write_bytes_atomic, write_json_atomic};
 pub use robot::{
     CONTROL_RATES_HZ, ODOMETRY_RATES_HZ, RobotAges, RobotAreas, RobotCorrection, RobotFile, RobotGround,
-    RobotMission, RobotRates, RobotRos, RobotSafety, RobotSensor, RosClock, RosCommand, RosLabels, RosTopics,
-    SCAN_RATES_HZ, THIRD_PARTIES_MAX, parse_robot, read_robot,
+    RobotMission, RobotRates, RobotRos, RobotSafety, RobotSensor, RosClock, RosCommand, RosLabels,
+    RosPointEpoch, RosPointTime, RosTopics, SCAN_RATES_HZ, THIRD_PARTIES_MAX, parse_robot, read_robot,
 };
 pub use scan::{parse_scan_points, read_scan_points};
 pub use skid_steer::{parse_skid_steer_vehicle, read_skid_steer_vehicle};

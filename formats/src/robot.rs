@@ -9,7 +9,7 @@ use serde::Deserialize;
 use terrain::Mount;
 
 use crate::{ConfigError, ConfigText, shipped_vehicle_text};
-pub use ros::{RobotRos, RosClock, RosCommand, RosLabels, RosTopics};
+pub use ros::{RobotRos, RosClock, RosCommand, RosLabels, RosPointEpoch, RosPointTime, RosTopics};
 
 /// Version of the robot files that this program reads.
 const FORMAT: u32 = 1;
@@ -312,6 +312,7 @@ speed_max_mps = 0.8
 vehicle_frame = "rear_axle"
 command = "twist"
 labels = { field = "label", open = [1, 40] }
+point_time = { field = "t", unit_s = 1e-9 }
 topics = { points = ["front/points", "rear/points"], pause = "" }
 "#;
 
@@ -336,6 +337,8 @@ topics = { points = ["front/points", "rear/points"], pause = "" }
         assert_eq!((ros.vehicle_frame.as_str(), ros.command), ("rear_axle", RosCommand::Twist));
         assert_eq!((ros.topics.points.len(), ros.topics.odometry.as_str()), (2, "odom"));
         assert_eq!(ros.labels.unwrap().open, [1, 40]);
+        let times = RosPointTime { field: "t".into(), unit_s: 1e-9, counts_from: RosPointEpoch::Stamp };
+        assert_eq!(ros.point_time, Some(times));
         let shipped = parse_robot(&ConfigText::new("r", "format = 1\nvehicle = \"rc_car\"")).unwrap();
         assert_eq!(shipped.relative_to(folder.path()).vehicle, "rc_car");
     }
@@ -373,6 +376,7 @@ topics = { points = ["front/points", "rear/points"], pause = "" }
         assert!(ros("\"rear_axle\"", "\"\"").contains("ros.vehicle_frame: expected a name, found none"));
         assert!(ros("command = \"twist\"", "namespace = \"car\"").contains("begins with a slash"));
         assert!(ros("\"twist\"", "\"steering\"").contains("ros.command"));
+        assert!(ros("1e-9", "0.0").contains("ros.point_time.unit_s: expected a finite number > 0, found 0"));
         let unknown = told(&WHOLE.replace("speed_max_mps", "top_speed"));
         assert!(unknown.contains("safety.top_speed") && unknown.contains("an unknown key"), "{unknown}");
         assert!(told("format = 1").contains("vehicle"));

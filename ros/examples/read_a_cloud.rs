@@ -4,8 +4,8 @@
 //! axle and a metre above it, and looks to the left.
 
 use nalgebra::{Isometry3, Translation3, UnitQuaternion};
-use ros::cloud::{Classes, GeometryClasses};
-use ros::intake::Intake;
+use ros::cloud::{Classes, GeometryClasses, Meaning};
+use ros::intake::{Clouds, Intake};
 use ros::message::{Header, PointCloud2, PointField, TfMessage, Time, Transform, TransformStamped, Vector3};
 use ros::odometry::Frames;
 use ros::rigid;
@@ -16,8 +16,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let frames = Frames { map: "map".into(), vehicle: "rear_axle".into() };
     let lengths = GeometryClasses { column_m: 0.3, step_m: 0.15, plants_max_m: 1.0 };
     let clock = StampClock::new(StampSource::OfItsOwn);
-    let mut intake =
-        Intake::new(frames, Classes::Geometry(lengths), Vec::new(), clock, Transforms::new(1_000_000_000));
+    let meaning = Meaning { classes: Classes::Geometry(lengths), times: None };
+    let clouds = Clouds { meaning, sensors: Vec::new() };
+    let mut intake = Intake::new(frames, clouds, clock, Transforms::new(1_000_000_000));
 
     // Without knowing where the sensor is, a cloud says nothing.
     let arrival = Arrival { monotonic_ns: 5_000_000_000, utc_ns: 0 };

@@ -12,7 +12,7 @@ use bicycle::Vehicle;
 use bus::clock;
 use byteorder::{BigEndian, LittleEndian};
 use cdr_encoding::from_bytes;
-use formats::{RecordedMessage, RobotRos};
+use formats::{RecordedMessage, RobotRos, RobotSensor};
 use serde::de::DeserializeOwned;
 
 pub use drive::{BagDrive, BagDriveError, Robot, drive_log};
@@ -116,16 +116,15 @@ pub fn arrival(message: &RecordedMessage) -> Arrival {
     Arrival { monotonic_ns: message.log_time_ns, utc_ns: message.log_time_ns }
 }
 
-/// What takes over the messages of a robot, as the bridge does; sensors are the frames that the robot file mounts.
+/// What takes over the messages of a robot, as the bridge does; sensors are those that the robot file mounts.
 ///
 /// # Errors
 /// Labels that mean nothing.
-pub fn intake(ros: &RobotRos, vehicle: &Vehicle, sensors: Vec<String>) -> Result<Intake, LabelsError> {
+pub fn intake(ros: &RobotRos, vehicle: &Vehicle, sensors: &[RobotSensor]) -> Result<Intake, LabelsError> {
     let frames = Frames { map: ros.frame(&ros.map_frame), vehicle: ros.frame(&ros.vehicle_frame) };
-    let sensors = sensors.iter().map(|sensor| ros.frame(sensor)).collect();
     let transforms = Transforms::new(clock::nanoseconds(ros.transform_age_max_s));
     let stamps = StampClock::new(bridge::source_of(ros.clock));
-    Ok(Intake::new(frames, bridge::classes(ros, vehicle)?, sensors, stamps, transforms))
+    Ok(Intake::new(frames, bridge::clouds(ros, vehicle, sensors)?, stamps, transforms))
 }
 
 /// A topic of the robot file as bags name it, from the root; none of an empty one.

@@ -14,13 +14,13 @@ use bus::channel::{Bus, COMMAND, ChannelError, Inlet, MISSION};
 use bus::clock::{self, SECOND_NS};
 use bus::message::{CommandRecord, MissionRecord, Stamp};
 use bus::status::{Health, Meter, Role};
-use formats::{RobotRos, RosClock};
+use formats::{RobotRos, RobotSensor, RosClock};
 
 use crate::actuation::Actuation;
-use crate::cloud::{ClassLabels, Classes, GeometryClasses, LabelsError};
+use crate::cloud::{ClassLabels, Classes, GeometryClasses, LabelsError, Meaning};
 use crate::complaints::Complaints;
 use crate::environment::Discovery;
-use crate::intake::Intake;
+use crate::intake::{Clouds, Intake};
 use crate::node::{Node, NodeError};
 use crate::odometry::Frames;
 use crate::orders::{Director, Order, Orders};
@@ -58,8 +58,8 @@ pub struct BridgeSetup<'a> {
     pub ros: &'a RobotRos,
     /// The machine.
     pub vehicle: &'a Vehicle,
-    /// Frames of the sensors that the robot file mounts, in its order.
-    pub sensors: Vec<String>,
+    /// The sensors that the robot file mounts, in its order.
+    pub sensors: &'a [RobotSensor],
     /// How often the robot speaks.
     pub periods: Periods,
     /// How old what is followed may be.
@@ -115,7 +115,6 @@ impl Bridge {
         let mut node = Node::join(discovery, &ros.namespace, &ros.node)?;
         let transforms = Transforms::new(clock::nanoseconds(ros.transform_age_max_s));
         let frames = Frames { map: ros.frame(&ros.map_frame), vehicle: ros.frame(&ros.vehicle_frame) };
-        let sensors = sensors.iter().map(|sensor| ros.frame(sensor)).collect();
         let speed_max_mps = vehicle.limits.speed_max_mps;
         let parameters = Parameters {
             alpha,
@@ -131,7 +130,7 @@ impl Bridge {
             ears: Ears::new(bus, &mut node, &ros.topics)?,
             voices: Voices::new(bus, &mut node, ros, vehicle, &periods)?,
             node,
-            intake: Intake::new(frames, classes(ros, vehicle)?, sensors, stamps, transforms),
+            intake: Intake::new(frames, clouds(ros, vehicle, sensors)?, stamps, transforms),
             actuation: Actuation::new(vehicle.limits, ages),
             orders: Orders::new(director),
             complaints: Complaints::default(),
@@ -284,8 +283,19 @@ pub(crate) fn source_of(clock: RosClock) -> StampSource {
     }
 }
 
+/// What clouds of the robot are.
+pub(crate) fn clouds(
+    ros: &RobotRos,
+    vehicle: &Vehicle,
+    sensors: &[RobotSensor],
+) -> Result<Clouds, LabelsError> {
+    let meaning = Meaning { classes: classes(ros, vehicle)?, times: ros.point_time.clone() };
+    let mounted = |sensor: &RobotSensor| (ros.frame(&sensor.name), sensor.mount.isometry());
+    Ok(Clouds { meaning, sensors: sensors.iter().map(mounted).collect() })
+}
+
 /// By labels where the robot file says which; else what rises by more than half of the clearance is no ground.
-pub(crate) fn classes(ros: &RobotRos, vehicle: &Vehicle) -> Result<Classes, LabelsError> {
+fn classes(ros: &RobotRos, vehicle: &Vehicle) -> Result<Classes, LabelsError> {
     if let Some(labels) = &ros.labels {
         return Ok(Classes::Labels(ClassLabels::new(labels)?));
     }

@@ -3,17 +3,20 @@
 mod classes;
 mod geometry;
 mod layout;
+mod twist;
 
 use nalgebra::{Isometry3, Point3};
 
 use bus::message::PointRecord;
+use formats::{RosPointEpoch, RosPointTime};
 use terrain::TerrainClass;
 
 use crate::message::PointCloud2;
 pub use classes::{ClassLabels, LabelsError};
 pub use geometry::GeometryClasses;
-use layout::Layout;
 pub use layout::LayoutError;
+use layout::{Layout, OFFSET_MAX_S, Read};
+pub use twist::Twist;
 
 /// How it is made out what a point is of.
 #[derive(Clone, Debug, PartialEq)]
@@ -37,30 +40,43 @@ pub struct Sweep {
     pub n_left_out: usize,
 }
 
+/// What the fields of clouds mean.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Meaning {
+    /// What points are of.
+    pub classes: Classes,
+    /// When they were measured; `None` = all at the stamp.
+    pub times: Option<RosPointTime>,
+}
+
 /// Nearest that a return can be [m].
 const RANGE_MIN_M: f32 = 1e-3;
 /// Farthest that a return is believed [m].
 const RANGE_MAX_M: f32 = 1e4;
 
-/// The points of a cloud, moved by `motion`, at most `n_max` of them.
+/// The points of a cloud, at most `n_max` of them, each moved by what `motion` says for the time that it was measured after
+/// the stamp [s].
 ///
 /// # Errors
-/// Its fields are not there, lie beyond their points, or it is shorter than it says.
+/// Its fields are not there, lie beyond their points, tell times of another sweep, or it is shorter than it says.
 pub fn sweep(
     cloud: &PointCloud2,
-    classes: &Classes,
-    motion: &Isometry3<f64>,
+    meaning: &Meaning,
     n_max: usize,
+    motion: impl Fn(f64) -> Isometry3<f64>,
 ) -> Result<Sweep, LayoutError> {
+    let Meaning { classes, times } = meaning;
     let label = match classes {
         Classes::Labels(labels) => Some(labels.field.as_str()),
         Classes::Geometry(_) => None,
     };
-    let layout = Layout::new(cloud, label)?;
+    let layout = Layout::new(cloud, label, times.as_ref().map(|times| times.field.as_str()))?;
     let stride = layout.n_points().div_ceil(n_max.max(1)).max(1);
     let mut sweep = Sweep::default();
+    // Points of one firing have one time.
+    let mut moment = (0.0, motion(0.0));
     for place in (0..layout.n_points()).step_by(stride) {
-        let (position_m, label) = layout.point(&cloud.data, place);
+        let Read { position_m, label, time } = layout.point(&cloud.data, place);
         let range_m = position_m.iter().fold(0.0_f32, |range_m, axis_m| range_m.max(axis_m.abs()));
         let is_place = position_m.iter().all(|axis_m| axis_m.is_finite());
         if !(is_place && (RANGE_MIN_M..=RANGE_MAX_M).contains(&range_m)) {
@@ -73,7 +89,13 @@ pub fn sweep(
         };
         sweep.n_unknown_labels += usize::from(class.is_none());
         let class_number = class.unwrap_or(TerrainClass::Obstacle) as u32;
-        let moved = motion * Point3::from(position_m.map(f64::from));
+        if let Some((times, time)) = times.as_ref().zip(time) {
+            let after_s = offset_s(times, time, cloud.header.stamp.nanoseconds())?;
+            if after_s != moment.0 {
+                moment = (after_s, motion(after_s));
+            }
+        }
+        let moved = moment.1 * Point3::from(position_m.map(f64::from));
         let position_m = [moved.x, moved.y, moved.z].map(|axis_m| axis_m as f32);
         sweep.points.push(PointRecord { position_m, class_number });
     }
@@ -82,6 +104,21 @@ pub fn sweep(
         geometry.classify(&mut sweep.points);
     }
     Ok(sweep)
+}
+
+/// How long after the stamp a point was measured [s].
+fn offset_s(times: &RosPointTime, time: f64, stamp_ns: i64) -> Result<f64, LayoutError> {
+    let since_s = time * times.unit_s;
+    let offset_s = match times.counts_from {
+        RosPointEpoch::Stamp => since_s,
+        RosPointEpoch::Epoch => since_s - stamp_ns as f64 * 1e-9,
+    };
+    // What is no number is not within.
+    if offset_s.abs() <= OFFSET_MAX_S {
+        Ok(offset_s)
+    } else {
+        Err(LayoutError::Time { name: times.field.clone(), offset_s })
+    }
 }
 
 #[cfg(test)]

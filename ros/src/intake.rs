@@ -1,10 +1,10 @@
 //! What comes from the robot, as the bus says it: frames found, stamps told on the bus's clock, everything checked.
 
-use nalgebra::Isometry3;
+use nalgebra::{Isometry3, Vector3};
 
 use bus::message::{ImuRecord, OdometryRecord};
 
-use crate::cloud::{self, Classes, LayoutError, Sweep};
+use crate::cloud::{self, LayoutError, Meaning, Sweep, Twist};
 use crate::goals::{self, GoalError};
 use crate::message::{Imu, Odometry, Path, PointCloud2, PoseArray, PoseStamped, TfMessage};
 use crate::odometry::{self, Agreement, Disagreement, Frames, OdometryError};
@@ -71,31 +71,37 @@ pub struct TakenScan {
     pub sweep: Sweep,
 }
 
+/// What clouds are, and where the sensors sit that the robot file mounts.
+#[derive(Clone, Debug)]
+pub struct Clouds {
+    /// What their fields mean.
+    pub meaning: Meaning,
+    /// Frames of the sensors, numbered from 1, with what takes their places to the vehicle's frame.
+    pub sensors: Vec<(String, Isometry3<f64>)>,
+}
+
+/// Odometry that is farther from a cloud in time than this says nothing of how the vehicle moved meanwhile [ns].
+const MOTION_AGE_MAX_NS: u64 = 300_000_000;
+
 /// What is known of the robot's frames and clocks.
 #[derive(Clone, Debug)]
 pub struct Intake {
     frames: Frames,
-    classes: Classes,
-    /// Frames of the sensors that the robot file mounts, numbered from 1.
-    sensors: Vec<String>,
+    clouds: Clouds,
     clock: StampClock,
     transforms: Transforms,
     agreement: Agreement,
     scanned_at_ns: u64,
     felt_at_ns: u64,
+    /// How the vehicle moves, and the time that was told of [ns].
+    twist: Option<(u64, Twist)>,
 }
 
 impl Intake {
     /// Nothing has come yet.
-    pub fn new(
-        frames: Frames,
-        classes: Classes,
-        sensors: Vec<String>,
-        clock: StampClock,
-        transforms: Transforms,
-    ) -> Self {
+    pub fn new(frames: Frames, clouds: Clouds, clock: StampClock, transforms: Transforms) -> Self {
         let agreement = Agreement::default();
-        Self { frames, classes, sensors, clock, transforms, agreement, scanned_at_ns: 0, felt_at_ns: 0 }
+        Self { frames, clouds, clock, transforms, agreement, scanned_at_ns: 0, felt_at_ns: 0, twist: None }
     }
 
     /// The clock of the robot's stamps.
@@ -115,11 +121,15 @@ impl Intake {
         let at_ns = self.at_ns(odometry.header.stamp.nanoseconds(), arrival)?;
         let record = odometry::odometry_record(odometry, &self.transforms, &self.frames)?;
         self.agreement.check(&record, at_ns)?;
+        let [forward_mps, left_mps] = record.velocity_mps;
+        let velocity_mps = Vector3::new(forward_mps, left_mps, 0.0);
+        self.twist = Some((at_ns, Twist { velocity_mps, rate_radps: Vector3::z() * record.yaw_rate_radps }));
         Ok((at_ns, record))
     }
 
     /// A sweep of a sensor: in its own frame where the robot file mounts one of the name of the cloud's frame, else in
-    /// that of the vehicle; of at most `n_max` points.
+    /// that of the vehicle; of at most `n_max` points. Where points have times, each is told as if it had been measured at
+    /// the stamp: what the vehicle moves meanwhile, as its last odometry says, is taken out.
     ///
     /// # Errors
     /// See [`IntakeError`].
@@ -135,11 +145,22 @@ impl Intake {
             return Err(IntakeError::OutOfOrder { by_s: (self.scanned_at_ns - at_ns) as f64 * 1e-9 });
         }
         let frame = &cloud.header.frame_id;
-        let (sensor, motion) = match self.sensors.iter().position(|sensor| sensor == frame) {
-            Some(place) => (place as u32 + 1, Isometry3::identity()),
-            None => (0, self.transforms.between(frame, &self.frames.vehicle, stamp_ns)?),
+        let Clouds { meaning, sensors } = &self.clouds;
+        let (sensor, mounting, motion) = match sensors.iter().position(|(sensor, _)| sensor == frame) {
+            Some(place) => (place as u32 + 1, sensors[place].1, Isometry3::identity()),
+            None => {
+                let motion = self.transforms.between(frame, &self.frames.vehicle, stamp_ns)?;
+                (0, motion, motion)
+            }
         };
-        let sweep = cloud::sweep(cloud, &self.classes, &motion, n_max)?;
+        let twist = self.twist.filter(|(told_at_ns, _)| told_at_ns.abs_diff(at_ns) <= MOTION_AGE_MAX_NS);
+        let sweep = cloud::sweep(cloud, meaning, n_max, |after_s| match twist {
+            // From the sensor to the vehicle then, to the vehicle at the stamp, and to the frame that is told.
+            Some((_, twist)) if after_s != 0.0 => {
+                motion * mounting.inverse() * twist.over(after_s) * mounting
+            }
+            _ => motion,
+        })?;
         if sweep.points.is_empty() {
             return Err(IntakeError::NoReturn { found: sweep.n_without_place });
         }

@@ -1,6 +1,6 @@
 //! Where a range sensor sits on the vehicle, and what it sees of the vehicle itself.
 
-use nalgebra::Point3;
+use nalgebra::{Isometry3, Point3};
 use serde::{Deserialize, Serialize};
 
 use crate::{BodyBox, Pose, RangePoint, Scan};
@@ -19,12 +19,17 @@ pub struct Mount {
 }
 
 impl Mount {
+    /// Takes places of the sensor's frame to the body frame.
+    pub fn isometry(&self) -> Isometry3<f64> {
+        let [x_m, y_m, z_m] = self.position_m;
+        let [roll_rad, pitch_rad, yaw_rad] = self.attitude_rad;
+        Pose { x_m, y_m, z_m, roll_rad, pitch_rad, yaw_rad }.isometry()
+    }
+
     /// A scan of the sensor's frame as one of the body frame, without the points on the vehicle. Points that are no
     /// numbers stay what they are.
     pub fn in_body_frame(&self, scan: &Scan) -> Scan {
-        let [x_m, y_m, z_m] = self.position_m;
-        let [roll_rad, pitch_rad, yaw_rad] = self.attitude_rad;
-        let motion = Pose { x_m, y_m, z_m, roll_rad, pitch_rad, yaw_rad }.isometry();
+        let motion = self.isometry();
         let moved = |place_m: [f32; 3]| motion * Point3::from(place_m.map(f64::from));
         let is_own = |place_m: &Point3<f64>| self.own_body.iter().any(|own| own.contains((*place_m).into()));
         let single = |place_m: Point3<f64>| [place_m.x, place_m.y, place_m.z].map(|v| v as f32);

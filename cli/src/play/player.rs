@@ -107,8 +107,7 @@ fn topics(ros: &RobotRos) -> BTreeMap<String, Topic> {
 impl<'a> Player<'a> {
     pub(super) fn new(setup: PlayerSetup<'a>) -> anyhow::Result<Self> {
         let PlayerSetup { up, ros, machine, route, kept } = setup;
-        let sensors = up.described.iter().flat_map(|robot| &robot.sensors);
-        let sensors = sensors.map(|sensor| sensor.name.clone()).collect();
+        let sensors = up.described.as_ref().map_or(&[][..], |robot| &robot.sensors);
         let tolerance_m = robot::tolerance_m(up, machine).unwrap_or_default();
         let goal_m = end_of(&route);
         let mut navigator = navigator(up, machine, goal_m, tolerance_m)?;

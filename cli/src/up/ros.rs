@@ -33,7 +33,7 @@ pub(super) fn run(arguments: &UpArguments, machine: &Machine, ages: AgeLimits) -
     let setup = BridgeSetup {
         ros,
         vehicle: &machine.vehicle,
-        sensors: robot.sensors.iter().map(|sensor| sensor.name.clone()).collect(),
+        sensors: &robot.sensors,
         periods: robot::periods(arguments),
         ages,
         discovery,

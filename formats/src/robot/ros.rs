@@ -33,6 +33,8 @@ pub struct RobotRos {
     pub path_speed_mps: f64,
     /// Which field of clouds says what points are of; by geometry where there is none.
     pub labels: Option<RosLabels>,
+    /// Which field of clouds says when points were measured; all at the cloud's stamp where there is none.
+    pub point_time: Option<RosPointTime>,
     /// The names of topics.
     pub topics: RosTopics,
 }
@@ -52,6 +54,7 @@ impl Default for RobotRos {
             transform_age_max_s: 1.0,
             path_speed_mps: 1.0,
             labels: None,
+            point_time: None,
             topics: RosTopics::default(),
         }
     }
@@ -97,6 +100,30 @@ pub struct RosLabels {
     /// What must not be touched; numbers of no class count as such, too.
     #[serde(default)]
     pub obstacle: Vec<i64>,
+}
+
+/// When the points of a cloud were measured.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RosPointTime {
+    /// Name of the field.
+    pub field: String,
+    /// Of which unit its numbers are [s]: 1 of seconds, 1e-9 of nanoseconds.
+    pub unit_s: f64,
+    /// What they count from.
+    #[serde(default)]
+    pub counts_from: RosPointEpoch,
+}
+
+/// What the times of points count from.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum RosPointEpoch {
+    /// The stamp of the cloud.
+    #[default]
+    Stamp,
+    /// The same as the stamp does.
+    Epoch,
 }
 
 /// The names of topics. An empty one is not spoken, or not listened to.
@@ -205,6 +232,10 @@ impl RobotRos {
             if name.is_empty() {
                 return Err(text.refuse(field, "a name", "none"));
             }
+        }
+        let unit_s = self.point_time.as_ref().map_or(1.0, |times| times.unit_s);
+        if !(unit_s.is_finite() && unit_s > 0.0) {
+            return Err(text.refuse("ros.point_time.unit_s", "a finite number > 0", unit_s));
         }
         if !self.namespace.starts_with('/') {
             let found = format!("{:?}", self.namespace);

@@ -2,11 +2,13 @@
 
 use crate::message::{PointCloud2, PointField};
 
+/// Longest that a sweep is believed to last [s].
+pub(super) const OFFSET_MAX_S: f64 = 1.0;
 /// Points of a cloud at the most: some ten times what the largest sensors send.
 const POINTS_MAX: usize = 1 << 24;
 
 /// Why a cloud cannot be read. Every message is one line.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum LayoutError {
     /// A field is missing.
     #[error("fields: expected one named {expected:?}, found {}", names(.found))]
@@ -60,6 +62,17 @@ pub enum LayoutError {
         /// What there is.
         found: usize,
     },
+    /// Points have a time of another sweep.
+    #[error(
+        "field {name:?}: expected times within {OFFSET_MAX_S} s of the stamp, found one {offset_s:e} s away: are unit_s and \
+         counts_from right?"
+    )]
+    Time {
+        /// Its name.
+        name: String,
+        /// How far away it is [s].
+        offset_s: f64,
+    },
     /// More points than anybody measures.
     #[error("width x height: expected at most {POINTS_MAX} points, found {found}")]
     TooMany {
@@ -107,11 +120,22 @@ impl Kind {
     }
 }
 
-/// Where the places of a cloud's points lie, and their labels; everything lies within its data.
+/// A point as it stands in a cloud.
+pub(super) struct Read {
+    /// Its place [m].
+    pub position_m: [f32; 3],
+    /// What it is of, in numbers of the cloud.
+    pub label: Option<i64>,
+    /// When it was measured, in numbers of the cloud.
+    pub time: Option<f64>,
+}
+
+/// Where the places of a cloud's points lie, their labels and their times; everything lies within its data.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Layout {
     axes: [Number; 3],
     label: Option<Number>,
+    time: Option<Number>,
     width: usize,
     height: usize,
     point_step: usize,
@@ -120,12 +144,17 @@ pub(super) struct Layout {
 }
 
 impl Layout {
-    /// The layout of a cloud, with the field of this name as label.
-    pub(super) fn new(cloud: &PointCloud2, label: Option<&str>) -> Result<Self, LayoutError> {
+    /// The layout of a cloud, with the fields of these names as label and as time.
+    pub(super) fn new(
+        cloud: &PointCloud2,
+        label: Option<&str>,
+        time: Option<&str>,
+    ) -> Result<Self, LayoutError> {
         let number = |name: &str| number(cloud, name);
         let layout = Self {
             axes: [number("x")?, number("y")?, number("z")?],
             label: label.map(number).transpose()?,
+            time: time.map(number).transpose()?,
             width: cloud.width as usize,
             height: cloud.height as usize,
             point_step: cloud.point_step as usize,
@@ -140,13 +169,16 @@ impl Layout {
         self.width * self.height
     }
 
-    /// A point's place [m], and its label.
-    pub(super) fn point(&self, data: &[u8], place: usize) -> ([f32; 3], Option<i64>) {
+    pub(super) fn point(&self, data: &[u8], place: usize) -> Read {
         let start = place / self.width * self.row_step + place % self.width * self.point_step;
         let bytes = &data[start..start + self.point_step];
         let read = |number: Number| self.number(bytes, number);
         // A label is a whole number: what is none is that of nothing.
-        (self.axes.map(|axis| read(axis) as f32), self.label.map(|label| read(label) as i64))
+        Read {
+            position_m: self.axes.map(|axis| read(axis) as f32),
+            label: self.label.map(|label| read(label) as i64),
+            time: self.time.map(read),
+        }
     }
 
     fn number(&self, point: &[u8], Number { offset, kind }: Number) -> f64 {

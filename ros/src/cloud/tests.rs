@@ -1,5 +1,5 @@
 use super::*;
-use crate::message::{Header, PointField};
+use crate::message::{Header, PointField, Time};
 use formats::RosLabels;
 use nalgebra::{Translation3, UnitQuaternion};
 use proptest::prelude::*;
@@ -74,7 +74,7 @@ fn cloud(rows: &[Vec<[f64; 4]>], arrangement: &Arrangement) -> PointCloud2 {
     }
 }
 
-fn labels() -> Classes {
+fn labels() -> Meaning {
     let labels = RosLabels {
         field: "label".into(),
         open: vec![1, 40],
@@ -82,11 +82,16 @@ fn labels() -> Classes {
         vegetation: vec![3],
         obstacle: vec![4],
     };
-    Classes::Labels(ClassLabels::new(&labels).unwrap())
+    Meaning { classes: Classes::Labels(ClassLabels::new(&labels).unwrap()), times: None }
+}
+
+/// Everything stays where it is, whenever it was measured.
+fn resting(_: f64) -> Isometry3<f64> {
+    Isometry3::identity()
 }
 
 fn here(cloud: &PointCloud2) -> Result<Sweep, LayoutError> {
-    sweep(cloud, &labels(), &Isometry3::identity(), 1 << 16)
+    sweep(cloud, &labels(), 1 << 16, resting)
 }
 
 proptest! {
@@ -118,7 +123,7 @@ proptest! {
     fn hostile_clouds_are_read_or_refused(
         [height, width, point_step, row_step] in prop::array::uniform4(prop_oneof![0_u32..40, any::<u32>()]),
         fields in prop::collection::vec(
-            ("[xyz]|label", prop_oneof![0_u32..40, any::<u32>()], any::<u8>(), 0_u32..3), 0..6,
+            ("[xyz]|label|t", prop_oneof![0_u32..40, any::<u32>()], any::<u8>(), 0_u32..3), 0..6,
         ),
         data in prop::collection::vec(any::<u8>(), 0..400),
         is_bigendian: bool,
@@ -128,8 +133,8 @@ proptest! {
         let hostile = PointCloud2 {
             height, width, fields, is_bigendian, point_step, row_step, data, ..PointCloud2::default()
         };
-        for classes in [labels(), geometry()] {
-            if let Ok(read) = sweep(&hostile, &classes, &Isometry3::identity(), 64) {
+        for meaning in [labels(), geometry(), timed(1.0, RosPointEpoch::Stamp)] {
+            if let Ok(read) = sweep(&hostile, &meaning, 64, resting) {
                 prop_assert!(read.points.len() <= 64);
                 prop_assert!(read.points.iter().all(|point| point.position_m.iter().all(|axis_m| axis_m.is_finite())));
             }
@@ -183,10 +188,59 @@ fn points_are_moved_into_the_frame_that_is_asked_for() {
     let quarter = UnitQuaternion::from_euler_angles(0.0, 0.0, std::f64::consts::FRAC_PI_2);
     let motion = Isometry3::from_parts(Translation3::new(1.0, 0.0, 0.5), quarter);
     let ahead = cloud(&[vec![[2.0, 0.0, -0.5, 3.0]]], &PLAIN);
-    let read = sweep(&ahead, &labels(), &motion, 10).unwrap();
+    let read = sweep(&ahead, &labels(), 10, |_| motion).unwrap();
     let [x_m, y_m, z_m] = read.points[0].position_m;
     assert!((x_m - 1.0).abs() + (y_m - 2.0).abs() + z_m.abs() < 1e-6, "{x_m} {y_m} {z_m}");
     assert_eq!(read.points[0].class_number, TerrainClass::Vegetation as u32);
+}
+
+fn timed(unit_s: f64, counts_from: RosPointEpoch) -> Meaning {
+    Meaning { times: Some(RosPointTime { field: "t".into(), unit_s, counts_from }), ..geometry() }
+}
+
+/// Three points at 1 m ahead, with these times in the place of labels, at the stamp of 1 700 000 000.25 s.
+fn timed_cloud(times: [f64; 3], kind: u8) -> PointCloud2 {
+    let rows = [times.map(|time| [1.0, 0.0, 0.0, time]).to_vec()];
+    let mut timed = cloud(&rows, &Arrangement { kinds: [7, 7, 7, kind], ..PLAIN });
+    timed.fields[3].name = "t".into();
+    timed.header.stamp = Time { sec: 1_700_000_000, nanosec: 250_000_000 };
+    timed
+}
+
+/// How far each point is moved by a frame that moves by 1 m/s.
+fn moved_m(cloud: &PointCloud2, meaning: &Meaning) -> Result<Vec<f32>, LayoutError> {
+    let motion = |after_s: f64| Isometry3::translation(after_s, 0.0, 0.0);
+    Ok(sweep(cloud, meaning, 10, motion)?.points.iter().map(|point| point.position_m[0] - 1.0).collect())
+}
+
+#[test]
+fn points_are_moved_for_the_time_they_were_measured_at() {
+    let near = |found: Vec<f32>| {
+        let expected_m = [0.0, 0.05, -0.02];
+        let off_m = found.iter().zip(expected_m).map(|(found, expected)| (found - expected).abs());
+        assert!(found.len() == 3 && off_m.fold(0.0, f32::max) < 1e-6, "{found:?}");
+    };
+    // Seconds as f32, nanoseconds as i32, both from the stamp; seconds as f64 since 1970.
+    near(moved_m(&timed_cloud([0.0, 0.05, -0.02], 7), &timed(1.0, RosPointEpoch::Stamp)).unwrap());
+    near(moved_m(&timed_cloud([0.0, 5e7, -2e7], 5), &timed(1e-9, RosPointEpoch::Stamp)).unwrap());
+    let since_1970_s = [0.25, 0.3, 0.23].map(|time_s| 1.7e9 + time_s);
+    near(moved_m(&timed_cloud(since_1970_s, 8), &timed(1.0, RosPointEpoch::Epoch)).unwrap());
+}
+
+#[test]
+fn times_of_another_sweep_are_refused_with_what_may_be_wrong() {
+    let told = |cloud: &PointCloud2, meaning: &Meaning| moved_m(cloud, meaning).unwrap_err().to_string();
+    let nanoseconds = timed_cloud([0.0, 5e7, 1e8], 6);
+    assert_eq!(
+        told(&nanoseconds, &timed(1.0, RosPointEpoch::Stamp)),
+        "field \"t\": expected times within 1 s of the stamp, found one 5e7 s away: are unit_s and counts_from right?"
+    );
+    assert!(
+        told(&timed_cloud([f64::NAN; 3], 8), &timed(1.0, RosPointEpoch::Stamp))
+            .contains("found one NaN s away")
+    );
+    let missing = told(&cloud(&[vec![[1.0; 4]]], &PLAIN), &timed(1.0, RosPointEpoch::Stamp));
+    assert_eq!(missing, "fields: expected one named \"t\", found x, y, z, label");
 }
 
 #[test]
@@ -212,7 +266,7 @@ fn rays_without_a_return_are_counted_and_what_nobody_knows_is_an_obstacle() {
 #[test]
 fn of_too_many_points_every_so_many_th_is_kept() {
     let row: Vec<[f64; 4]> = (1..=100).map(|k| [f64::from(k), 0.0, 0.0, 1.0]).collect();
-    let read = sweep(&cloud(&[row], &PLAIN), &labels(), &Isometry3::identity(), 30).unwrap();
+    let read = sweep(&cloud(&[row], &PLAIN), &labels(), 30, resting).unwrap();
     assert_eq!((read.points.len(), read.n_left_out), (25, 75));
     assert_eq!(read.points[1].position_m[0], 5.0);
 }
@@ -225,8 +279,10 @@ fn a_label_in_two_classes_is_refused() {
     assert_eq!(told, "ros.labels: expected every number in one class, found 2 in two");
 }
 
-fn geometry() -> Classes {
-    Classes::Geometry(GeometryClasses { column_m: 0.3, step_m: 0.15, plants_max_m: 1.0 })
+const LENGTHS: GeometryClasses = GeometryClasses { column_m: 0.3, step_m: 0.15, plants_max_m: 1.0 };
+
+fn geometry() -> Meaning {
+    Meaning { classes: Classes::Geometry(LENGTHS), times: None }
 }
 
 /// Points of a square of 6 m, every 5 cm, where `height_m` says.
@@ -241,8 +297,7 @@ fn ground(height_m: impl Fn(f64, f64) -> f64) -> Vec<PointRecord> {
 }
 
 fn classified(mut points: Vec<PointRecord>) -> Vec<PointRecord> {
-    let Classes::Geometry(lengths) = geometry() else { unreachable!("it is one") };
-    lengths.classify(&mut points);
+    LENGTHS.classify(&mut points);
     points
 }
 

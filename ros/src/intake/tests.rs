@@ -1,10 +1,13 @@
 use super::*;
-use crate::cloud::GeometryClasses;
+use crate::cloud::{Classes, GeometryClasses};
 use crate::message::{
     Header, PointField, Pose, PoseWithCovariance, Quaternion, Time, Transform, TransformStamped, Twist,
     TwistWithCovariance, Vector3,
 };
 use crate::stamps::StampSource;
+use formats::{RosPointEpoch, RosPointTime};
+use nalgebra::{Translation3, UnitQuaternion};
+use std::f64::consts::PI;
 
 /// Half a second after the message of this stamp [s]: on the bus's clock, stamps lie 100 s back.
 fn arrival(sec: i32) -> Arrival {
@@ -38,13 +41,13 @@ fn intake() -> Intake {
     let frames = Frames { map: "map".into(), vehicle: "base".into() };
     let classes = Classes::Geometry(GeometryClasses { column_m: 0.3, step_m: 0.15, plants_max_m: 1.0 });
     let clock = StampClock::new(StampSource::TimeOfDay);
-    let mut intake = Intake::new(
-        frames,
-        classes,
-        vec!["front".into(), "rear".into()],
-        clock,
-        Transforms::new(5_000_000_000),
+    let rear = Isometry3::from_parts(
+        Translation3::new(-1.0, 0.0, 0.5),
+        UnitQuaternion::from_euler_angles(0.0, 0.0, PI),
     );
+    let sensors = vec![("front".into(), Isometry3::identity()), ("rear".into(), rear)];
+    let clouds = Clouds { meaning: Meaning { classes, times: None }, sensors };
+    let mut intake = Intake::new(frames, clouds, clock, Transforms::new(5_000_000_000));
     intake.moving_frames(&told()).unwrap();
     intake
 }
@@ -89,6 +92,64 @@ fn a_cloud_of_a_sensor_that_the_robot_file_mounts_stays_in_its_frame() {
     assert_eq!(scan.sweep.points[0].position_m, [2.0, 0.0, -1.0]);
     let lost = intake.cloud(&cloud(202, "side", &[[2.0, 0.0, -1.0]]), arrival(202), 10).unwrap_err();
     assert!(lost.to_string().starts_with("frame \"side\": expected transforms"), "{lost}");
+}
+
+/// A post stands 5 m ahead and 1 m to the left of the vehicle at the stamp, which turns to the left in a circle of
+/// 2 m/s / 0.8 rad/s = 2.5 m. Every point of the sweep is measured from where the vehicle is then; all must show one post.
+#[test]
+fn what_the_vehicle_drives_within_a_sweep_is_taken_out() {
+    let turning = Twist { linear: Vector3 { x: 2.0, y: 0.0, z: 0.0 }, ..rate(0.8) };
+    let post = nalgebra::Point3::new(5.0, 1.0, 0.4);
+    let seen_from = |mounting: Isometry3<f64>, after_s: f64| {
+        let (turned_rad, radius_m) = (0.8 * after_s, 2.5);
+        let place = Translation3::new(radius_m * turned_rad.sin(), radius_m * (1.0 - turned_rad.cos()), 0.0);
+        let vehicle = Isometry3::from_parts(place, UnitQuaternion::from_euler_angles(0.0, 0.0, turned_rad));
+        (vehicle * mounting).inverse() * post
+    };
+    for frame in ["mast", "rear"] {
+        let mut intake = intake();
+        let times = RosPointTime { field: "t".into(), unit_s: 1.0, counts_from: RosPointEpoch::Stamp };
+        intake.clouds.meaning.times = Some(times);
+        let mut driven = odometry(201);
+        driven.twist.twist = turning;
+        intake.odometry(&driven, arrival(201)).unwrap();
+        let mounting = match frame {
+            "mast" => intake.transforms.between("mast", "base", 201_000_000_000).unwrap(),
+            _ => intake.clouds.sensors[1].1,
+        };
+        let offsets_s = [0.0_f32, 0.04, 0.1, -0.05];
+        let points = offsets_s.map(|after_s| {
+            let place = seen_from(mounting, f64::from(after_s));
+            ([place.x as f32, place.y as f32, place.z as f32], after_s)
+        });
+        let scan = intake.cloud(&timed_cloud(201, frame, &points), arrival(201), 10).unwrap();
+        let told = if frame == "mast" { Isometry3::identity() } else { mounting };
+        for point in &scan.sweep.points {
+            let place = told * nalgebra::Point3::from(point.position_m.map(f64::from));
+            // The chord in place of the arc: 0.2 m x 0.08^2 / 24 = 0.05 mm, and single precision.
+            assert!((place - post).norm() < 1e-4, "{frame}: {place}");
+        }
+        // Without odometry of that time they lie apart by what was driven: 2 m/s x 0.1 s and more, for the turn.
+        let lost = intake.cloud(&timed_cloud(205, frame, &points), arrival(205), 10).unwrap();
+        let spread_m = lost.sweep.points[2].position_m.map(f64::from);
+        let there = told * nalgebra::Point3::from(spread_m);
+        assert!((there - post).norm() > 0.2, "{frame}: {there}");
+    }
+}
+
+fn rate(yaw_radps: f64) -> Twist {
+    Twist { angular: Vector3 { x: 0.0, y: 0.0, z: yaw_radps }, ..Twist::default() }
+}
+
+/// Points with the times that they were measured at after the stamp [s].
+fn timed_cloud(sec: i32, frame: &str, points: &[([f32; 3], f32)]) -> PointCloud2 {
+    let places: Vec<[f32; 3]> = points.iter().map(|(place_m, _)| *place_m).collect();
+    let mut timed = cloud(sec, frame, &places);
+    timed.fields.push(PointField { name: "t".into(), offset: 12, datatype: 7, count: 1 });
+    (timed.point_step, timed.row_step) = (16, 16 * points.len() as u32);
+    let numbers = points.iter().flat_map(|([x_m, y_m, z_m], after_s)| [*x_m, *y_m, *z_m, *after_s]);
+    timed.data = numbers.flat_map(f32::to_le_bytes).collect();
+    timed
 }
 
 #[test]

@@ -10,8 +10,8 @@ use serde::de::DeserializeOwned;
 
 use super::{BagDrive, BagDriveError, Robot};
 use crate::bag::{LogTopics, arrival, intake, is_of, read, topic_name};
-use crate::cloud::{Classes, GeometryClasses};
-use crate::intake::Intake;
+use crate::cloud::{Classes, GeometryClasses, Meaning};
+use crate::intake::{Clouds, Intake};
 use crate::message::{AckermannDriveStamped, Clock, Imu, Named, Odometry, TfMessage, Twist, TwistStamped};
 use crate::odometry::Frames;
 use crate::stamps::{StampClock, StampSource};
@@ -57,7 +57,7 @@ pub(super) struct Reader<'a> {
 
 impl<'a> Reader<'a> {
     pub(super) fn new(topics: &LogTopics, robot: Option<Robot<'a>>) -> Result<Self, BagDriveError> {
-        let intake = robot.map(|Robot { ros, vehicle }| intake(ros, vehicle, Vec::new())).transpose()?;
+        let intake = robot.map(|Robot { ros, vehicle }| intake(ros, vehicle, &[])).transpose()?;
         Ok(Self {
             topics: topics.clone(),
             robot,
@@ -266,9 +266,10 @@ impl<'a> Reader<'a> {
 /// An intake for odometry that is of the vehicle already, on whatever clock.
 fn intake_of(odometry: &Odometry, early: &[TfMessage]) -> Intake {
     let frames = Frames { map: odometry.header.frame_id.clone(), vehicle: odometry.child_frame_id.clone() };
-    let unused = Classes::Geometry(GeometryClasses { column_m: 1.0, step_m: 1.0, plants_max_m: 1.0 });
+    let classes = Classes::Geometry(GeometryClasses { column_m: 1.0, step_m: 1.0, plants_max_m: 1.0 });
+    let unused = Clouds { meaning: Meaning { classes, times: None }, sensors: Vec::new() };
     let clock = StampClock::new(StampSource::OfItsOwn);
-    let mut intake = Intake::new(frames, unused, Vec::new(), clock, Transforms::new(TRANSFORM_AGE_MAX_NS));
+    let mut intake = Intake::new(frames, unused, clock, Transforms::new(TRANSFORM_AGE_MAX_NS));
     // One that is none is told of when it comes again, or missed.
     early.iter().for_each(|told| drop(intake.fixed_frames(told)));
     intake
