@@ -136,7 +136,7 @@ impl Fusion {
 }
 
 /// Rows of cells that a thread takes at a time: so many that a last block, which may not be full, is cheap.
-const TASK_ROWS: usize = 4;
+const TASK_ROWS: usize = 2;
 
 impl BeliefMap {
     /// A map in the window `risk` for surfaces of the given resolution; [`Risk::OUTSIDE`] until it is updated.

@@ -16,8 +16,10 @@ const SMALL_LENGTH_M: f64 = 1.0;
 const MOST_RISKS: usize = 1 << 26;
 /// Scans within which every row of the map of the ground has its turn to tell what is not urgent.
 const PUBLISH_TURNS: u8 = 8;
-/// How long that takes a sensor of 5 Hz [s]: what is not urgent yet is told before the vehicle comes near.
+/// How long that takes a sensor of 5 Hz [s].
 const PUBLISH_WAIT_S: f64 = 0.2 * PUBLISH_TURNS as f64;
+/// What a vehicle brakes with at the least [m/s2].
+const BRAKING_MPS2: f64 = 2.0;
 
 /// Settings of the pipeline. A file gives only what differs from [`Config::for_vehicle`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -103,7 +105,10 @@ impl Config {
                 recentre_m: 4.0 * risk_m,
                 gap_radius_m: fitting.gap_radius_m.max(gap_cells(length_m) * risk_m),
                 publish_turns: PUBLISH_TURNS,
-                publish_near_m: fitting.publish_near_m + speed_max_mps * PUBLISH_WAIT_S,
+                // What waits is told while the vehicle can still stop a third of its length before it.
+                publish_near_m: fitting.publish_near_m
+                    + speed_max_mps * PUBLISH_WAIT_S
+                    + speed_max_mps * speed_max_mps / (2.0 * BRAKING_MPS2),
                 ..fitting
             },
             risk_map: RiskMapConfig {

@@ -96,7 +96,7 @@ impl Default for ElevationConfig {
             ghost_scans: 2,
             publish_step_m: 0.003,
             publish_turns: 1,
-            publish_near_m: 5.1,
+            publish_near_m: 4.0,
         }
     }
 }
