@@ -418,7 +418,9 @@ fn far_from_the_vehicle_everything_waits_for_its_turn() {
 fn what_lies_within_what_was_told_is_not_told_again() {
     let moved_m = |last_m: f64| {
         let mut map = plain_map(|config| config.publish_step_m = 0.001);
-        (0..40).for_each(|_| drop(map.fuse(&scan(0.1), &HERE).unwrap()));
+        for _ in 0..40 {
+            map.fuse(&scan(0.1), &HERE).unwrap();
+        }
         let before_m = at_spot(&map).height_m;
         map.fuse(&scan(last_m), &HERE).unwrap();
         at_spot(&map).height_m - before_m
