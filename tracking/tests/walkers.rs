@@ -153,10 +153,10 @@ fn who_was_never_seen_to_move_is_told_of_by_the_second_scan_that_shows_him_set_o
 /// Two trunks side by side, of which one is hidden now and then: what is seen of them jumps, and has not set off.
 #[test]
 fn what_jumps_to_and_fro_has_not_set_off() {
-    let trunks = |number: f64| {
+    let trunks = |time_s: f64| {
         let one = Cylinder { centre_m: [4.0, 0.0], radius_m: 0.15 };
         let other = Cylinder { centre_m: [4.0, 0.45], radius_m: 0.15 };
-        if (number / 0.2).round() as u64 % 3 == 0 { vec![one] } else { vec![one, other] }
+        if ((time_s / 0.2).round() as u64).is_multiple_of(3) { vec![one] } else { vec![one, other] }
     };
     let told = told(60, |_| Pose::default(), trunks);
     assert!(told.iter().all(Vec::is_empty), "{told:?}");
