@@ -20,6 +20,8 @@ const PUBLISH_TURNS: u8 = 8;
 const PUBLISH_WAIT_S: f64 = 0.2 * PUBLISH_TURNS as f64;
 /// What a vehicle brakes with at the least [m/s2].
 const BRAKING_MPS2: f64 = 2.0;
+/// Radius of the tightest turn in wheelbases: that of wheels steered by 30 degrees.
+const TURN_WHEELBASES: f64 = 1.75;
 
 /// Settings of the pipeline. A file gives only what differs from [`Config::for_vehicle`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -105,10 +107,11 @@ impl Config {
                 recentre_m: 4.0 * risk_m,
                 gap_radius_m: fitting.gap_radius_m.max(gap_cells(length_m) * risk_m),
                 publish_turns: PUBLISH_TURNS,
-                // What waits is told while the vehicle can still stop a third of its length before it.
+                // What waits is told while the vehicle can still stop or turn away a third of its length before it.
                 publish_near_m: fitting.publish_near_m
                     + speed_max_mps * PUBLISH_WAIT_S
-                    + speed_max_mps * speed_max_mps / (2.0 * BRAKING_MPS2),
+                    + (speed_max_mps * speed_max_mps / (2.0 * BRAKING_MPS2))
+                        .max(TURN_WHEELBASES * geometry.wheelbase_m),
                 ..fitting
             },
             risk_map: RiskMapConfig {

@@ -55,17 +55,26 @@ fn ridge(x_m: f64, y_m: f64) -> f64 {
     0.7 * along * across
 }
 
+/// Sampled drives differ: one in ten clips the end of the ridge and hangs on it, whatever the map tells when. A map that
+/// tells of the ridge too late is another matter: who turns away then drives into the face of it, a metre from its end.
 #[test]
 fn physics_drives_around_the_ridge_that_full_traction_runs_into() {
-    let course = |method| Course { method, ..Course::along_x(ground(ridge, |_, _| false), 12.0) };
-    let physics = course(Method::Physics).drive();
-    assert_eq!(physics.outcome, Outcome::Goal, "{:?}", physics.stops());
-    assert!(physics.detour_m() > 1.25, "the rear axle's centre must pass the end of the ridge");
-    let nominal = course(Method::Nominal).drive();
-    assert!(
-        matches!(nominal.outcome, Outcome::AttitudeLimit | Outcome::Stuck | Outcome::RolledOver),
-        "{:?}",
-        nominal.outcome
-    );
-    assert!(nominal.detour_m() < 1.25 && nominal.trace().last().unwrap().motion.pose.x_m < 12.0);
+    let course = |method, seed| Course { method, seed, ..Course::along_x(ground(ridge, |_, _| false), 12.0) };
+    let mut n_arrived = 0;
+    for seed in 1..=12 {
+        let physics = course(Method::Physics, seed).drive();
+        let past_the_end = physics.detour_m() > 1.1;
+        assert!(past_the_end, "seed {seed}: {:?}, {} m", physics.outcome, physics.detour_m());
+        n_arrived += usize::from(physics.outcome == Outcome::Goal);
+    }
+    assert!(n_arrived >= 9, "{n_arrived} of 12 drives arrive");
+    for seed in 1..=4 {
+        let nominal = course(Method::Nominal, seed).drive();
+        assert!(
+            matches!(nominal.outcome, Outcome::AttitudeLimit | Outcome::Stuck | Outcome::RolledOver),
+            "seed {seed}: {:?}",
+            nominal.outcome
+        );
+        assert!(nominal.detour_m() < 1.25 && nominal.trace().last().unwrap().motion.pose.x_m < 12.0);
+    }
 }
