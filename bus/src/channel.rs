@@ -15,7 +15,7 @@ use crate::message::{
     TrackRecord, TracksHeader,
 };
 use crate::payload;
-pub use bus::{Bus, Cleared, RunName, RunNameError};
+pub use bus::{Bus, Cleared, RunName, RunNameError, free_shared_memory_bytes};
 pub(crate) use inlet::FUTURE_NS;
 pub use inlet::{Counts, Inlet, Message, Refusal};
 pub use outlet::{Loan, Outlet};

@@ -6,6 +6,7 @@ mod collect;
 mod correction;
 mod crossings;
 mod deviation;
+mod doctor;
 mod drive;
 mod friction;
 mod gap;
@@ -38,6 +39,7 @@ pub use collect::{CollectArguments, CollectMap, CollectSplit, CollectWorld};
 pub use correction::{BenchCorrectionArguments, CorrectionMethod};
 pub use crossings::{BenchCrossingsArguments, CrossingHandling};
 pub use deviation::AskedDeviation;
+pub use doctor::DoctorArguments;
 pub use drive::{Correct, DriveArguments, MapSource, Method, Pace};
 pub use friction::{BenchFrictionArguments, TrainFrictionArguments};
 pub use gap::{
@@ -108,6 +110,9 @@ pub enum Command {
     Reset(AskedRun),
     /// Change the risk tolerance of a run
     Alpha(AlphaArguments),
+    /// Check the machine and, if one is there, the sensors and processes of a run
+    #[command(long_about = doctor::LONG_ABOUT)]
+    Doctor(DoctorArguments),
     /// Make every decision of a recording again, to the last bit
     #[command(long_about = replay::LONG_ABOUT)]
     Replay(ReplayArguments),
@@ -156,6 +161,7 @@ Examples:
   surefoot drive --world arena          an RC car in a hall with a ramp and bushes
   surefoot drive --help                 every option, with its unit and default
   surefoot up                           the same drive by processes that survive one another
+  surefoot doctor                       whether machine and sensors are fit for it
   surefoot goal 30,25 40,10             where that run shall go next
   surefoot route --world hills.npz --start 20,20,0.8 --goal 250,240
                                         a way over measured ground, and how fast to drive it

@@ -89,6 +89,7 @@
 pub mod arguments;
 mod bench;
 mod collect;
+mod doctor;
 mod drive;
 mod drive_file;
 mod failure;
@@ -169,6 +170,7 @@ fn dispatch(command: Command) -> anyhow::Result<()> {
         Command::Estop(run) => orders::tell(&run, &Order::EmergencyStop),
         Command::Reset(run) => orders::tell(&run, &Order::Reset),
         Command::Alpha(alpha) => orders::alpha(&alpha),
+        Command::Doctor(doctor) => doctor::run(&doctor),
         Command::Replay(replay) => replay::run(&replay),
         Command::Play(play) => play::run(&play),
         Command::Route(route) => route::run(&route),

@@ -50,7 +50,7 @@ fn points(goals: &[Goal]) -> Vec<[f64; 2]> {
 }
 
 /// The run that was named, if it is there; else the only one.
-fn choose(asked: &AskedRun) -> anyhow::Result<RunName> {
+pub(crate) fn choose(asked: &AskedRun) -> anyhow::Result<RunName> {
     let alive = RunName::alive()?;
     let named = |run: &RunName| asked.run.as_ref().is_none_or(|name| name == run);
     let found: Vec<&RunName> = alive.iter().filter(|run| named(run)).collect();

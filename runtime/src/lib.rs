@@ -10,6 +10,7 @@ pub mod ages;
 pub mod budget;
 pub mod control;
 pub mod convert;
+pub mod doctor;
 mod error;
 mod intake;
 pub mod learning;

@@ -19,7 +19,12 @@ const CORES: &str = "/sys/devices/system/cpu";
 /// the vehicle waits for share the other large ones, and learning and the recorder all the rest; where they are alike,
 /// control has the last and the others share the rest. SCHED_FIFO goes to those that the vehicle waits for. To be called before the process starts any other thread.
 pub fn configure_thread(role: Role) -> String {
-    [pinned(role), scheduled(role), locked()].join("; ")
+    granted(role).map(|part| part.unwrap_or_else(|refusal| refusal)).join("; ")
+}
+
+/// The same part by part: cores, priority, memory, each with what was done, or why not.
+pub fn granted(role: Role) -> [Result<String, String>; 3] {
+    [pinned(role), scheduled(role), locked()]
 }
 
 /// SCHED_FIFO priority; `None` keeps the ordinary policy.
@@ -32,24 +37,16 @@ fn priority(role: Role) -> Option<u8> {
     }
 }
 
-fn pinned(role: Role) -> String {
-    let allowed = match sched_getaffinity(None) {
-        Ok(allowed) => allowed,
-        Err(error) => return format!("not pinned: {error}"),
-    };
+fn pinned(role: Role) -> Result<String, String> {
+    let refused = |error| format!("not pinned: {error}");
+    let allowed = sched_getaffinity(None).map_err(refused)?;
     let cores: Vec<usize> = (0..CpuSet::MAX_CPU).filter(|&core| allowed.is_set(core)).collect();
     let large = largest(&cores, Path::new(CORES));
-    let Some(own) = own_cores(role, &cores, &large) else {
-        return "not pinned: there is one core only".to_owned();
-    };
+    let own = own_cores(role, &cores, &large).ok_or("not pinned: there is one core only")?;
     let mut wanted = CpuSet::new();
     own.iter().for_each(|&core| wanted.set(core));
-    match sched_setaffinity(None, &wanted) {
-        Ok(()) => {
-            format!("pinned to core {}", own.iter().map(usize::to_string).collect::<Vec<_>>().join(", "))
-        }
-        Err(error) => format!("not pinned: {error}"),
-    }
+    sched_setaffinity(None, &wanted).map_err(refused)?;
+    Ok(format!("pinned to core {}", own.iter().map(usize::to_string).collect::<Vec<_>>().join(", ")))
 }
 
 /// Those of the cores whose stated capacity is the largest; all of them where nothing is stated of one.
@@ -77,26 +74,26 @@ fn own_cores(role: Role, cores: &[usize], large: &[usize]) -> Option<Vec<usize>>
     }
 }
 
-fn scheduled(role: Role) -> String {
-    let Some(level) = priority(role) else { return "ordinary priority".to_owned() };
-    let Ok(value) = ThreadPriorityValue::try_from(level) else { return "no SCHED_FIFO".to_owned() };
+fn scheduled(role: Role) -> Result<String, String> {
+    let Some(level) = priority(role) else { return Ok("ordinary priority".to_owned()) };
+    let value = ThreadPriorityValue::try_from(level).map_err(|_| "no SCHED_FIFO")?;
     let fifo = ThreadSchedulePolicy::Realtime(RealtimeThreadSchedulePolicy::Fifo);
     match set_thread_priority_and_policy(thread_native_id(), ThreadPriority::Crossplatform(value), fifo) {
-        Ok(()) => format!("SCHED_FIFO {level}"),
+        Ok(()) => Ok(format!("SCHED_FIFO {level}")),
         Err(Error::OS(code)) => {
             let error = std::io::Error::from_raw_os_error(code);
-            format!("no SCHED_FIFO: {error}; it takes CAP_SYS_NICE or a limit `rtprio` of {level}")
+            Err(format!("no SCHED_FIFO: {error}; it takes CAP_SYS_NICE or a limit `rtprio` of {level}"))
         }
-        Err(error) => format!("no SCHED_FIFO: {error:?}"),
+        Err(error) => Err(format!("no SCHED_FIFO: {error:?}")),
     }
 }
 
-fn locked() -> String {
+fn locked() -> Result<String, String> {
     // Locked once it is used: what channels keep in reserve is not fetched for that.
     match mlockall(MlockAllFlags::CURRENT | MlockAllFlags::FUTURE | MlockAllFlags::ONFAULT) {
-        Ok(()) => "memory locked".to_owned(),
+        Ok(()) => Ok("memory locked".to_owned()),
         Err(error) => {
-            format!("memory not locked: {error}; it takes CAP_IPC_LOCK or a higher limit `memlock`")
+            Err(format!("memory not locked: {error}; it takes CAP_IPC_LOCK or a higher limit `memlock`"))
         }
     }
 }

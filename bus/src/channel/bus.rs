@@ -297,16 +297,21 @@ fn open_error(channel: &'static str, error: impl std::fmt::Display) -> ChannelEr
 /// Writing into memory that is not there would end the process: better refuse before.
 fn check_memory(needed_bytes: f64) -> Result<(), ChannelError> {
     // A system that will not say has no such limit.
-    let Ok(space) = rustix::fs::statvfs(SHARED_MEMORY) else { return Ok(()) };
-    let free_bytes = space.f_bavail as f64 * space.f_frsize as f64 - reserved_bytes();
+    let Some(free_bytes) = free_shared_memory_bytes() else { return Ok(()) };
     if free_bytes >= needed_bytes {
         return Ok(());
     }
     Err(ChannelError::Memory {
         place: SHARED_MEMORY,
         needed_mb: needed_bytes * 1e-6,
-        free_mb: free_bytes.max(0.0) * 1e-6,
+        free_mb: free_bytes * 1e-6,
     })
+}
+
+/// Shared memory that no run has reserved [bytes]; `None` where the system will not say.
+pub fn free_shared_memory_bytes() -> Option<f64> {
+    let space = rustix::fs::statvfs(SHARED_MEMORY).ok()?;
+    Some((space.f_bavail as f64 * space.f_frsize as f64 - reserved_bytes()).max(0.0))
 }
 
 /// What runs have reserved and not written to yet: it still counts as free.

@@ -120,6 +120,11 @@ pub(super) fn tolerance_m(word: &str) -> Result<f64, String> {
     number_where(word, "a distance above 0 and up to 100 metres", |value| value > 0.0 && value <= 100.0)
 }
 
+/// How long something is looked on at [s].
+pub(super) fn watch_s(word: &str) -> Result<f64, String> {
+    number_where(word, "seconds from 0.5 to 3600", |value| (0.5..=3600.0).contains(&value))
+}
+
 /// A speed along a path [m/s].
 pub(super) fn speed_mps(word: &str) -> Result<f64, String> {
     number_where(word, "a speed above 0 and up to 50 m/s", |value| value > 0.0 && value <= 50.0)
