@@ -130,7 +130,7 @@ impl Bridge {
             ears: Ears::new(bus, &mut node, &ros.topics)?,
             voices: Voices::new(bus, &mut node, ros, vehicle, &periods)?,
             node,
-            intake: Intake::new(frames, clouds(ros, vehicle, sensors)?, stamps, transforms),
+            intake: Intake::new(frames, clouds(ros, vehicle, sensors)?, stamps, transforms).kept_to(&periods),
             actuation: Actuation::new(vehicle.limits, ages),
             orders: Orders::new(director),
             complaints: Complaints::default(),

@@ -1,7 +1,13 @@
 //! What comes from the robot, as the bus says it: frames found, stamps told on the bus's clock, everything checked.
 
+mod pace;
+
+use std::collections::BTreeMap;
+
 use nalgebra::{Isometry3, Vector3};
 
+use bus::ages::Periods;
+use bus::clock;
 use bus::message::{ImuRecord, OdometryRecord};
 
 use crate::cloud::{self, LayoutError, Meaning, Sweep, Twist};
@@ -11,6 +17,8 @@ use crate::odometry::{self, Agreement, Disagreement, Frames, OdometryError};
 use crate::rigid::{self, PoseError};
 use crate::stamps::{Arrival, StampClock, StampError};
 use crate::transforms::{TransformError, Transforms};
+use pace::Pace;
+pub use pace::TooOften;
 
 /// Why a message is not taken over. Every message is one line.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -50,6 +58,9 @@ pub enum IntakeError {
         /// Points of the cloud.
         found: usize,
     },
+    /// There is more of it than the robot file states.
+    #[error(transparent)]
+    TooOften(#[from] TooOften),
     /// It is older than one that came before.
     #[error("stamp: expected one after that of the message before, found one {by_s:.3} s before it")]
     OutOfOrder {
@@ -95,13 +106,39 @@ pub struct Intake {
     felt_at_ns: u64,
     /// How the vehicle moves, and the time that was told of [ns].
     twist: Option<(u64, Twist)>,
+    paces: Option<Paces>,
+}
+
+/// What odometry, and the clouds of each frame, are kept to.
+#[derive(Clone, Debug)]
+struct Paces {
+    odometry: Pace,
+    scan: Pace,
+    clouds: BTreeMap<String, Pace>,
 }
 
 impl Intake {
     /// Nothing has come yet.
     pub fn new(frames: Frames, clouds: Clouds, clock: StampClock, transforms: Transforms) -> Self {
         let agreement = Agreement::default();
-        Self { frames, clouds, clock, transforms, agreement, scanned_at_ns: 0, felt_at_ns: 0, twist: None }
+        Self {
+            frames,
+            clouds,
+            clock,
+            transforms,
+            agreement,
+            scanned_at_ns: 0,
+            felt_at_ns: 0,
+            twist: None,
+            paces: None,
+        }
+    }
+
+    /// Where odometry or the clouds of a frame come more than three times as often, they are kept to these periods.
+    pub fn kept_to(self, periods: &Periods) -> Self {
+        let pace = |period_s: f64| Pace::new(clock::nanoseconds(period_s));
+        let [odometry, scan] = [pace(periods.odometry_s), pace(periods.scan_s)];
+        Self { paces: Some(Paces { odometry, scan, clouds: BTreeMap::new() }), ..self }
     }
 
     /// The clock of the robot's stamps.
@@ -120,6 +157,9 @@ impl Intake {
     ) -> Result<(u64, OdometryRecord), IntakeError> {
         let at_ns = self.at_ns(odometry.header.stamp.nanoseconds(), arrival)?;
         let record = odometry::odometry_record(odometry, &self.transforms, &self.frames)?;
+        if let Some(paces) = &mut self.paces {
+            paces.odometry.check(at_ns)?;
+        }
         self.agreement.check(&record, at_ns)?;
         let [forward_mps, left_mps] = record.velocity_mps;
         let velocity_mps = Vector3::new(forward_mps, left_mps, 0.0);
@@ -153,6 +193,10 @@ impl Intake {
                 (0, motion, motion)
             }
         };
+        if let Some(Paces { scan, clouds, .. }) = &mut self.paces {
+            // Frames that nobody knows were refused: there are as many as the robot has.
+            clouds.entry(frame.clone()).or_insert_with(|| scan.clone()).check(at_ns)?;
+        }
         let twist = self.twist.filter(|(told_at_ns, _)| told_at_ns.abs_diff(at_ns) <= MOTION_AGE_MAX_NS);
         let sweep = cloud::sweep(cloud, meaning, n_max, |after_s| match twist {
             // From the sensor to the vehicle then, to the vehicle at the stamp, and to the frame that is told.

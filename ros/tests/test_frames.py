@@ -132,6 +132,26 @@ def test_a_transform_that_nobody_tells_any_more_is_told_of_and_odometry_is_refus
     assert inlet.newest() is None, "what is refused is as if it had not come"
 
 
+def test_odometry_that_comes_far_more_often_than_stated_is_thinned_and_told(bridge):
+    process, peer = bridge
+    odometry, moving = peer.writer("north/odom", Odometry), peer.writer("tf", TFMessage)
+    fixed = peer.writer("tf_static", TFMessage, LATCHED)
+    fixed.write(told("base_link", "rear_axle", (0.0, 0.0, 0.0), 0.0))
+    # The file states nothing, which is 50 Hz; this is some hundreds.
+    often = "odometry: rate: expected at most 150.0 Hz, 3 times what the robot file states, found "
+
+    def is_told() -> bool:
+        moving.write(told("map", "odom", (0.0, 0.0, 0.0), 0.0))
+        for _ in range(50):
+            still = circling()
+            still.twist.linear, still.twist.angular = Vector3(0.0, 0.0, 0.0), Vector3(0.0, 0.0, 0.0)
+            odometry.write(still)
+            time.sleep(0.002)
+        return process.has_said(often)
+
+    until(is_told, 20, often)
+
+
 def test_robots_of_one_network_keep_to_their_own_topics_and_frames(bridge, start, tmp_path):
     _, peer = bridge
     words = FRAMES.read_text().replace("ros-frames", "ros-south").replace("/north", "/south")

@@ -116,7 +116,9 @@ impl<'a> Player<'a> {
             ros,
             machine,
             topics: topics(ros),
-            intake: bag::intake(ros, &machine.vehicle, sensors).map_err(UsageError::from_input)?,
+            intake: bag::intake(ros, &machine.vehicle, sensors)
+                .map_err(UsageError::from_input)?
+                .kept_to(&robot::periods(up)),
             navigator,
             kept,
             goal_m,

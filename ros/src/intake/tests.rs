@@ -94,6 +94,35 @@ fn a_cloud_of_a_sensor_that_the_robot_file_mounts_stays_in_its_frame() {
     assert!(lost.to_string().starts_with("frame \"side\": expected transforms"), "{lost}");
 }
 
+/// Stated once a second, told ten times a second: of the 32nd on, one in ten is taken.
+#[test]
+fn what_comes_much_more_often_than_stated_is_thinned_and_told() {
+    let periods = Periods { odometry_s: 1.0, scan_s: 1.0, ..Periods::default() };
+    let mut intake = intake().kept_to(&periods);
+    intake.fixed_frames(&told()).unwrap();
+    let tenth = |k: i32| Time { sec: 201 + k / 10, nanosec: (k % 10) as u32 * 100_000_000 };
+    let (mut n_odometry, mut n_clouds, mut n_others, mut refusal) = (0, 0, 0, String::new());
+    for k in 0..132 {
+        let (mut odometry, mut seen) = (odometry(201), cloud(201, "mast", &[[2.0, 0.0, -1.0]]));
+        (odometry.header.stamp, seen.header.stamp) = (tenth(k), tenth(k));
+        n_odometry += usize::from(intake.odometry(&odometry, arrival(202 + k / 10)).is_ok());
+        match intake.cloud(&seen, arrival(202 + k / 10), 10) {
+            Ok(_) => n_clouds += 1,
+            Err(why) => refusal = why.to_string(),
+        }
+        // Another sensor that keeps to what is stated is heard as before.
+        if k % 10 == 0 {
+            seen.header.frame_id = "rear".into();
+            n_others += usize::from(intake.cloud(&seen, arrival(202 + k / 10), 10).is_ok());
+        }
+    }
+    assert!((40..=42).contains(&n_odometry), "{n_odometry}");
+    assert!((40..=42).contains(&n_clouds), "{n_clouds}");
+    assert_eq!(n_others, 14);
+    let expected = "rate: expected at most 3.0 Hz, 3 times what the robot file states, found 10.0 Hz";
+    assert!(refusal.starts_with(expected), "{refusal}");
+}
+
 /// A post stands 5 m ahead and 1 m to the left of the vehicle at the stamp, which turns to the left in a circle of
 /// 2 m/s / 0.8 rad/s = 2.5 m. Every point of the sweep is measured from where the vehicle is then; all must show one post.
 #[test]

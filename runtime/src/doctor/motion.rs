@@ -57,9 +57,9 @@ impl Motion {
         let (sin, cos) = libm::sincos(before.attitude_rad[2] + 0.5 * turn_rad);
         let [forward_mps, left_mps] = [0, 1].map(|k| 0.5 * (before.velocity_mps[k] + after.velocity_mps[k]));
         let velocity_mps = [cos * forward_mps - sin * left_mps, sin * forward_mps + cos * left_mps];
-        for axis in 0..2 {
+        for (axis, velocity_mps) in velocity_mps.into_iter().enumerate() {
             self.displacement_m[axis] += after.position_m[axis] - before.position_m[axis];
-            self.integral_m[axis] += velocity_mps[axis] * step_s;
+            self.integral_m[axis] += velocity_mps * step_s;
         }
         self.way_m += libm::hypot(forward_mps, left_mps) * step_s;
         self.turn_rad += turn_rad;

@@ -21,6 +21,8 @@ const SCANS_MAX: usize = 50;
 const N_FITS: usize = 6;
 /// Deviations from a plane beyond which a point stands out, in medians of them.
 const OUTLIER_MEDIANS: f64 = 3.0;
+/// Deviation up to which no point stands out, however smooth the ground [m].
+const SMOOTH_M: f64 = 0.01;
 /// Slope of the ground against the vehicle that may be its springs, and what is more than any are [rad].
 const FINE_RAD: f64 = 0.05;
 const BEARABLE_RAD: f64 = 0.2;
@@ -47,7 +49,7 @@ struct Seen {
 /// The ground that a sensor sees, in the body frame.
 #[derive(Clone, Copy, Debug)]
 struct Ground {
-    /// Height below the rear axle's centre, negative below [m].
+    /// Height under the rear axle's centre, negative below it [m].
     height_m: f64,
     /// How much it rises to the front and to the left [-].
     rise: [f64; 2],
@@ -181,7 +183,8 @@ impl Ground {
         for _ in 0..N_FITS {
             let kept = near.iter().filter(|place_m| ground.above_m(place_m).abs() <= within_m);
             ground = Self::through(kept)?;
-            within_m = OUTLIER_MEDIANS * median(near.iter().map(|place_m| ground.above_m(place_m).abs()))?;
+            let deviation_m = median(near.iter().map(|place_m| ground.above_m(place_m).abs()))?;
+            within_m = (OUTLIER_MEDIANS * deviation_m).max(SMOOTH_M);
         }
         Some(ground)
     }
