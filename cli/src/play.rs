@@ -41,9 +41,9 @@ pub(crate) fn run(arguments: &PlayArguments) -> anyhow::Result<()> {
     let results = &arguments.results;
     results.prepare()?;
     interrupt::catch_interrupts()?;
-    let ground = extent(&driven.log);
-    let kept = Kept::create(&results.file(RECORDING), &machine, route.tolerance_m(), ground)?;
-    let setup = PlayerSetup { up, ros, machine: &machine, route, kept };
+    let recording = results.file(RECORDING);
+    let setup =
+        PlayerSetup { up, ros, machine: &machine, route, recording: &recording, ground: extent(&driven.log) };
     let mut player = Player::new(setup)?;
     let ended_early = play(arguments.pace, &bag, &mut player)?;
     let (mut kept, goal_m) = player.finish();

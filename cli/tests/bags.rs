@@ -188,6 +188,8 @@ fn what_cannot_be_played_is_refused_in_one_line() {
     std::fs::write(here.join("mute.toml"), "format = 1\nvehicle = 'rc_car'\n").unwrap();
     let lost = ROBOT.replace("map_frame = 'odom'", "map_frame = 'map'");
     std::fs::write(here.join("lost.toml"), lost).unwrap();
+    std::fs::write(here.join("hasty.toml"), ROBOT.replace("[ros]", "ages = { command_s = 0.05 }\n[ros]"))
+        .unwrap();
     let told = |bag: &str, robot: &str| surefoot(here, &["play", bag, "--robot", robot, "--out", "out"]);
     for (bag, robot, part) in [
         ("absent.mcap", "robot.toml", "absent.mcap: expected a readable bag, found: "),
@@ -198,8 +200,10 @@ fn what_cannot_be_played_is_refused_in_one_line() {
             "lost.toml",
             "150 messages on /odom left out, the first for frame \"odom\": expected transforms",
         ),
+        ("drive.mcap", "hasty.toml", "ages.command_s (--command-age): expected more than 0.120 s"),
     ] {
         let (code, _, error) = told(bag, robot);
         assert!(code == 2 && error.contains(part) && error.lines().count() == 1, "{bag} {robot}: {error}");
     }
+    assert!(!here.join("out/play.mcap").exists(), "what is refused leaves no recording");
 }

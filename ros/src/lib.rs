@@ -21,6 +21,7 @@ mod node;
 pub mod odometry;
 pub mod orders;
 pub mod parameters;
+mod quality;
 pub mod rigid;
 pub mod stamps;
 pub mod telling;

@@ -16,6 +16,7 @@ use std::time::Duration;
 
 use crate::environment::{Discovery, Range};
 use crate::message::Named;
+use crate::quality::{Mismatch, Quality};
 
 /// Messages of one topic that are taken in at one look: whoever floods a topic keeps no other waiting.
 const BATCH: usize = 64;
@@ -172,6 +173,7 @@ pub(crate) struct Node {
     events: Events,
     n_ears: usize,
     full_name: String,
+    quality: Quality,
 }
 
 impl Node {
@@ -192,16 +194,22 @@ impl Node {
         let participant = builder.build().map_err(|error| refused(error.to_string()))?;
         let context =
             Context::from_domain_participant(participant).map_err(|error| refused(error.to_string()))?;
+        let quality = Quality::new(context.domain_participant().status_listener());
         let options = NodeOptions::new().enable_rosout(false);
         let node = context.new_node(named, options).map_err(|error| refused(error.to_string()))?;
         let poll = Poll::new().map_err(|error| refused(error.to_string()))?;
         let full_name = absolute(namespace, name);
-        Ok(Self { node, poll, events: Events::with_capacity(64), n_ears: 0, full_name })
+        Ok(Self { node, poll, events: Events::with_capacity(64), n_ears: 0, full_name, quality })
     }
 
     /// Namespace and name.
     pub(crate) fn full_name(&self) -> &str {
         &self.full_name
+    }
+
+    /// Ends of its topics that cannot be joined to those of others, found since the last look.
+    pub(crate) fn mismatches(&self) -> Vec<(String, Mismatch)> {
+        self.quality.mismatches()
     }
 
     /// Listens to a topic; to none of an empty name.
@@ -218,6 +226,7 @@ impl Node {
         let subscription = self.node.create_subscription::<M>(&of, Some(profile));
         let mut subscription = subscription.map_err(|error| failed(error.to_string()))?;
         self.wake_for(&mut subscription).map_err(|error| failed(error.to_string()))?;
+        self.quality.watch(subscription.guid(), topic);
         Ok(Some(Ear { topic: topic.to_owned(), subscription }))
     }
 
@@ -241,6 +250,7 @@ impl Node {
         let publisher = self.node.create_publisher(&of, Some(profile));
         let failed = |problem: String| NodeError::Topic { topic: topic.to_owned(), problem };
         let publisher = publisher.map_err(|error| failed(error.to_string()))?;
+        self.quality.watch(publisher.guid(), topic);
         Ok(Some(Voice { topic: topic.to_owned(), publisher }))
     }
 

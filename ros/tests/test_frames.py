@@ -152,6 +152,18 @@ def test_odometry_that_comes_far_more_often_than_stated_is_thinned_and_told(brid
     until(is_told, 20, often)
 
 
+def test_who_cannot_be_heard_or_hear_is_told(bridge):
+    process, _ = bridge
+    peer = Peer()
+    # Frames that stay are said once: who says them without keeping them is not heard.
+    ends = [peer.writer("tf_static", TFMessage), peer.reader("north/command", AckermannDriveStamped, LATCHED)]
+    kept = "expected a publisher that is reliable and transient local, found one that is reliable and volatile"
+    asked = "expected a subscriber that asks for reliable and volatile at the most, found one that asks for reliable and"
+    for line in (f"/tf_static: quality of service: {kept}", f"command: quality of service: {asked}"):
+        until(lambda: process.has_said(line), 20, line)
+    assert len(ends) == 2, "as long as they are there"
+
+
 def test_robots_of_one_network_keep_to_their_own_topics_and_frames(bridge, start, tmp_path):
     _, peer = bridge
     words = FRAMES.read_text().replace("ros-frames", "ros-south").replace("/north", "/south")

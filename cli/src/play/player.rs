@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::fmt::Display;
+use std::path;
 
 use bicycle::{Applied, AppliedBy, Command, Decision, ImuSample};
 use bus::clock;
@@ -16,6 +17,7 @@ use ros::message::{
     AckermannDriveStamped, Bool, Clock, Imu, Named, Odometry, Path, PointCloud2, PoseArray, PoseStamped,
     TfMessage, Twist, TwistStamped,
 };
+use scenarios::Bounds;
 use serde::de::DeserializeOwned;
 use terrain::Scan;
 use traversability::CvarLevel;
@@ -40,7 +42,9 @@ pub(super) struct PlayerSetup<'a> {
     pub machine: &'a Machine,
     /// Where to go until the bag says otherwise.
     pub route: Route,
-    pub kept: Kept,
+    /// The recording that is left, and the part of the map that is drawn.
+    pub recording: &'a path::Path,
+    pub ground: Bounds,
 }
 
 /// The pipeline, fed by a bag.
@@ -106,21 +110,21 @@ fn topics(ros: &RobotRos) -> BTreeMap<String, Topic> {
 
 impl<'a> Player<'a> {
     pub(super) fn new(setup: PlayerSetup<'a>) -> anyhow::Result<Self> {
-        let PlayerSetup { up, ros, machine, route, kept } = setup;
+        let PlayerSetup { up, ros, machine, route, recording, ground } = setup;
         let sensors = up.described.as_ref().map_or(&[][..], |robot| &robot.sensors);
         let tolerance_m = robot::tolerance_m(up, machine).unwrap_or_default();
-        let goal_m = end_of(&route);
+        let (goal_m, kept_to_m) = (end_of(&route), route.tolerance_m());
         let mut navigator = navigator(up, machine, goal_m, tolerance_m)?;
         navigator.order(Order::Drive(route), 0).map_err(UsageError::from_input)?;
+        let intake = bag::intake(ros, &machine.vehicle, sensors).map_err(UsageError::from_input)?;
         Ok(Self {
             ros,
             machine,
             topics: topics(ros),
-            intake: bag::intake(ros, &machine.vehicle, sensors)
-                .map_err(UsageError::from_input)?
-                .kept_to(&robot::periods(up)),
+            intake: intake.kept_to(&robot::periods(up)),
             navigator,
-            kept,
+            // Nothing is written as long as anything can be refused.
+            kept: Kept::create(recording, machine, kept_to_m, ground)?,
             goal_m,
             tolerance_m,
             period_ns: clock::nanoseconds(robot::periods(up).control_s),

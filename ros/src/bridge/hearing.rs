@@ -124,6 +124,9 @@ impl Bridge {
     pub(super) fn hear(&mut self, tell: &mut dyn FnMut(&str)) -> Result<(), BridgeError> {
         let mut complaints = std::mem::take(&mut self.complaints);
         let mut refused = Refused { complaints: &mut complaints, tell };
+        for (topic, mismatch) in self.node.mismatches() {
+            refused.note(&topic, &mismatch);
+        }
         self.hear_emergency(&mut refused);
         self.hear_frames(&mut refused);
         let heard = self.hear_measurements(&mut refused);
