@@ -1,24 +1,26 @@
 //! `surefoot doctor`: is this machine, and are this robot's sensors, fit to drive?
 
-use bus::ages::Periods;
+use std::path::Path;
+
 use bus::channel::{Bus, RunName};
-use formats::{RobotFile, read_robot, read_vehicle};
+use formats::read_vehicle;
 use runtime::doctor::{self, Expected, Finding, Verdict};
 
-use crate::arguments::{AskedRun, DoctorArguments};
+use crate::arguments::{AskedRun, DoctorArguments, UpArguments};
+use crate::up::robot;
 use crate::{UsageError, WorkFailed, interrupt, orders, progress};
 
 pub(crate) fn run(arguments: &DoctorArguments) -> anyhow::Result<()> {
     arguments.copy.prepare()?;
-    let robot = arguments.robot.as_deref().map(read_robot).transpose().map_err(UsageError::from_input)?;
-    let expected = robot.as_ref().map(expected).transpose()?.unwrap_or_default();
-    let run = which(&arguments.run, robot.as_ref())?;
+    let up = arguments.robot.as_deref().map(described).transpose()?;
+    let expected = up.as_ref().map(expected).transpose()?.unwrap_or_default();
+    let run = which(&arguments.run, up.as_ref())?;
     let mut findings = doctor::machine(&arguments.recordings);
     print("this machine", &findings);
     match run {
         Some(run) => {
             let of_run = watch(&run, &expected, arguments.seconds)?;
-            print(&format!("run {run}, for {} s", arguments.seconds), &of_run);
+            print(&format!("run {run}, looked on at for up to {} s", arguments.seconds), &of_run);
             findings.extend(of_run);
         }
         None => println!("There is no run to look on at: start one with `surefoot up`."),
@@ -27,29 +29,26 @@ pub(crate) fn run(arguments: &DoctorArguments) -> anyhow::Result<()> {
     conclude(&findings)
 }
 
+/// What `surefoot up` would make of the robot's file.
+fn described(file: &Path) -> anyhow::Result<UpArguments> {
+    Ok(robot::described(&UpArguments::of_robot(file, &[])?)?)
+}
+
 /// What the robot's file says that it is like.
-fn expected(robot: &RobotFile) -> Result<Expected, UsageError> {
-    let vehicle = read_vehicle(&robot.vehicle).map_err(UsageError::from_input)?;
-    let usual = Periods::default();
-    let period_s = |hz: Option<f64>, usual_s: f64| hz.map_or(usual_s, f64::recip);
-    let rates = &robot.rates;
-    let periods = Periods {
-        control_s: period_s(rates.control_hz, usual.control_s),
-        odometry_s: period_s(rates.odometry_hz, usual.odometry_s),
-        scan_s: period_s(rates.scan_hz, usual.scan_s),
-        mission_s: period_s(rates.mission_hz, usual.mission_s),
-    };
+fn expected(up: &UpArguments) -> Result<Expected, UsageError> {
+    let vehicle = read_vehicle(up.drive.vehicle_name_or_path()).map_err(UsageError::from_input)?;
+    let sensors = up.described.iter().flat_map(|robot| &robot.sensors);
     Ok(Expected {
-        periods: Some(periods),
-        mounts: robot.sensors.iter().map(|sensor| sensor.mount.clone()).collect(),
+        periods: Some(robot::periods(up)),
+        mounts: sensors.map(|sensor| sensor.mount.clone()).collect(),
         wheel_and_length_m: Some([vehicle.geometry.wheel_radius_m, vehicle.geometry.length_m]),
     })
 }
 
 /// The run that is asked for, else the robot's, else the only one; `None` where nobody asked and there is none.
-fn which(asked: &AskedRun, robot: Option<&RobotFile>) -> anyhow::Result<Option<RunName>> {
-    let of_robot = robot.and_then(|robot| robot.run.as_deref()).map(str::parse).transpose();
-    let of_robot = of_robot.map_err(UsageError::from_input)?;
+fn which(asked: &AskedRun, up: Option<&UpArguments>) -> anyhow::Result<Option<RunName>> {
+    let names_run = |up: &&UpArguments| up.described.as_ref().is_some_and(|robot| robot.run.is_some());
+    let of_robot = up.filter(names_run).map(|up| up.run.clone());
     if asked.run.is_some() || !RunName::alive()?.is_empty() {
         let run = asked.run.clone().or(of_robot);
         return orders::choose(&AskedRun { run }).map(Some);

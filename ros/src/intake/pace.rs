@@ -38,13 +38,18 @@ impl Pace {
 
     /// Whether a message of this time is taken [ns].
     pub fn check(&mut self, at_ns: u64) -> Result<(), TooOften> {
+        if self.lately_ns.back().is_some_and(|last_ns| at_ns < *last_ns) {
+            // Of a clock that went back: what came before says nothing of how often it speaks now.
+            self.lately_ns.clear();
+        }
         if self.lately_ns.len() == N_LATELY {
             self.lately_ns.pop_front();
         }
         self.lately_ns.push_back(at_ns);
-        let span_ns = self.lately_ns.front().map_or(0, |first_ns| at_ns.saturating_sub(*first_ns));
+        let span_ns = self.lately_ns.front().map_or(0, |first_ns| at_ns - first_ns);
         let n_periods = self.lately_ns.len() as u64 - 1;
-        let is_often = n_periods + 1 == N_LATELY as u64 && MOST * span_ns < n_periods * self.period_ns;
+        let is_full = self.lately_ns.len() == N_LATELY;
+        let is_often = is_full && MOST * span_ns < n_periods * self.period_ns;
         if is_often && at_ns < self.kept_at_ns + self.period_ns {
             let hz = |n: u64, span_ns: u64| (n * SECOND_NS) as f64 / span_ns.max(1) as f64;
             return Err(TooOften { most_hz: hz(MOST, self.period_ns), found_hz: hz(n_periods, span_ns) });
@@ -98,5 +103,13 @@ mod tests {
         let mut pace = Pace::new(PERIOD_NS);
         let n = (0..1000).filter(|_| pace.check(PERIOD_NS).is_ok()).count();
         assert_eq!(n, N_LATELY - 1);
+    }
+
+    #[test]
+    fn a_clock_that_goes_back_is_heard_at_once() {
+        let mut pace = Pace::new(PERIOD_NS);
+        let before = (100..200).map(|k| k * PERIOD_NS);
+        let after = (50..150).map(|k| k * PERIOD_NS);
+        assert!(before.chain(after).all(|at_ns| pace.check(at_ns).is_ok()));
     }
 }

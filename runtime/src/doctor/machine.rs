@@ -20,8 +20,8 @@ const NAP_NS: u64 = SECOND_NS / 500;
 /// How late a process may wake at the most: a tenth of a control cycle, and one of them [s].
 const FINE_LATENESS_S: f64 = 0.01;
 const BEARABLE_LATENESS_S: f64 = 0.1;
-/// By how much the time of day may leave the monotonic clock within a minute: what keeps it right slews it by that
-/// (500 parts in a million are 30 ms) [s].
+/// By how much the time of day may leave the monotonic clock in a second: what keeps a clock right slews it by at most
+/// 500 parts in a million [-].
 const SLEW_PER_S: f64 = 5e-4;
 /// What two looks at both clocks one after the other may differ by [s].
 const LOOK_S: f64 = 1e-3;

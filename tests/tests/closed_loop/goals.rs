@@ -63,9 +63,12 @@ fn physics_drives_around_the_ridge_that_full_traction_runs_into() {
     let mut n_arrived = 0;
     for seed in 1..=12 {
         let physics = course(Method::Physics, seed).drive();
-        let past_the_end = physics.detour_m() > 1.1;
-        assert!(past_the_end, "seed {seed}: {:?}, {} m", physics.outcome, physics.detour_m());
-        n_arrived += usize::from(physics.outcome == Outcome::Goal);
+        let has_arrived = physics.outcome == Outcome::Goal;
+        // The rear axle's centre must pass the end of the ridge; who hangs on the end is within a step of it.
+        let least_m = if has_arrived { 1.25 } else { 1.1 };
+        let detour_m = physics.detour_m();
+        assert!(detour_m > least_m, "seed {seed}: {:?}, {detour_m} m", physics.outcome);
+        n_arrived += usize::from(has_arrived);
     }
     assert!(n_arrived >= 9, "{n_arrived} of 12 drives arrive");
     for seed in 1..=4 {
