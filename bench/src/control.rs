@@ -73,9 +73,7 @@ pub struct Report {
 /// Median times of the parts of an update [ms].
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Split {
-    /// Shifting the plan and sampling the controls.
-    pub noise: f64,
-    /// Rolling them out and pricing them.
+    /// Shifting the plan, sampling the controls, rolling them out and pricing them.
     pub rollout: f64,
     /// Weighing, averaging and judging.
     pub update: f64,
@@ -121,25 +119,24 @@ pub(crate) fn measure_config(config: Config, work: Work, n_updates: usize) -> Re
 /// Times of all updates [ms].
 struct Laps {
     total: Vec<f64>,
-    /// Noise, rollout, update.
-    parts: [Vec<f64>; 3],
+    /// Rollout, update.
+    parts: [Vec<f64>; 2],
 }
 
 impl Laps {
     fn with_room_for(n_updates: usize) -> Self {
-        Self { total: Vec::with_capacity(n_updates), parts: [(); 3].map(|()| Vec::with_capacity(n_updates)) }
+        Self { total: Vec::with_capacity(n_updates), parts: [(); 2].map(|()| Vec::with_capacity(n_updates)) }
     }
 
     /// One decision: the time of the whole and of its parts.
-    fn of(controller: &mut Controller, input: &Input<'_>) -> (f64, [f64; 3]) {
+    fn of(controller: &mut Controller, input: &Input<'_>) -> (f64, [f64; 2]) {
         let start = now();
-        let (mut parts, mut passed) = ([0.0; 3], 0.0);
+        let (mut parts, mut passed) = ([0.0; 2], 0.0);
         controller.decide_observed(input, |phase| {
             let until = milliseconds_since(start);
             let part = match phase {
-                Phase::Noise => 0,
-                Phase::Rollout => 1,
-                Phase::Update => 2,
+                Phase::Rollout => 0,
+                Phase::Update => 1,
             };
             parts[part] += until - passed;
             passed = until;
@@ -147,14 +144,14 @@ impl Laps {
         (milliseconds_since(start), parts)
     }
 
-    fn push(&mut self, (total, parts): (f64, [f64; 3])) {
+    fn push(&mut self, (total, parts): (f64, [f64; 2])) {
         self.total.push(total);
         self.parts.iter_mut().zip(parts).for_each(|(all, part)| all.push(part));
     }
 
     fn spread(self) -> (Spread, Split) {
-        let [noise, rollout, update] = self.parts.map(|part| Spread::of(part).median);
-        (Spread::of(self.total), Split { noise, rollout, update })
+        let [rollout, update] = self.parts.map(|part| Spread::of(part).median);
+        (Spread::of(self.total), Split { rollout, update })
     }
 }
 
@@ -235,9 +232,9 @@ mod tests {
             assert!(
                 0.0 < report.ms.min && report.ms.min <= report.ms.median && report.ms.median <= report.ms.p99
             );
-            let Split { noise, rollout, update } = report.split_ms;
+            let Split { rollout, update } = report.split_ms;
             // Of a sum, the median is not the sum of the medians, but the parts cannot be longer than the whole.
-            assert!([noise, rollout, update].iter().all(|&part| part > 0.0 && part < report.ms.p99));
+            assert!([rollout, update].iter().all(|&part| part > 0.0 && part < report.ms.p99));
         }
     }
 

@@ -137,7 +137,7 @@ proptest! {
             recentre_m: 0.3,
             fading_m2ps: 1e-4,
             gap_radius_m: 0.2,
-            publish_turns: 2,
+            publish_period_scans: 2,
             publish_near_m: 0.5,
             ..ElevationConfig::scaled_to(CAR.length_m)
         };

@@ -39,9 +39,7 @@ const MOST_JUDGED: usize = 64;
 /// A part of a decision, for whoever measures where time goes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Phase {
-    /// Shifting the plan, predicting the start and sampling the controls.
-    Noise,
-    /// Rolling them out and pricing them.
+    /// Shifting the plan, predicting the start, sampling the controls, rolling them out and pricing them.
     Rollout,
     /// Weighing, averaging and judging the result.
     Update,
@@ -305,7 +303,6 @@ impl<M: Driven, S: StepCost, R: RolloutCost> Controller<M, S, R> {
         let told_mps = self.ledger.last().map_or(0.0, |command| f64::from(command.speed_mps()));
         let mode = self.watch.observe(&input.state, told_mps, input.elapsed_s);
         self.follow_held(input);
-        self.recall_slots(input.state, self.config.delay_s);
         self.start = self.predict_start(input);
         // No model steps from farther: what is measured may exceed what the wheels can do.
         self.start.turn = self.start.turn.clamp(-self.limits.turn_domain, self.limits.turn_domain);
@@ -319,9 +316,7 @@ impl<M: Driven, S: StepCost, R: RolloutCost> Controller<M, S, R> {
         for iteration in 0..self.config.n_iterations {
             let number =
                 input.cycle.wrapping_mul(self.config.n_iterations as u64).wrapping_add(iteration as u64);
-            self.sample(functions::key(self.seed, number), mode);
-            observe(Phase::Noise);
-            self.roll_out(input, task);
+            self.roll_out(input, task, (functions::key(self.seed, number), mode));
             self.add_rollout_cost(input);
             observe(Phase::Rollout);
             summary = self.weigh();

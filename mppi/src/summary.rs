@@ -59,7 +59,7 @@ impl Work for Accumulate<'_> {
             let [one, other] = [&rows[0], &rows[rows.len() - 1]];
             let values = [&one[0], &one[1], &other[0], &other[1]].map(|row| dot(kernel, weights, row));
             let [a, b, c, d] = kernel.sums(values);
-            sums.copy_from_slice(&[[a, b], [c, d]][..sums.len()]);
+            sums.iter_mut().zip([[a, b], [c, d]]).for_each(|(sum, value)| *sum = value);
         }
     }
 }
@@ -97,7 +97,7 @@ fn total<K: Kernel>(kernel: K, chunk: &Chunk) -> Totals {
     let mut terms_s = [0.0; CostTerm::COUNT];
     for (terms_s, sums) in terms_s.chunks_mut(4).zip(sums.chunks(4)) {
         let values = std::array::from_fn(|place| sums.get(place).unwrap_or(&zero).1);
-        terms_s.copy_from_slice(&kernel.sums(values)[..sums.len()]);
+        terms_s.iter_mut().zip(kernel.sums(values)).for_each(|(term_s, sum)| *term_s = sum);
     }
     let [n_finite, n_feasible, ..] = kernel.sums([n_finite.1, n_feasible.1, zero.1, zero.1]);
     Totals { terms_s, n_finite, n_feasible }

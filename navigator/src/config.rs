@@ -14,10 +14,10 @@ const SMALL_LENGTH_M: f64 = 1.0;
 
 /// Poses of a risk map: a gigabyte.
 const MOST_RISKS: usize = 1 << 26;
-/// Scans within which every row of the map of the ground has its turn to tell what is not urgent.
-const PUBLISH_TURNS: u8 = 8;
+/// Scans between two with which the map of the ground tells what is not urgent.
+const PUBLISH_PERIOD_SCANS: u8 = 8;
 /// How long that takes a sensor of 5 Hz [s].
-const PUBLISH_WAIT_S: f64 = 0.2 * PUBLISH_TURNS as f64;
+const PUBLISH_PERIOD_S: f64 = 0.2 * PUBLISH_PERIOD_SCANS as f64;
 /// What a vehicle brakes with at the least [m/s2].
 const BRAKING_MPS2: f64 = 2.0;
 /// Radius of the tightest turn in wheelbases: that of wheels steered by 30 degrees.
@@ -106,10 +106,10 @@ impl Config {
                 n_cols: elevation_n,
                 recentre_m: 4.0 * risk_m,
                 gap_radius_m: fitting.gap_radius_m.max(gap_cells(length_m) * risk_m),
-                publish_turns: PUBLISH_TURNS,
+                publish_period_scans: PUBLISH_PERIOD_SCANS,
                 // What waits is told while the vehicle can still stop or turn away a third of its length before it.
                 publish_near_m: fitting.publish_near_m
-                    + speed_max_mps * PUBLISH_WAIT_S
+                    + speed_max_mps * PUBLISH_PERIOD_S
                     + (speed_max_mps * speed_max_mps / (2.0 * BRAKING_MPS2))
                         .max(TURN_WHEELBASES * geometry.wheelbase_m),
                 ..fitting

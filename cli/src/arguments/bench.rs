@@ -296,7 +296,7 @@ const CONTROL_AFTER_HELP: &str = "\
 Prints JSON, and with --json writes it to a file too:
   threads, updates, config, isa
   ms        min, median, p99 of an update
-  split_ms  medians of its parts: noise, rollout, update
+  split_ms  medians of its parts: rollout (with the noise that it takes), update
 
 Examples:
   surefoot bench control --threads 1

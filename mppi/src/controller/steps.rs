@@ -9,6 +9,7 @@ use crate::driven::Driven;
 use crate::kernel::CHUNK;
 use crate::kernel::workers::Workers;
 use crate::objective::{Input, Objective, ReferencePath, ReferenceStep, Terminal, TerminalField};
+use crate::plan::Plan;
 use crate::recovery::Mode;
 use crate::rollout::together::RollTogether;
 use crate::rollout::{GoalTask, Grid, Job, MAX_SLOTS, Prices, Rest, Scene, Start, Task};
@@ -33,12 +34,13 @@ pub(super) enum TaskOrder<'a> {
 
 impl<M: Driven, S: StepCost, R: RolloutCost> Controller<M, S, R> {
     /// The measured state, carried over the known delay by the commands that are already on their way.
-    pub(super) fn predict_start(&self, input: &Input<'_, MotionState>) -> MotionState {
+    pub(super) fn predict_start(&mut self, input: &Input<'_, MotionState>) -> MotionState {
         let mut state = input.state;
         let n_steps = (self.config.delay_s / self.config.step_s).ceil() as usize;
         if n_steps == 0 {
             return state;
         }
+        self.recall_slots(state, self.config.delay_s);
         let step_s = self.config.delay_s / n_steps as f64;
         let judge = self.judge_over(input.map);
         let mut memory = self.slots.map(f64::from);
@@ -106,34 +108,6 @@ impl<M: Driven, S: StepCost, R: RolloutCost> Controller<M, S, R> {
         [0, 1].map(|c| last[c].clamp(reached[c] - reach[c], reached[c] + reach[c]) as f32)
     }
 
-    pub(super) fn sample(&mut self, key: [u32; 4], mode: Mode) {
-        let MotionLimits { low, high, rates, .. } = self.limits;
-        let step_s = self.config.step_s;
-        let start = self.start_control();
-        self.plan.prepare(start, self.config.control_cost * f64::from(self.weighing_temperature_s()));
-        let change = match self.config.actuation {
-            Actuation::Instant => [f32::INFINITY; 2],
-            Actuation::Limited => rates.map(|rate| (rate * step_s) as f32),
-        };
-        let speed_max_mps = if mode == Mode::Onward { high[0] } else { 0.0 };
-        let sampler = Sampler {
-            steps: &self.plan.steps,
-            kept_noise: [self.plan.correlation(); 2],
-            kept_control: self.plan.kept_control(),
-            low: low.map(|value| value as f32),
-            high: [speed_max_mps as f32, high[1] as f32],
-            change,
-            start,
-            key,
-        };
-        let (instructions, n_used) = (self.instructions, self.n_used);
-        self.workers.run(&mut self.chunks, |index, chunk| {
-            if index < n_used {
-                Sample { sampler: &sampler, index, chunk }.on(instructions);
-            }
-        });
-    }
-
     fn weighing_temperature_s(&self) -> f32 {
         match self.config.temperature {
             Temperature::Fixed { temperature_s } => temperature_s as f32,
@@ -154,7 +128,15 @@ impl<M: Driven, S: StepCost, R: RolloutCost> Controller<M, S, R> {
         }
     }
 
-    pub(super) fn roll_out(&mut self, input: &Input<'_, MotionState>, order: TaskOrder<'_>) {
+    /// Samples controls and rolls them out, chunk by chunk, so that what was sampled is still in the core's cache.
+    pub(super) fn roll_out(
+        &mut self,
+        input: &Input<'_, MotionState>,
+        order: TaskOrder<'_>,
+        (key, mode): ([u32; 4], Mode),
+    ) {
+        let start = self.start_control();
+        self.plan.prepare(start, self.config.control_cost * f64::from(self.weighing_temperature_s()));
         let geometry = &input.map.geometry;
         let frame = Frame { corner_m: geometry.south_west_m(), cell_m: geometry.resolution_m };
         if let TaskOrder::Path(path) = order {
@@ -192,7 +174,12 @@ impl<M: Driven, S: StepCost, R: RolloutCost> Controller<M, S, R> {
             frame,
             keeps_ends: !R::IS_NOTHING,
         };
-        let crew = Crew { workers: &mut self.workers, instructions: self.instructions, n_used: self.n_used };
+        let crew = Crew {
+            workers: &mut self.workers,
+            sampler: Sampler { start, key, ..sampler(&self.plan, &self.config, &self.limits, mode) },
+            instructions: self.instructions,
+            n_used: self.n_used,
+        };
         if R::KEEPS_STEPS {
             let kept = Kept(&self.step_cost);
             crew.roll_out(&scene.with_cost(&kept), &mut self.chunks, |job| job.run());
@@ -284,9 +271,10 @@ impl<M: Driven, S: StepCost, R: RolloutCost> Controller<M, S, R> {
     }
 }
 
-/// Who rolls out.
+/// Who samples, from what, and rolls out.
 struct Crew<'a> {
     workers: &'a mut Workers,
+    sampler: Sampler<'a>,
     instructions: Instructions,
     n_used: usize,
 }
@@ -299,12 +287,19 @@ impl Crew<'_> {
         chunks: &mut [Chunk],
         run: impl Fn(Job<'_, P, C>) + Sync,
     ) {
-        let Self { workers, instructions, n_used } = self;
+        let Self { workers, sampler, instructions, n_used } = self;
+        let sample = |index, chunk: &mut Chunk| Sample { sampler: &sampler, index, chunk }.on(instructions);
         if P::GOES_TOGETHER {
+            workers.run(chunks, |index, chunk| {
+                if index < n_used {
+                    sample(index, chunk);
+                }
+            });
             RollTogether { scene, chunks: &mut chunks[..n_used] }.on(instructions);
         } else {
             workers.run(chunks, |index, chunk| {
                 if index < n_used {
+                    sample(index, chunk);
                     run(Job { instructions, scene, chunk });
                 }
             });
@@ -352,6 +347,24 @@ impl GoalTerms<'_> {
             Terminal::StraightLine => None,
             Terminal::CostToGo(view) => TerminalField::new(view, self.geometry, self.turning_s_per_rad),
         }
+    }
+}
+
+/// How samples are drawn around a plan, from no movement and with no key.
+fn sampler<'a>(plan: &'a Plan, config: &Config, limits: &MotionLimits, mode: Mode) -> Sampler<'a> {
+    let speed_max_mps = if mode == Mode::Onward { limits.high[0] } else { 0.0 };
+    Sampler {
+        steps: &plan.steps,
+        kept_noise: [plan.correlation(); 2],
+        kept_control: plan.kept_control(),
+        low: limits.low.map(|value| value as f32),
+        high: [speed_max_mps as f32, limits.high[1] as f32],
+        change: match config.actuation {
+            Actuation::Instant => [f32::INFINITY; 2],
+            Actuation::Limited => limits.rates.map(|rate| (rate * config.step_s) as f32),
+        },
+        start: [0.0; 2],
+        key: [0; 4],
     }
 }
 

@@ -58,14 +58,12 @@ pub struct ElevationConfig {
     /// [m], nor are changes of a variance by less than a fifth or of a probability by less than a twentieth; 0 = every
     /// change is.
     pub publish_step_m: f32,
-    /// What is published when the turn of its row comes is so at the latest after so many scans, > 0; 1 = everything at
-    /// once. Near the vehicle, within `publish_near_m`, that is what tells little: a height that stays within two of the
-    /// standard deviations that were told with it and within `visibility_margin_m` (a tenth of it where the ground was
-    /// filled in), a variance, and a probability that moves by less than a fifth and leaves the likeliest class as it is.
-    /// Whatever else changes there, and what is known for the first time or no more, is urgent and published at once.
-    /// Farther away everything waits.
-    pub publish_turns: u8,
-    /// How far from the vehicle what is urgent does not wait for its turn [m].
+    /// Everything that changed is published with every so many scans, > 0; 1 = with each. With the others only what is
+    /// urgent, within `publish_near_m` of the vehicle: what is known for the first time or no more, another likeliest
+    /// class, a probability that moves by a fifth or more, and a height that leaves two of the standard deviations that
+    /// were told with it or moves by more than `visibility_margin_m` (a tenth of it where the ground was filled in).
+    pub publish_period_scans: u8,
+    /// How far from the vehicle what is urgent does not wait [m].
     pub publish_near_m: f64,
     /// The box that the vehicle takes up, with a margin: points inside are the vehicle itself. Empty = the sensor sees
     /// nothing of it.
@@ -95,7 +93,7 @@ impl Default for ElevationConfig {
             visibility_margin_m: 0.1,
             ghost_scans: 2,
             publish_step_m: 0.003,
-            publish_turns: 1,
+            publish_period_scans: 1,
             publish_near_m: 4.0,
         }
     }
@@ -137,7 +135,7 @@ impl ElevationConfig {
             ("hidden_ground_std_m", f64::from(self.hidden_ground_std_m)),
             ("visibility_margin_m", f64::from(self.visibility_margin_m)),
             ("ghost_scans", f64::from(self.ghost_scans)),
-            ("publish_turns", f64::from(self.publish_turns)),
+            ("publish_period_scans", f64::from(self.publish_period_scans)),
         ];
         let not_negative = [
             ("noise_per_range", self.noise_per_range),

@@ -18,7 +18,7 @@ use crate::{
 use cell::{CellState, Ground};
 use nalgebra::{Point3, Vector3};
 use sorting::SortedPoints;
-use surfacing::Turns;
+use surfacing::Due;
 
 /// What became of one scan.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -161,7 +161,7 @@ impl ElevationMap {
         self.fade(scan.valid_at_ns);
         self.points.sort(scan, pose, self.states.geometry(), &self.config);
         self.fuse_points();
-        self.publish(Turns::of_scan(self.n_fused, pose, &self.config));
+        self.publish(Due::after_scan(self.n_fused, pose, &self.config));
         self.n_fused += 1;
         let report = FuseReport {
             n_points: scan.points.len(),
@@ -203,7 +203,7 @@ impl ElevationMap {
                 state.variance_m2 = (assumed.height_std_m * assumed.height_std_m) as f32;
             }
         }
-        self.publish(Turns::All);
+        self.publish(Due::All);
         Ok(())
     }
 
@@ -222,7 +222,7 @@ impl ElevationMap {
         self.changed.include_window(&geometry);
         self.states = moved_states(&self.states, geometry, before, after);
         self.surface = GridMap::filled(geometry, SurfaceCell::UNKNOWN);
-        self.publish(Turns::All);
+        self.publish(Due::All);
         Ok(())
     }
 

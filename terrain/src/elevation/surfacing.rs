@@ -32,10 +32,10 @@ const PLANT_SHARE: f32 = 0.1;
 const GAP_MARGIN_SHARE: f32 = 0.25;
 
 impl ElevationMap {
-    /// Brings the published surface up to date and notes what changed: in the rows whose turn it is all that is worth
-    /// telling, near the vehicle also what is urgent. Neighbouring rows have their turn together, so that whoever judges
-    /// footprints finds what changed in one place.
-    pub(super) fn publish(&mut self, turns: Turns) {
+    /// Brings the published surface up to date and notes what changed: all that is worth telling when it is time, else
+    /// what is urgent near the vehicle. Told at once, what is not urgent makes whoever judges footprints judge each of
+    /// them once.
+    pub(super) fn publish(&mut self, due: Due) {
         let geometry = *self.surface.geometry();
         self.surfacing.draw(&self.states, &self.config);
         let [x, y] = geometry.origin;
@@ -43,8 +43,10 @@ impl ElevationMap {
         for (index, (published, next)) in self.surface.values_mut().iter_mut().zip(next).enumerate() {
             let cell = geometry.cell(index);
             let place = [x + cell.col as i64, y + cell.row as i64];
-            let is_due =
-                turns.have(place) || turns.is_near(place) && is_urgent(published, next, &self.config);
+            let is_due = match due {
+                Due::All => true,
+                Due::Urgent(near) => near.holds(place) && is_urgent(published, next, &self.config),
+            };
             if is_due && differs(published, next, &self.config) {
                 *published = *next;
                 self.changed.include(place, place);
@@ -53,59 +55,39 @@ impl ElevationMap {
     }
 }
 
-/// Whose turn it is to be published.
+/// What is to be published.
 #[derive(Clone, Copy, Debug)]
-pub(super) enum Turns {
-    /// Every cell's.
+pub(super) enum Due {
+    /// All that is worth telling.
     All,
-    /// That of some rows of the lattice.
-    Of {
-        /// Which one.
-        turn: i64,
-        /// Of how many.
-        n_turns: i64,
-        /// Neighbouring rows that have it together.
-        n_rows: i64,
-        /// The cell of the vehicle.
-        here: [i64; 2],
-        /// How far from it what is urgent does not wait [cells].
-        near: i64,
-    },
+    /// What is urgent around the vehicle.
+    Urgent(Circle),
 }
 
-impl Turns {
-    /// The turn of a scan taken at `pose`, counted from the first one, which tells everything.
-    pub fn of_scan(n_before: u64, pose: &Pose, config: &ElevationConfig) -> Self {
-        let n_turns = i64::from(config.publish_turns);
-        let cells = |length_m: f64| (length_m / config.resolution_m).floor() as i64;
-        if n_before == 0 {
+/// Cells of the lattice around one of them.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Circle {
+    centre: [i64; 2],
+    /// In cells.
+    radius: i64,
+}
+
+impl Due {
+    /// After a scan taken at `pose`, the first of which is number 0.
+    pub fn after_scan(number: u64, pose: &Pose, config: &ElevationConfig) -> Self {
+        if number.is_multiple_of(u64::from(config.publish_period_scans)) {
             return Self::All;
         }
-        Self::Of {
-            turn: (n_before % u64::from(config.publish_turns)) as i64,
-            n_turns,
-            n_rows: (config.n_rows as i64 + n_turns - 1) / n_turns,
-            here: [pose.x_m, pose.y_m].map(cells),
-            near: cells(config.publish_near_m),
-        }
+        let cells = |length_m: f64| (length_m / config.resolution_m).floor() as i64;
+        let centre = [pose.x_m, pose.y_m].map(cells);
+        Self::Urgent(Circle { centre, radius: cells(config.publish_near_m) })
     }
+}
 
-    /// Whether a cell of the lattice has its turn.
-    fn have(self, [_, row]: [i64; 2]) -> bool {
-        match self {
-            Self::All => true,
-            Self::Of { turn, n_turns, n_rows, .. } => row.div_euclid(n_rows).rem_euclid(n_turns) == turn,
-        }
-    }
-
-    /// Whether a cell of the lattice is so near that what is urgent does not wait for its turn.
-    fn is_near(self, [col, row]: [i64; 2]) -> bool {
-        match self {
-            Self::All => true,
-            Self::Of { here: [x, y], near, .. } => {
-                (col - x).pow(2) + (row - y).pow(2) <= near.saturating_pow(2)
-            }
-        }
+impl Circle {
+    fn holds(self, [col, row]: [i64; 2]) -> bool {
+        let [x, y] = self.centre;
+        (col - x).pow(2) + (row - y).pow(2) <= self.radius.saturating_pow(2)
     }
 }
 
@@ -220,7 +202,7 @@ fn lowest_plant(
     height_m.is_finite().then_some((height_m, config.hidden_ground_std_m * config.hidden_ground_std_m))
 }
 
-/// Whether a cell tells so much that it cannot wait for its turn.
+/// Whether a cell tells so much that it cannot wait.
 fn is_urgent(published: &SurfaceCell, next: &SurfaceCell, config: &ElevationConfig) -> bool {
     let told_m = URGENT_DEVIATIONS * published.height_variance_m2.sqrt();
     // What was filled in may turn out to be a ditch.

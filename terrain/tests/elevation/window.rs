@@ -127,10 +127,10 @@ proptest! {
         hits in prop::collection::vec(((-12.0..12.0_f64), (-12.0..12.0_f64), (-0.5..1.5_f64), 0..4_usize), 0..60),
         steps in prop::collection::vec(((-2.0..2.0_f64), (-2.0..2.0_f64), (0..4_000_000_000_u64)), 1..6),
         publish_step_m in prop::sample::select(vec![0.0_f32, 0.003]),
-        publish_turns in 1..4_u8,
+        publish_period_scans in 1..4_u8,
     ) {
         let config = ElevationConfig {
-            recentre_m: 1.0, fading_m2ps: 1e-5, publish_step_m, publish_turns, ..plain_config()
+            recentre_m: 1.0, fading_m2ps: 1e-5, publish_step_m, publish_period_scans, ..plain_config()
         };
         let mut map = ElevationMap::new(config).unwrap();
         let mut consumer = map.surface().clone();
