@@ -37,7 +37,8 @@ pub struct Disc {
 pub struct DiscPrices {
     /// Of a step that touches a disc [s].
     pub touch_s: f64,
-    /// Of a step close to one, on top; it falls with the square of the distance to nothing at the margin's end [s].
+    /// Of a step close to one at 1 m/s or more, on top [s]. It falls with the square of the distance to nothing at the
+    /// margin's end, and with the square of the speed below 1 m/s, as the way to stop does: who is slow may be near.
     pub near_s: f64,
     /// How far plans are looked at beyond the time that it takes to stop [s].
     pub foresight_s: f64,
@@ -115,6 +116,8 @@ impl StepCost for MovingDiscs {
         let [front, rear, half_width] = [front_m, -rear_m, half_width_m].map(|value_m| lanes.real(value_m));
         let [touch, near] = [self.prices.touch_s, self.prices.near_s].map(|price_s| lanes.real(price_s));
         let (sin, cos) = heading(step);
+        let [speed, _] = step.reached();
+        let near = near * one.min(speed * speed);
         let mut cost = zero;
         for disc in self.at(step.number()) {
             // From the disc to the vehicle; the disc lies the other way.

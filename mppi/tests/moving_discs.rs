@@ -96,43 +96,44 @@ fn no_disc_and_a_disc_far_away_change_no_bit() {
     }
 }
 
-/// A disc as wide as the map: every one of the 50 steps touches it and is as near as can be, on every instruction set. And
-/// nothing is left of that when it has gone.
+/// Futures that all but keep the speed they start with, within a disc as wide as the map and half a margin away from one:
+/// what the 50 steps cost, on every instruction set. And nothing is left of that when it has gone.
 #[test]
-fn steps_within_a_disc_cost_what_they_are_said_to() {
+fn steps_near_a_disc_cost_what_they_are_said_to() {
     let map = level();
+    let around = Disc { centre_m: [0.0; 2], radius_m: 100.0, margin_m: 1.0 };
+    let half_a_margin_away = Disc { centre_m: [0.0, 1000.8], radius_m: 950.0, margin_m: 100.0 };
     for isa in Isa::SETS {
-        let config = Config { isa, ..Config::default() };
+        let mut config = Config { isa, ..Config::default() };
+        (config.sampling.speed_std, config.sampling.steering_std) = (1e-3, 1e-3);
         let discs = MovingDiscs::new(OUTLINE, PRICES, 1, N_STEPS);
         let Ok(mut controller) = Controller::with_costs(config, model(), (discs, ()), 3) else { continue };
-        let added_s = |controller: &Controller<Model, MovingDiscs>| {
-            controller.diagnostics().mean_terms_s[CostTerm::Added as usize]
-        };
-        let mut input = Input {
-            state: State::default(),
-            elapsed_s: 0.0,
-            map: map.view(),
-            objective: goal([15.0, 0.0]),
-            cycle: 0,
-        };
-        controller.step_cost_mut().add(|_| Disc { centre_m: [0.0; 2], radius_m: 100.0, margin_m: 1.0 });
-        let decision = controller.decide(&input);
-        assert_eq!(decision, Decision::Stop(StopReason::MovingObstacle), "{isa:?}");
-        assert!((added_s(&controller) - 125.0).abs() < 1e-2, "{isa:?}: {}", added_s(&controller));
-        controller.step_cost_mut().clear();
-        (input.elapsed_s, input.cycle) = (STEP_S, 1);
-        assert!(matches!(controller.decide(&input), Decision::Drive(_)));
-        assert_eq!(added_s(&controller), 0.0, "{isa:?}");
-        // Half a margin away all along: a quarter of the price, for a vehicle that cannot get anywhere in the time.
-        controller.step_cost_mut().add(|_| Disc {
-            centre_m: [0.0, 1000.8],
-            radius_m: 950.0,
-            margin_m: 100.0,
-        });
-        (input.elapsed_s, input.cycle) = (STEP_S, 2);
-        controller.decide(&input);
-        let expected_s = 0.25 * 0.5 * 50.0;
-        assert!((added_s(&controller) - expected_s).abs() < 0.1 * expected_s, "{}", added_s(&controller));
+        // A price of 0.5 s at 1 m/s and more, a quarter of it at half of that speed.
+        for (speed_mps, near_s) in [(2.0, 0.5), (1.2, 0.5), (0.5, 0.125), (0.0, 0.0)] {
+            let mut added_s = |disc: Option<Disc>| {
+                controller.reset();
+                controller.step_cost_mut().clear();
+                disc.into_iter().for_each(|disc| controller.step_cost_mut().add(|_| disc));
+                let state = State { speed_mps, ..State::default() };
+                let objective = goal([15.0, 0.0]);
+                let input = Input { state, elapsed_s: 0.0, map: map.view(), objective, cycle: 0 };
+                let decision = controller.decide(&input);
+                (controller.diagnostics().mean_terms_s[CostTerm::Added as usize], decision)
+            };
+            let n_steps = N_STEPS as f32;
+            let (within_s, decision) = added_s(Some(around));
+            assert_eq!(decision, Decision::Stop(StopReason::MovingObstacle), "{isa:?}");
+            let expected_s = n_steps * (2.0 + near_s);
+            assert!((within_s - expected_s).abs() < 0.02 * expected_s, "{isa:?}, {speed_mps}: {within_s} s");
+            let (away_s, _) = added_s(Some(half_a_margin_away));
+            let expected_s = 0.25 * n_steps * near_s;
+            assert!(
+                (away_s - expected_s).abs() < 0.1 * expected_s + 0.01,
+                "{isa:?}, {speed_mps}: {away_s} s"
+            );
+            let (nothing_s, decision) = added_s(None);
+            assert!(nothing_s == 0.0 && matches!(decision, Decision::Drive(_)), "{isa:?}: {nothing_s} s");
+        }
     }
 }
 

@@ -31,7 +31,7 @@ pub struct MovingConfig {
     pub margin_m: f64,
     /// Of a step that comes nearer than it may [s], >= 0.
     pub touch_s: f64,
-    /// Of a step that comes close, falling to nothing over the margin [s], >= 0.
+    /// Of a step that comes close at 1 m/s or more, falling to nothing over the margin and towards standstill [s], >= 0.
     pub near_s: f64,
     /// How long beyond the time that it takes to stop a plan must keep away from them [s], >= 0.
     pub foresight_s: f64,
@@ -44,9 +44,9 @@ impl Default for MovingConfig {
             clearance_m: 0.35,
             place_std: 1.0,
             uncertainty_max_m: 0.6,
-            margin_m: 1.0,
+            margin_m: 2.0,
             touch_s: 2.0,
-            near_s: 0.2,
+            near_s: 1.0,
             foresight_s: 0.6,
         }
     }

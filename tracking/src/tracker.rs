@@ -13,6 +13,8 @@ pub const TRACKS_MAX: usize = 16;
 const FOLLOWED_MAX: usize = 64;
 /// Nearer to the vehicle's body than this a thing may be there unseen [m].
 const BESIDE_M: f64 = 0.8;
+/// Whoever vanished beside the vehicle while walking may be on his way to it for so long [s]; then he stands.
+const NEARING_S: f64 = 3.0;
 /// Where a thing stood for so long is where it may later be seen to have left [s].
 const SETTLED_S: f64 = 3.0;
 /// Things up to this radius, as people are, have no side that comes into view unseen so far [m].
@@ -20,6 +22,8 @@ const COMPACT_M: f64 = 0.5;
 /// What has stood for a while sets off where two scans in a row show it farther from there than this, each by so much more
 /// than the one before [m]. What jumps once, because it is seen together with what is beside it, does not.
 const SETTING_OFF_M: f64 = 0.1;
+/// What appears closer than this to something that moves was one with it in the scans before, and moves, too [m].
+const PARTING_M: f64 = 0.5;
 /// A scan that shows a point within this distance of a place has looked at it, however slim what stood there [m].
 const LOOKED_AT_M: f64 = 0.3;
 /// Shares by which a radius follows a larger and a smaller one: a scan may see one side of a thing only, or take it
@@ -55,6 +59,8 @@ struct Followed {
     unseen_s: f64,
     /// Of that, while its place could be looked at.
     absent_s: f64,
+    /// How fast it was when it vanished beside the vehicle [m/s]; else 0.
+    vanished_mps: f64,
     standing_s: f64,
     /// Whether it has stood at its anchor for a while.
     has_settled: bool,
@@ -92,6 +98,7 @@ impl Tracker {
         for followed in &mut self.followed {
             if followed.unseen_s > 0.0 && is_beside(followed) {
                 // Who vanishes there has not walked through the vehicle.
+                followed.vanished_mps = followed.vanished_mps.max(followed.estimate.speed_mps());
                 followed.estimate.velocity_mps = [0.0; 2];
             }
             followed.estimate.predict(elapsed_s, self.config.acceleration_density_m2ps3);
@@ -194,14 +201,16 @@ impl Tracker {
         self.n_seen += 1;
         let speed_mps = 0.5 * self.config.speed_max_mps;
         let noise_m2 = noise_m2(cluster, &self.config);
+        let has_moved = self.followed.iter().any(|other| other.has_moved && other.parts_with(cluster));
         self.followed.push(Followed {
             number: self.n_seen,
             estimate: Estimate::new(cluster.centre_m, noise_m2, speed_mps * speed_mps),
             radius_m: cluster.radius_m,
             anchor_m: cluster.centre_m,
-            has_moved: false,
+            has_moved,
             n_scans: 1,
             unseen_s: 0.0,
+            vanished_mps: 0.0,
             absent_s: 0.0,
             standing_s: 0.0,
             has_settled: false,
@@ -234,6 +243,12 @@ impl Followed {
         self.estimate.squared_distance(cluster.centre_m, noise_m2)
     }
 
+    /// Whether a cluster that is nobody's may be somebody who went together with this thing.
+    fn parts_with(&self, cluster: &Cluster) -> bool {
+        let [east_m, north_m] = [0, 1].map(|axis| cluster.centre_m[axis] - self.estimate.position_m[axis]);
+        libm::hypot(east_m, north_m) <= self.radius_m + cluster.radius_m + PARTING_M
+    }
+
     fn see(&mut self, cluster: &Cluster, elapsed_s: f64, config: &TrackingConfig) {
         let noise_m2 = noise_m2(cluster, config);
         if self.sets_off(cluster, config) {
@@ -247,7 +262,7 @@ impl Followed {
         let growth_m = cluster.radius_m - self.radius_m;
         self.radius_m += growth_m * if growth_m > 0.0 { GROW_GAIN } else { SHRINK_GAIN };
         self.n_scans += 1;
-        (self.unseen_s, self.absent_s) = (0.0, 0.0);
+        (self.unseen_s, self.absent_s, self.vanished_mps) = (0.0, 0.0, 0.0);
         self.judge_motion(elapsed_s, config);
     }
 
@@ -275,9 +290,12 @@ impl Followed {
         }
     }
 
+    /// What is told of it. Who vanished beside the vehicle may be anywhere that he could have reached since.
     fn track(&self) -> Track {
         let Estimate { position_m, velocity_mps, variance } = self.estimate;
-        Track { number: self.number, position_m, velocity_mps, variance, radius_m: self.radius_m }
+        let nearing_s = if self.unseen_s <= NEARING_S { self.unseen_s } else { 0.0 };
+        let radius_m = self.radius_m + (self.vanished_mps * nearing_s).min(BESIDE_M);
+        Track { number: self.number, position_m, velocity_mps, variance, radius_m }
     }
 }
 

@@ -174,6 +174,27 @@ fn two_who_meet_keep_their_numbers_and_their_ways() {
     }
 }
 
+/// They pass each other so closely that a scan sees one thing. Who comes out of it anew is told of at once, not only when
+/// three scans have shown him.
+#[test]
+fn two_who_were_one_are_told_of_from_when_they_part() {
+    let at = |time_s: f64| vec![person([6.0, -4.0 + 1.5 * time_s]), person([6.5, 4.0 - 1.5 * time_s])];
+    let told = told(24, |_| Pose::default(), at);
+    // They meet after 2.67 s, and are 1.3 m apart 0.4 s before and after that.
+    for (number, told) in
+        told.iter().enumerate().filter(|(number, _)| *number > 5 && !(12..16).contains(number))
+    {
+        for walker in at(0.2 * number as f64) {
+            let away_m = told.iter().map(|track| {
+                let [east_m, north_m] = [0, 1].map(|axis| track.position_m[axis] - walker.centre_m[axis]);
+                east_m.hypot(north_m) - track.radius_m
+            });
+            let nearest_m = away_m.fold(f64::INFINITY, f64::min);
+            assert!(nearest_m < 0.2, "scan {number}: {nearest_m} m from him to what is told");
+        }
+    }
+}
+
 #[test]
 fn who_is_hidden_is_expected_where_he_goes_and_given_up_in_the_end() {
     let at = |time_s: f64| {
@@ -208,7 +229,7 @@ fn who_vanishes_beside_the_vehicle_is_expected_to_stand_there() {
 }
 
 /// Beside the vehicle, where its own body hides him: no ray comes back from there for seconds. Then some do, from the ground
-/// where he stood.
+/// where he stood. For three seconds he may still be on his way to the vehicle.
 #[test]
 fn who_is_hidden_beside_the_vehicle_stands_there_until_his_place_is_seen_empty() {
     let body = BodyBox { min_m: [-1.0, -0.9, -1.0], max_m: [2.5, 0.9, 2.0] };
@@ -223,10 +244,14 @@ fn who_is_hidden_beside_the_vehicle_stands_there_until_his_place_is_seen_empty()
             scan.points.push(RangePoint { position_m: [0.5, 1.3, 0.0], class: TerrainClass::Open });
         }
         tracker.observe(&scan, &Pose::default(), &ground);
-        told.push(tracker.moving().len());
+        told.push(tracker.moving().first().map(|track| track.radius_m));
     }
-    assert_eq!(told[10..46], [1; 36], "7 s after he was seen last");
-    assert_eq!(told[46 + 8..], [0; 6], "1.5 s after his place was seen");
+    assert!(told[10..46].iter().all(Option::is_some), "7 s after he was seen last");
+    assert_eq!(told[46 + 8..], [None; 6], "1.5 s after his place was seen");
+    let radius_m = |number: usize| told[number].unwrap();
+    assert!(radius_m(9) < 0.35 && radius_m(30) < 0.35, "{told:?}");
+    // 0.8 s and 2.6 s at 1.5 m/s, and no farther than the vehicle can be.
+    assert!(radius_m(13) > 0.35 + 0.7 && radius_m(22) > 0.35 + 0.7 && radius_m(22) < 0.35 + 0.9, "{told:?}");
 }
 
 #[test]
