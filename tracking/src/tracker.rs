@@ -220,8 +220,8 @@ impl Tracker {
 
     fn tell(&mut self, from_m: [f64; 2]) {
         self.moving.clear();
-        let standing_max_s = self.config.standing_max_s;
-        let is_told = |followed: &&Followed| followed.has_moved && followed.standing_s <= standing_max_s;
+        let config = &self.config;
+        let is_told = |followed: &&Followed| followed.may_move(config);
         let mut moving: Vec<Track> = self.followed.iter().filter(is_told).map(Followed::track).collect();
         let distance_m =
             |track: &Track| libm::hypot(track.position_m[0] - from_m[0], track.position_m[1] - from_m[1]);
@@ -275,6 +275,12 @@ impl Followed {
         is_news && self.radius_m <= COMPACT_M && goes_on && now_m > config.moved_min_m + SETTING_OFF_M
     }
 
+    /// Whether it moves, has moved and may do so again, or stands and is no larger than people are.
+    fn may_move(&self, config: &TrackingConfig) -> bool {
+        let is_like_people = self.radius_m <= COMPACT_M && self.n_scans >= config.scans_min;
+        self.has_moved && self.standing_s <= config.standing_max_s || is_like_people && self.unseen_s == 0.0
+    }
+
     /// Whether it moves. What does has left the place where it was first seen, which neither a side that comes into view
     /// nor noise makes of what stands.
     fn judge_motion(&mut self, elapsed_s: f64, config: &TrackingConfig) {
@@ -295,6 +301,8 @@ impl Followed {
         let Estimate { position_m, velocity_mps, variance } = self.estimate;
         let nearing_s = if self.unseen_s <= NEARING_S { self.unseen_s } else { 0.0 };
         let radius_m = self.radius_m + (self.vanished_mps * nearing_s).min(BESIDE_M);
+        // Of what has never been seen to move the filter knows noise.
+        let velocity_mps = if self.has_moved { velocity_mps } else { [0.0; 2] };
         Track { number: self.number, position_m, velocity_mps, variance, radius_m }
     }
 }

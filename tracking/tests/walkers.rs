@@ -105,8 +105,15 @@ fn what_stands_does_not_move_because_the_vehicle_does() {
         // Comes into view from behind the one before.
         Cylinder { centre_m: [5.5, 5.2], radius_m: 0.5 },
     ];
-    let told = told(60, driving, |_| trunks.to_vec());
-    assert!(told.iter().all(Vec::is_empty), "{told:?}");
+    assert_stands(&told(60, driving, |_| trunks.to_vec()));
+}
+
+/// Nothing is told of that moves, and of what stands only what is no larger than people.
+fn assert_stands(told: &[Vec<Track>]) {
+    for track in told.iter().flatten() {
+        assert!(track.velocity_mps == [0.0; 2] && track.radius_m <= 0.5, "{track:?}");
+    }
+    assert!(told[5..].iter().all(|tracks| !tracks.is_empty()), "who stands may set off: {told:?}");
 }
 
 #[test]
@@ -122,13 +129,14 @@ fn who_stops_is_told_of_while_he_stands_and_at_once_when_he_sets_off_again() {
 }
 
 #[test]
-fn who_stands_for_as_long_as_is_set_is_told_of_when_he_sets_off() {
+fn what_is_larger_than_people_and_stands_for_as_long_as_is_set_is_told_of_when_it_sets_off() {
     let config = TrackingConfig { standing_max_s: 2.0, ..TrackingConfig::default() };
     let (mut tracker, ground) = (Tracker::new(config, BodyBox::EMPTY).unwrap(), ground());
     let way_m = |time_s: f64| 1.2 * (time_s.min(3.0) + (time_s - 9.0).max(0.0));
     let told: Vec<usize> = (0..50)
         .map(|number| {
-            let things = [person([4.0, -3.0 + way_m(0.2 * number as f64)])];
+            let centre_m = [4.0, -3.0 + way_m(0.2 * number as f64)];
+            let things = [Cylinder { centre_m, radius_m: 0.8 }];
             tracker.observe(&sweep(&Pose::default(), number, &things), &Pose::default(), &ground);
             tracker.moving().len()
         })
@@ -142,7 +150,7 @@ fn who_was_never_seen_to_move_is_told_of_by_the_second_scan_that_shows_him_set_o
     for speed_mps in [1.0, 2.0] {
         let way_m = |time_s: f64| speed_mps * (time_s - 5.0).max(0.0);
         let told = told(40, |_| Pose::default(), |time_s| vec![person([4.0, -3.0 + way_m(time_s)])]);
-        assert!(told[..26].iter().all(Vec::is_empty), "{told:?}");
+        assert_stands(&told[..26]);
         let [track] = told[27][..] else { panic!("{speed_mps} m/s: {told:?}") };
         let [east_mps, north_mps] = track.velocity_mps;
         assert!(east_mps.abs() < 0.3 && (north_mps - speed_mps).abs() < 0.3, "{track:?}");
@@ -158,8 +166,7 @@ fn what_jumps_to_and_fro_has_not_set_off() {
         let other = Cylinder { centre_m: [4.0, 0.45], radius_m: 0.15 };
         if ((time_s / 0.2).round() as u64).is_multiple_of(3) { vec![one] } else { vec![one, other] }
     };
-    let told = told(60, |_| Pose::default(), trunks);
-    assert!(told.iter().all(Vec::is_empty), "{told:?}");
+    assert_stands(&told(60, |_| Pose::default(), trunks));
 }
 
 #[test]
