@@ -55,7 +55,7 @@ const RANGE_MIN_M: f32 = 1e-3;
 const RANGE_MAX_M: f32 = 1e4;
 
 /// The points of a cloud, at most `n_max` of them, each moved by what `motion` says for the time that it was measured after
-/// the stamp [s].
+/// the stamp [s]. `to_upright` takes points as they are told then to a frame whose third axis points up.
 ///
 /// # Errors
 /// Its fields are not there, lie beyond their points, tell times of another sweep, or it is shorter than it says.
@@ -63,6 +63,7 @@ pub fn sweep(
     cloud: &PointCloud2,
     meaning: &Meaning,
     n_max: usize,
+    to_upright: &Isometry3<f64>,
     motion: impl Fn(f64) -> Isometry3<f64>,
 ) -> Result<Sweep, LayoutError> {
     let Meaning { classes, times } = meaning;
@@ -101,7 +102,7 @@ pub fn sweep(
     }
     sweep.n_left_out = layout.n_points() - layout.n_points().div_ceil(stride);
     if let Classes::Geometry(geometry) = classes {
-        geometry.classify(&mut sweep.points);
+        geometry.classify(&mut sweep.points, to_upright);
     }
     Ok(sweep)
 }

@@ -102,7 +102,9 @@ pub struct Intake {
     clock: StampClock,
     transforms: Transforms,
     agreement: Agreement,
+    /// The newest cloud, and that of each frame [ns].
     scanned_at_ns: u64,
+    seen_at_ns: BTreeMap<String, u64>,
     felt_at_ns: u64,
     /// How the vehicle moves, and the time that was told of [ns].
     twist: Option<(u64, Twist)>,
@@ -128,6 +130,7 @@ impl Intake {
             transforms,
             agreement,
             scanned_at_ns: 0,
+            seen_at_ns: BTreeMap::new(),
             felt_at_ns: 0,
             twist: None,
             paces: None,
@@ -171,6 +174,9 @@ impl Intake {
     /// that of the vehicle; of at most `n_max` points. Where points have times, each is told as if it had been measured at
     /// the stamp: what the vehicle moves meanwhile, as its last odometry says, is taken out.
     ///
+    /// One of several sensors may come later than another's newer cloud: it is told in the same way, as if it had been
+    /// measured when that was, since the bus takes scans in their order.
+    ///
     /// # Errors
     /// See [`IntakeError`].
     pub fn cloud(
@@ -181,10 +187,9 @@ impl Intake {
     ) -> Result<TakenScan, IntakeError> {
         let stamp_ns = cloud.header.stamp.nanoseconds();
         let at_ns = self.at_ns(stamp_ns, arrival)?;
-        if at_ns < self.scanned_at_ns {
-            return Err(IntakeError::OutOfOrder { by_s: (self.scanned_at_ns - at_ns) as f64 * 1e-9 });
-        }
         let frame = &cloud.header.frame_id;
+        let twist = self.twist.filter(|(told_at_ns, _)| told_at_ns.abs_diff(at_ns) <= MOTION_AGE_MAX_NS);
+        let late_s = self.late_s(frame, at_ns, twist.is_some())?;
         let Clouds { meaning, sensors } = &self.clouds;
         let (sensor, mounting, motion) = match sensors.iter().position(|(sensor, _)| sensor == frame) {
             Some(place) => (place as u32 + 1, sensors[place].1, Isometry3::identity()),
@@ -197,20 +202,40 @@ impl Intake {
             // Frames that nobody knows were refused: there are as many as the robot has.
             clouds.entry(frame.clone()).or_insert_with(|| scan.clone()).check(at_ns)?;
         }
-        let twist = self.twist.filter(|(told_at_ns, _)| told_at_ns.abs_diff(at_ns) <= MOTION_AGE_MAX_NS);
-        let sweep = cloud::sweep(cloud, meaning, n_max, |after_s| match twist {
-            // From the sensor to the vehicle then, to the vehicle at the stamp, and to the frame that is told.
-            Some((_, twist)) if after_s != 0.0 => {
-                motion * mounting.inverse() * twist.over(after_s) * mounting
+        let told = |after_s: f64| match twist {
+            // From the sensor to the vehicle then, to the vehicle at the time that is told, and to the frame that is told.
+            Some((_, twist)) if after_s != late_s => {
+                motion * mounting.inverse() * twist.over(after_s - late_s) * mounting
             }
             _ => motion,
-        })?;
+        };
+        // Points are told in the sensor's frame or in the vehicle's, which stands upright.
+        let to_upright = mounting * motion.inverse();
+        let sweep = cloud::sweep(cloud, meaning, n_max, &to_upright, told)?;
         if sweep.points.is_empty() {
             return Err(IntakeError::NoReturn { found: sweep.n_without_place });
         }
-        self.scanned_at_ns = at_ns;
-        let origin_m = motion.translation.vector.map(|axis_m| axis_m as f32).into();
-        Ok(TakenScan { at_ns, origin_m, sensor, sweep })
+        self.seen_at_ns.insert(frame.clone(), at_ns);
+        self.scanned_at_ns = self.scanned_at_ns.max(at_ns);
+        let origin_m = told(0.0).translation.vector.map(|axis_m| axis_m as f32).into();
+        Ok(TakenScan { at_ns: self.scanned_at_ns, origin_m, sensor, sweep })
+    }
+
+    /// How much older a cloud is than the newest of another sensor [s]. What lies so far back that nobody knows how the
+    /// vehicle moved since, or before one of the same frame, is out of order.
+    fn late_s(&self, frame: &str, at_ns: u64, is_motion_known: bool) -> Result<f64, IntakeError> {
+        let out_of_order = |newest_ns: u64| {
+            Err(IntakeError::OutOfOrder { by_s: newest_ns.saturating_sub(at_ns) as f64 * 1e-9 })
+        };
+        match self.seen_at_ns.get(frame) {
+            Some(&seen_at_ns) if at_ns < seen_at_ns => return out_of_order(seen_at_ns),
+            _ => {}
+        }
+        match self.scanned_at_ns.saturating_sub(at_ns) {
+            0 => Ok(0.0),
+            late_ns if is_motion_known && late_ns <= MOTION_AGE_MAX_NS => Ok(late_ns as f64 * 1e-9),
+            _ => out_of_order(self.scanned_at_ns),
+        }
     }
 
     /// What the inertial unit feels, in the vehicle's frame. What a lever arm adds is left in: units sit near the middle.

@@ -6,8 +6,10 @@
 mod inertial;
 mod machine;
 mod motion;
+mod observed;
 mod regularity;
 mod scans;
+mod yaw;
 
 use bus::ages::Periods;
 use bus::channel::{Bus, Channel, ChannelError, Element, Header, IMU, Inlet, ODOMETRY, SCAN};
@@ -17,11 +19,9 @@ use bus::status::Role;
 use serde::Serialize;
 use terrain::Mount;
 
-use inertial::Inertial;
 pub use machine::machine;
-use motion::Motion;
-use regularity::{Regularity, refused};
-use scans::Scans;
+pub use observed::{Observed, Source};
+use regularity::refused;
 
 /// Time between two looks at the channels [ns].
 const POLL_NS: u64 = SECOND_NS / 200;
@@ -52,7 +52,8 @@ pub struct Finding {
 }
 
 impl Finding {
-    fn new(what: impl Into<String>, verdict: Verdict, found: String) -> Self {
+    /// What came of a check.
+    pub fn new(what: impl Into<String>, verdict: Verdict, found: String) -> Self {
         Self { what: what.into(), verdict, found }
     }
 }
@@ -96,10 +97,7 @@ struct Watch {
     scan: Option<Inlet<ScanHeader, PointRecord>>,
     imu: Option<Inlet<Stamp, ImuRecord>>,
     statuses: Vec<(Role, Inlet<Stamp, StatusRecord>, Vec<StatusRecord>)>,
-    times: Regularity,
-    motion: Motion,
-    scans: Scans,
-    inertial: Inertial,
+    observed: Observed,
 }
 
 impl Watch {
@@ -113,26 +111,20 @@ impl Watch {
             scan: open(bus, &SCAN)?,
             imu: open(bus, &IMU)?,
             statuses,
-            times: Regularity::default(),
-            motion: Motion::default(),
-            scans: Scans::default(),
-            inertial: Inertial::default(),
+            observed: Observed::default(),
         })
     }
 
     fn look(&mut self) {
-        let Self { times, motion, scans, inertial, .. } = self;
+        let observed = &mut self.observed;
         if let Some(inlet) = &mut self.odometry {
-            inlet.poll(|stamp, records| {
-                times.note(stamp);
-                records.iter().for_each(|record| motion.note(stamp.valid_at_ns, record));
-            });
+            inlet.poll(|stamp, records| observed.odometry(stamp, records));
         }
         if let Some(inlet) = &mut self.scan {
-            inlet.poll(|header, points| scans.note(header, points));
+            inlet.poll(|header, points| observed.scan(header, points));
         }
         if let Some(inlet) = &mut self.imu {
-            inlet.poll(|stamp, samples| inertial.note(stamp, samples));
+            inlet.poll(|stamp, samples| observed.imu(stamp, samples));
         }
         for (_, inlet, seen) in &mut self.statuses {
             inlet.poll(|_, records| seen.extend_from_slice(records));
@@ -140,20 +132,11 @@ impl Watch {
     }
 
     fn findings(&self, expected: &Expected, watched_s: f64) -> Vec<Finding> {
-        let Expected { periods, mounts, wheel_and_length_m } = expected;
-        let hz = |period_s: fn(&Periods) -> f64| periods.as_ref().map(|periods| period_s(periods).recip());
-        let mut findings = vec![self.times.finding("odometry", hz(|periods| periods.odometry_s), watched_s)];
-        findings.extend(self.odometry.as_ref().and_then(|inlet| refused("odometry", inlet.counts())));
-        findings.extend(self.motion.findings());
-        findings.extend(self.scans.findings(
-            hz(|periods| periods.scan_s),
-            mounts,
-            *wheel_and_length_m,
-            watched_s,
-        ));
-        findings.extend(self.scan.as_ref().and_then(|inlet| refused("scans", inlet.counts())));
-        findings.extend(self.inertial.findings(&self.motion, watched_s));
-        findings.extend(self.imu.as_ref().and_then(|inlet| refused("imu", inlet.counts())));
+        let mut findings = self.observed.findings(expected, watched_s, |source| match source {
+            Source::Odometry => self.odometry.as_ref().and_then(|inlet| refused("odometry", inlet.counts())),
+            Source::Scans => self.scan.as_ref().and_then(|inlet| refused("scans", inlet.counts())),
+            Source::Imu => self.imu.as_ref().and_then(|inlet| refused("imu", inlet.counts())),
+        });
         findings.extend(self.statuses.iter().filter_map(|(role, _, seen)| process(*role, seen)));
         findings
     }

@@ -35,7 +35,8 @@ pub(super) const LONG_ABOUT: &str = "\
 Checks the machine that this runs on (cores, priority, locked memory, how late it wakes, shared memory, disk) and, where a \
 run is there, looks on at it for some seconds: rates, gaps and delays of odometry, scans and inertial samples beside the \
 robot file's; velocities against positions and rates against headings; the ground that each range sensor sees against the \
-ground under the wheels; gravity where the odometry has it; and how every process keeps its times. Nothing is sent.";
+ground under the wheels, and whether what stands out of the ground stays where it is while the vehicle drives; gravity \
+where the odometry has it; and how every process keeps its times. Nothing is sent.";
 
 const AFTER_HELP: &str = "\
 Each check is one line:
@@ -45,7 +46,8 @@ Each check is one line:
   unknown   it could not be told; the line says what would tell it
 
 A mount is judged by the ground within two lengths of the vehicle, so stand on even ground for it; a velocity by half a
-metre that is driven, and a yaw rate by a turn of 0.2 rad. A run needs a place for one reader more (--third-parties).
+metre that is driven, a yaw rate by a turn of 0.2 rad, and a sensor's yaw by some metres past trees, posts or rocks.
+A run needs a place for one reader more (--third-parties).
 
 Examples:
   surefoot doctor                                    the machine, and the run if there is one

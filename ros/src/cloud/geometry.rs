@@ -7,7 +7,7 @@
 
 use std::collections::{BTreeSet, HashMap};
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
 
 use bus::message::PointRecord;
 use terrain::TerrainClass;
@@ -74,9 +74,9 @@ struct Columns {
 }
 
 impl Columns {
-    fn new(points: &[PointRecord], column_m: f64) -> Self {
+    fn new(places_m: &[[f32; 3]], column_m: f64) -> Self {
         let mut columns = Self { number_of: HashMap::new(), lowest_m: Vec::new(), of_points: Vec::new() };
-        for PointRecord { position_m: [x_m, y_m, height_m], .. } in points {
+        for [x_m, y_m, height_m] in places_m {
             let column = [x_m, y_m].map(|axis_m| (f64::from(*axis_m) / column_m).floor() as i32);
             let next = columns.lowest_m.len();
             let number = *columns.number_of.entry(column).or_insert(next);
@@ -110,22 +110,29 @@ const NEIGHBOURS: [[i32; 2]; 9] =
     [[0, 0], [1, 0], [-1, 0], [0, 1], [0, -1], [1, 1], [1, -1], [-1, 1], [-1, -1]];
 
 impl GeometryClasses {
-    /// Writes the class of every point. Heights are along the third axis, which has to point up.
-    pub fn classify(&self, points: &mut [PointRecord]) {
-        let columns = Columns::new(points, self.column_m);
+    /// Writes the class of every point. `to_upright` takes them to a frame whose third axis points up: a sensor may hang
+    /// upside down, and a camera's axes lie otherwise.
+    pub fn classify(&self, points: &mut [PointRecord], to_upright: &Isometry3<f64>) {
+        let places_m: Vec<[f32; 3]> = points.iter().map(|point| upright(point, to_upright)).collect();
+        let columns = Columns::new(&places_m, self.column_m);
         let ground_m = columns.ground_m(self.column_m);
-        let above_m = |point: &PointRecord, column: usize| f64::from(point.position_m[2] - ground_m[column]);
+        let above_m = |place_m: &[f32; 3], column: usize| f64::from(place_m[2] - ground_m[column]);
         let mut raised = vec![Raised::default(); ground_m.len()];
-        for (point, &column) in points.iter().zip(&columns.of_points) {
-            let above_m = above_m(point, column);
+        for (place_m, &column) in places_m.iter().zip(&columns.of_points) {
+            let above_m = above_m(place_m, column);
             if above_m > self.step_m {
-                raised[column].add(Vector3::from(point.position_m.map(f64::from)), above_m);
+                raised[column].add(Vector3::from(place_m.map(f64::from)), above_m);
             }
         }
         let classes: Vec<TerrainClass> = raised.iter().map(|raised| raised.class(self)).collect();
-        for (point, &column) in points.iter_mut().zip(&columns.of_points) {
-            let is_raised = above_m(point, column) > self.step_m;
+        for ((point, place_m), &column) in points.iter_mut().zip(&places_m).zip(&columns.of_points) {
+            let is_raised = above_m(place_m, column) > self.step_m;
             point.class_number = if is_raised { classes[column] } else { TerrainClass::Open } as u32;
         }
     }
+}
+
+fn upright(point: &PointRecord, to_upright: &Isometry3<f64>) -> [f32; 3] {
+    let place = to_upright * Point3::from(point.position_m.map(f64::from));
+    [place.x, place.y, place.z].map(|axis_m| axis_m as f32)
 }

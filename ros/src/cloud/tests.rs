@@ -91,7 +91,7 @@ fn resting(_: f64) -> Isometry3<f64> {
 }
 
 fn here(cloud: &PointCloud2) -> Result<Sweep, LayoutError> {
-    sweep(cloud, &labels(), 1 << 16, resting)
+    sweep(cloud, &labels(), 1 << 16, &Isometry3::identity(), resting)
 }
 
 proptest! {
@@ -134,7 +134,7 @@ proptest! {
             height, width, fields, is_bigendian, point_step, row_step, data, ..PointCloud2::default()
         };
         for meaning in [labels(), geometry(), timed(1.0, RosPointEpoch::Stamp)] {
-            if let Ok(read) = sweep(&hostile, &meaning, 64, resting) {
+            if let Ok(read) = sweep(&hostile, &meaning, 64, &Isometry3::identity(), resting) {
                 prop_assert!(read.points.len() <= 64);
                 prop_assert!(read.points.iter().all(|point| point.position_m.iter().all(|axis_m| axis_m.is_finite())));
             }
@@ -188,7 +188,7 @@ fn points_are_moved_into_the_frame_that_is_asked_for() {
     let quarter = UnitQuaternion::from_euler_angles(0.0, 0.0, std::f64::consts::FRAC_PI_2);
     let motion = Isometry3::from_parts(Translation3::new(1.0, 0.0, 0.5), quarter);
     let ahead = cloud(&[vec![[2.0, 0.0, -0.5, 3.0]]], &PLAIN);
-    let read = sweep(&ahead, &labels(), 10, |_| motion).unwrap();
+    let read = sweep(&ahead, &labels(), 10, &Isometry3::identity(), |_| motion).unwrap();
     let [x_m, y_m, z_m] = read.points[0].position_m;
     assert!((x_m - 1.0).abs() + (y_m - 2.0).abs() + z_m.abs() < 1e-6, "{x_m} {y_m} {z_m}");
     assert_eq!(read.points[0].class_number, TerrainClass::Vegetation as u32);
@@ -210,7 +210,11 @@ fn timed_cloud(times: [f64; 3], kind: u8) -> PointCloud2 {
 /// How far each point is moved by a frame that moves by 1 m/s.
 fn moved_m(cloud: &PointCloud2, meaning: &Meaning) -> Result<Vec<f32>, LayoutError> {
     let motion = |after_s: f64| Isometry3::translation(after_s, 0.0, 0.0);
-    Ok(sweep(cloud, meaning, 10, motion)?.points.iter().map(|point| point.position_m[0] - 1.0).collect())
+    Ok(sweep(cloud, meaning, 10, &Isometry3::identity(), motion)?
+        .points
+        .iter()
+        .map(|point| point.position_m[0] - 1.0)
+        .collect())
 }
 
 #[test]
@@ -266,7 +270,7 @@ fn rays_without_a_return_are_counted_and_what_nobody_knows_is_an_obstacle() {
 #[test]
 fn of_too_many_points_every_so_many_th_is_kept() {
     let row: Vec<[f64; 4]> = (1..=100).map(|k| [f64::from(k), 0.0, 0.0, 1.0]).collect();
-    let read = sweep(&cloud(&[row], &PLAIN), &labels(), 30, resting).unwrap();
+    let read = sweep(&cloud(&[row], &PLAIN), &labels(), 30, &Isometry3::identity(), resting).unwrap();
     assert_eq!((read.points.len(), read.n_left_out), (25, 75));
     assert_eq!(read.points[1].position_m[0], 5.0);
 }
@@ -297,7 +301,7 @@ fn ground(height_m: impl Fn(f64, f64) -> f64) -> Vec<PointRecord> {
 }
 
 fn classified(mut points: Vec<PointRecord>) -> Vec<PointRecord> {
-    LENGTHS.classify(&mut points);
+    LENGTHS.classify(&mut points, &Isometry3::identity());
     points
 }
 

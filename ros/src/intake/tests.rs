@@ -1,3 +1,5 @@
+mod sensors;
+
 use super::*;
 use crate::cloud::{Classes, GeometryClasses};
 use crate::message::{

@@ -137,7 +137,7 @@ pub(super) fn judged(what: &str, share: f64, found: String, cause: &str) -> Find
 }
 
 /// The smaller turn to the same heading [rad].
-fn turned_rad(turn_rad: f64) -> f64 {
+pub(super) fn turned_rad(turn_rad: f64) -> f64 {
     let full_rad = std::f64::consts::TAU;
     turn_rad - full_rad * libm::round(turn_rad / full_rad)
 }

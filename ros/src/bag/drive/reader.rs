@@ -11,7 +11,7 @@ use serde::de::DeserializeOwned;
 use super::{BagDrive, BagDriveError, Robot};
 use crate::bag::{LogTopics, arrival, intake, is_of, read, topic_name};
 use crate::cloud::{Classes, GeometryClasses, Meaning};
-use crate::intake::{Clouds, Intake};
+use crate::intake::{Clouds, Intake, IntakeError};
 use crate::message::{AckermannDriveStamped, Clock, Imu, Named, Odometry, TfMessage, Twist, TwistStamped};
 use crate::odometry::Frames;
 use crate::stamps::{StampClock, StampSource};
@@ -23,8 +23,8 @@ const SPEED_MIN_MPS: f64 = 0.05;
 const COMMANDS_MAX: usize = 4096;
 /// How far in time transforms count, where no robot file says it [ns].
 const TRANSFORM_AGE_MAX_NS: u64 = 1_000_000_000;
-/// Messages of fixed frames that are kept until it is known whose frames count.
-const EARLY_MAX: usize = 256;
+/// Messages of frames that are kept until it is known whose frames count: a second of `/tf` and more.
+const EARLY_MAX: usize = 4096;
 /// The types of commands.
 const COMMANDS: &str =
     "ackermann_msgs/msg/AckermannDriveStamped, geometry_msgs/msg/TwistStamped or geometry_msgs/msg/Twist";
@@ -36,13 +36,21 @@ struct Commanded {
     columns: [(Column, f64); 2],
 }
 
+/// Where frames lay before anybody had said whose count.
+struct Early {
+    topic: String,
+    at_ns: u64,
+    is_fixed: bool,
+    told: TfMessage,
+}
+
 pub(super) struct Reader<'a> {
     topics: LogTopics,
     robot: Option<Robot<'a>>,
     /// Without a robot file, from the first odometry on, whose frames count.
     intake: Option<Intake>,
-    /// Fixed frames that were told before.
-    early: Vec<TfMessage>,
+    /// Frames that were told before, in their order.
+    early: Vec<Early>,
     /// Kinds of topics that were not named, but chosen.
     chosen: Vec<&'static str>,
     commands: VecDeque<Commanded>,
@@ -126,8 +134,10 @@ impl<'a> Reader<'a> {
 
     fn odometry(&mut self, message: &RecordedMessage) {
         let Some(odometry) = self.kept::<Odometry>(message) else { return };
-        let early = std::mem::take(&mut self.early);
-        let intake = self.intake.get_or_insert_with(|| intake_of(&odometry, &early));
+        if self.intake.is_none() {
+            self.begin(&odometry);
+        }
+        let Some(intake) = &mut self.intake else { return };
         let taken = intake.odometry(&odometry, arrival(message));
         let Some((at_ns, record)) = self.used(message, taken) else { return };
         let began_ns = *self.began_ns.get_or_insert(at_ns);
@@ -210,14 +220,35 @@ impl<'a> Reader<'a> {
             None => topic.ends_with("tf_static"),
         };
         let taken = match &mut self.intake {
-            Some(intake) if is_fixed => intake.fixed_frames(&told),
-            Some(intake) => intake.moving_frames(&told),
+            Some(intake) => placed(intake, is_fixed, &told).map_err(|problem| problem.to_string()),
             None => {
-                self.early.extend(Some(told).filter(|_| is_fixed && self.early.len() < EARLY_MAX));
-                Ok(())
+                self.keep_early(Early { topic: topic.clone(), at_ns: message.log_time_ns, is_fixed, told })
             }
         };
         self.used(message, taken);
+    }
+
+    /// Moving frames of so long ago that they will not count make room for others.
+    fn keep_early(&mut self, early: Early) -> Result<(), String> {
+        let oldest_ns = early.at_ns.saturating_sub(TRANSFORM_AGE_MAX_NS);
+        self.early.retain(|before| before.is_fixed || before.at_ns >= oldest_ns);
+        if self.early.len() >= EARLY_MAX {
+            return Err(format!(
+                "frames: expected odometry before {EARLY_MAX} messages of frames, found none"
+            ));
+        }
+        self.early.push(early);
+        Ok(())
+    }
+
+    /// Whose frames count is known by the first odometry: what was told of frames before is taken over.
+    fn begin(&mut self, odometry: &Odometry) {
+        let mut intake = intake_of(odometry);
+        for Early { topic, is_fixed, told, .. } in std::mem::take(&mut self.early) {
+            let taken = placed(&mut intake, is_fixed, &told);
+            self.noted(&topic, taken);
+        }
+        self.intake = Some(intake);
     }
 
     fn clock(&mut self, message: &RecordedMessage) {
@@ -233,9 +264,13 @@ impl<'a> Reader<'a> {
 
     /// What was made of a message, or a note of why nothing was.
     fn used<T, E: Display>(&mut self, message: &RecordedMessage, made: Result<T, E>) -> Option<T> {
+        self.noted(&message.channel.topic, made)
+    }
+
+    fn noted<T, E: Display>(&mut self, topic: &str, made: Result<T, E>) -> Option<T> {
         let noted = made.map_err(|problem| {
             let note = || (0, problem.to_string());
-            self.refused.entry(message.channel.topic.clone()).or_insert_with(note).0 += 1;
+            self.refused.entry(topic.to_owned()).or_insert_with(note).0 += 1;
         });
         noted.ok()
     }
@@ -263,14 +298,15 @@ impl<'a> Reader<'a> {
     }
 }
 
+fn placed(intake: &mut Intake, is_fixed: bool, told: &TfMessage) -> Result<(), IntakeError> {
+    if is_fixed { intake.fixed_frames(told) } else { intake.moving_frames(told) }
+}
+
 /// An intake for odometry that is of the vehicle already, on whatever clock.
-fn intake_of(odometry: &Odometry, early: &[TfMessage]) -> Intake {
+fn intake_of(odometry: &Odometry) -> Intake {
     let frames = Frames { map: odometry.header.frame_id.clone(), vehicle: odometry.child_frame_id.clone() };
     let classes = Classes::Geometry(GeometryClasses { column_m: 1.0, step_m: 1.0, plants_max_m: 1.0 });
     let unused = Clouds { meaning: Meaning { classes, times: None }, sensors: Vec::new() };
     let clock = StampClock::new(StampSource::OfItsOwn);
-    let mut intake = Intake::new(frames, unused, clock, Transforms::new(TRANSFORM_AGE_MAX_NS));
-    // One that is none is told of when it comes again, or missed.
-    early.iter().for_each(|told| drop(intake.fixed_frames(told)));
-    intake
+    Intake::new(frames, unused, clock, Transforms::new(TRANSFORM_AGE_MAX_NS))
 }

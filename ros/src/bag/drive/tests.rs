@@ -5,8 +5,9 @@ use super::reader::Reader;
 use super::*;
 use crate::bag::tests::recorded;
 use crate::message::{
-    AckermannDrive, AckermannDriveStamped, Header, Imu, Odometry, Point, Pose, PoseWithCovariance, TfMessage,
-    Time, Transform, TransformStamped, Twist, TwistStamped, TwistWithCovariance, Vector3,
+    AckermannDrive, AckermannDriveStamped, Header, Imu, Odometry, Point, Pose, PoseWithCovariance,
+    Quaternion, TfMessage, Time, Transform, TransformStamped, Twist, TwistStamped, TwistWithCovariance,
+    Vector3,
 };
 
 const SECOND_NS: u64 = 1_000_000_000;
@@ -137,6 +138,55 @@ fn what_is_felt_is_carried_to_the_vehicle() {
         "{:?}",
         unjoined.notes
     );
+}
+
+/// A frame that turns is told of before the first odometry, and not again.
+#[test]
+fn moving_frames_that_are_told_before_the_first_odometry_count() {
+    let turned = |rotation: Quaternion| TransformStamped {
+        header: header(-0.1, "base_link"),
+        child_frame_id: "imu".to_owned(),
+        transform: Transform { rotation, ..Transform::default() },
+    };
+    let half = std::f64::consts::FRAC_1_SQRT_2;
+    let left = turned(Quaternion { x: 0.0, y: 0.0, z: half, w: half });
+    let none = TransformStamped {
+        child_frame_id: "camera".to_owned(),
+        ..turned(Quaternion { w: 0.0, ..Quaternion::default() })
+    };
+    let told = |transform| recorded("/tf", at_ns(-0.1), &TfMessage { transforms: vec![transform] });
+    let linear_acceleration = Vector3 { x: 0.5, ..Vector3::default() };
+    let felt = recorded(
+        "/imu",
+        at_ns(0.05),
+        &Imu { header: header(0.05, "imu"), linear_acceleration, ..Imu::default() },
+    );
+    let whole = drive(&[told(left), told(none), odometry(0.0), felt, odometry(0.1)]);
+    assert!((column(&whole, Column::Ay)[1] - 0.5).abs() < 1e-6, "{:?}", whole.notes);
+    let [note] = &whole.notes[..] else { panic!("{:?}", whole.notes) };
+    assert!(
+        note.starts_with("1 messages on /tf left out, the first for frame \"camera\": orientation: expected"),
+        "{note}"
+    );
+}
+
+/// More frames that stay than are kept, before anybody has said whose frames count.
+#[test]
+fn frames_beyond_those_that_are_kept_are_told_of() {
+    let fixed = |k: u64| recorded("/tf_static", DAY_NS + k, &TfMessage { transforms: Vec::new() });
+    let moving = |k: u64| recorded("/tf", DAY_NS + k, &TfMessage { transforms: Vec::new() });
+    let many: Vec<RecordedMessage> = (0..4100).map(fixed).chain([odometry(0.0)]).collect();
+    let [note] = &drive(&many).notes[..] else { panic!("one note") };
+    assert!(
+        note.starts_with(
+            "4 messages on /tf_static left out, the first for frames: expected odometry before 4096"
+        ),
+        "{note}"
+    );
+    // Those that move make room once they are a second old.
+    let long: Vec<RecordedMessage> =
+        (0..9000).map(|k| moving(k * 1_000_000)).chain([odometry(9.0)]).collect();
+    assert_eq!(drive(&long).notes, [""; 0]);
 }
 
 #[test]
