@@ -47,7 +47,7 @@ impl Default for MovingConfig {
             margin_m: 2.0,
             touch_s: 2.0,
             near_s: 1.0,
-            foresight_s: 0.6,
+            foresight_s: 1.0,
         }
     }
 }

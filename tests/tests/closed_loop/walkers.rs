@@ -107,7 +107,7 @@ fn who_steps_before_the_bumper_is_stopped_for() {
     let vehicle = full_size();
     // He walks beside the way, as if to pass, and then across it.
     let beside = Stride { duration_s: 4.5, velocity_mps: [0.5, 0.0] };
-    let across = Stride { duration_s: 12.0, velocity_mps: [0.0, -0.8] };
+    let across = Stride { duration_s: 6.0, velocity_mps: [0.0, -1.6] };
     let mut closed = closed(
         &vehicle,
         vec![Walker::new([14.0, 14.8], vec![beside, across])],
