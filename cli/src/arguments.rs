@@ -3,6 +3,7 @@
 mod bench;
 mod bench_gap;
 mod collect;
+mod convert;
 mod correction;
 mod crossings;
 mod deviation;
@@ -22,6 +23,7 @@ mod play;
 mod replay;
 mod results;
 mod risk;
+mod robot;
 mod route;
 mod scaling;
 mod train;
@@ -36,6 +38,7 @@ pub use bench::{
 };
 pub use bench_gap::BenchGapArguments;
 pub use collect::{CollectArguments, CollectMap, CollectSplit, CollectWorld};
+pub use convert::ConvertArguments;
 pub use correction::{BenchCorrectionArguments, CorrectionMethod};
 pub use crossings::{BenchCrossingsArguments, CrossingHandling};
 pub use deviation::AskedDeviation;
@@ -60,6 +63,7 @@ pub use play::PlayArguments;
 pub use replay::ReplayArguments;
 pub use results::{JsonArguments, ResultArguments};
 pub use risk::BenchRiskArguments;
+pub use robot::RobotArguments;
 pub use route::{BareGround, RouteArguments};
 pub use scaling::BenchScalingArguments;
 pub use train::{TrainArguments, TrainCommand};
@@ -110,6 +114,9 @@ pub enum Command {
     Reset(AskedRun),
     /// Change the risk tolerance of a run
     Alpha(AlphaArguments),
+    /// Write a robot file from a URDF and a bag of ROS 2
+    #[command(long_about = robot::LONG_ABOUT)]
+    Robot(RobotArguments),
     /// Check the machine and, if one is there, the sensors and processes of a run
     #[command(long_about = doctor::LONG_ABOUT)]
     Doctor(DoctorArguments),
@@ -119,6 +126,9 @@ pub enum Command {
     /// Feed a bag of ROS 2 through the pipeline, and show what it would have decided
     #[command(long_about = play::LONG_ABOUT)]
     Play(PlayArguments),
+    /// Make a bag of ROS 2 of recordings
+    #[command(long_about = convert::LONG_ABOUT)]
+    Convert(ConvertArguments),
     /// Search a route over measured ground, and the fastest speeds along it
     #[command(long_about = route::LONG_ABOUT)]
     Route(RouteArguments),

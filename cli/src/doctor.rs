@@ -1,5 +1,7 @@
 //! `surefoot doctor`: is this machine, and are this robot's sensors, fit to drive?
 
+mod bag;
+
 use std::path::Path;
 
 use bus::channel::{Bus, RunName};
@@ -14,6 +16,12 @@ pub(crate) fn run(arguments: &DoctorArguments) -> anyhow::Result<()> {
     arguments.copy.prepare()?;
     let up = arguments.robot.as_deref().map(described).transpose()?;
     let expected = up.as_ref().map(expected).transpose()?.unwrap_or_default();
+    if let (Some(bag), Some(file), Some(up)) = (&arguments.bag, &arguments.robot, &up) {
+        let findings = bag::look(bag, up, robot::ros(up, file)?, &expected)?;
+        print(&format!("bag {}", bag.display()), &findings);
+        arguments.copy.write(&findings)?;
+        return conclude(&findings);
+    }
     let run = which(&arguments.run, up.as_ref())?;
     let mut findings = doctor::machine(&arguments.recordings);
     print("this machine", &findings);

@@ -89,6 +89,7 @@
 pub mod arguments;
 mod bench;
 mod collect;
+mod convert;
 mod doctor;
 mod drive;
 mod drive_file;
@@ -102,6 +103,7 @@ mod play;
 mod program;
 pub mod progress;
 mod replay;
+mod robot;
 mod route;
 pub mod summary;
 mod train;
@@ -170,9 +172,11 @@ fn dispatch(command: Command) -> anyhow::Result<()> {
         Command::Estop(run) => orders::tell(&run, &Order::EmergencyStop),
         Command::Reset(run) => orders::tell(&run, &Order::Reset),
         Command::Alpha(alpha) => orders::alpha(&alpha),
+        Command::Robot(robot) => robot::run(&robot),
         Command::Doctor(doctor) => doctor::run(&doctor),
         Command::Replay(replay) => replay::run(&replay),
         Command::Play(play) => play::run(&play),
+        Command::Convert(convert) => convert::run(&convert),
         Command::Route(route) => route::run(&route),
         Command::Inspect(inspect) => inspect::run(&inspect),
         Command::Gap { command } => gap::run(&command),

@@ -7,7 +7,7 @@ mod player;
 use std::time::{Duration, Instant};
 
 use bicycle::{Column, DriveLog};
-use formats::{Bag, RobotRos};
+use formats::Bag;
 use navigator::{Areas, Route};
 use report::drive::{DrivePicture, RiskLayer};
 use ros::bag::{BagDrive, LogTopics, Robot, drive_log};
@@ -29,10 +29,7 @@ const MARGIN_M: f64 = 20.0;
 
 pub(crate) fn run(arguments: &PlayArguments) -> anyhow::Result<()> {
     let up = &robot::described(&UpArguments::of_robot(&arguments.robot, &arguments.goal)?)?;
-    let ros = ros_of(up).ok_or_else(|| {
-        let file = arguments.robot.display();
-        UsageError(format!("{file}: expected a robot file with a part [ros], found none"))
-    })?;
+    let ros = robot::ros(up, &arguments.robot)?;
     let machine = robot::machine(up, runtime::ages::guard(&robot::periods(up)))?;
     let bag = Bag::open(&arguments.bag).map_err(UsageError::from_input)?;
     let driven = drive_log(&bag, &LogTopics::of_robot(ros), Some(Robot { ros, vehicle: &machine.vehicle }))
@@ -55,10 +52,6 @@ pub(crate) fn run(arguments: &PlayArguments) -> anyhow::Result<()> {
     results.write(PICTURE, &drawn(&machine, &kept, &summary)?)?;
     show(arguments, &driven, &summary);
     Ok(())
-}
-
-fn ros_of(up: &UpArguments) -> Option<&RobotRos> {
-    up.described.as_ref()?.ros.as_ref()
 }
 
 /// The goals that were asked for, else where the bag's odometry ends.

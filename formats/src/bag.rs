@@ -2,11 +2,13 @@
 
 mod database;
 mod folder;
+mod writer;
 
 use std::io;
 use std::path::{Path, PathBuf};
 
 pub use folder::BagMetadata;
+pub use writer::{BagTopic, BagWriteError, BagWriter};
 
 use crate::{RecordedMessage, open_recording};
 

@@ -35,9 +35,10 @@ mod robot;
 mod scan;
 mod skid_steer;
 mod traction_map;
+mod urdf;
 mod vehicle;
 
-pub use bag::{Bag, BagError, BagMetadata};
+pub use bag::{Bag, BagError, BagMetadata, BagTopic, BagWriteError, BagWriter};
 pub use column_names::{ColumnNames, ColumnNamesError};
 pub use config::{ConfigError, ConfigText};
 pub use drive_log_csv::{
@@ -60,10 +61,10 @@ pub use journal::{Journal, JournalContent, JournalError, read_journal};
 pub use model_text::{model_text, toml_text};
 pub use overlay::overlay;
 pub use recording::{
-    DriveRecorder, DriveTopics, McapDriveLog, McapReadError, RecordError, RecordedCell, RecordedChannel,
-    RecordedColumn, RecordedMessage, RecordedRisk, RecordedTable, RecordingError, RecordingMessages,
-    json_row, open_recording, read_drive_log_mcap, read_recorded_maps, read_recorded_table,
-    recorded_elevation, recorded_risk, recorded_scan,
+    DriveLogFields, DriveRecorder, DriveTopics, McapDriveLog, McapReadError, RecordError, RecordedCell,
+    RecordedChannel, RecordedColumn, RecordedMessage, RecordedRisk, RecordedTable, RecordingError,
+    RecordingMessages, json_row, open_recording, read_drive_log_mcap, read_recorded_maps,
+    read_recorded_table, recorded_best_rollout, recorded_elevation, recorded_risk, recorded_scan,
 };
 pub use refusal::ArrayFileError;
 pub use results::{OutputError, config_hash, prepare_out_dir, write_bytes_atomic, write_json_atomic};
@@ -75,6 +76,7 @@ pub use robot::{
 pub use scan::{parse_scan_points, read_scan_points};
 pub use skid_steer::{parse_skid_steer_vehicle, read_skid_steer_vehicle};
 pub use traction_map::{TractionMap, TractionPmfs, parse_traction_map, read_traction_map};
+pub use urdf::{UrdfError, UrdfVehicle};
 pub use vehicle::{
     parse_model, parse_vehicle, read_model, read_vehicle, shipped_vehicle_names, shipped_vehicle_text,
 };

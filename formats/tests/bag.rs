@@ -5,9 +5,9 @@
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::BufWriter;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-use formats::{Bag, RecordedMessage};
+use formats::{Bag, BagTopic, BagWriter, RecordedChannel, RecordedMessage};
 use rusqlite::{Connection, params};
 
 /// The tables of rosbag2, as far as its readers need them.
@@ -256,4 +256,67 @@ fn a_message_of_no_topic_ends_the_bag() {
     let (numbers, ended) = read(&path);
     assert_eq!(numbers, up_to(3));
     assert!(ended.unwrap().ends_with("expected a message on a known topic, found one on topic number 7"));
+}
+
+const ODOMETRY: BagTopic<'_> = BagTopic {
+    name: "/odom",
+    kind: "nav_msgs/msg/Odometry",
+    definition: "std_msgs/Header header",
+    type_hash: "RIHS01_3cc9",
+};
+const IMU: BagTopic<'_> = BagTopic { name: "/imu", kind: "sensor_msgs/msg/Imu", ..ODOMETRY };
+
+#[test]
+fn a_bag_that_is_written_is_read_with_what_it_says_of_itself() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("fields/drive");
+    let mut writer = BagWriter::create(&path).unwrap();
+    assert!(!path.exists(), "it has its name once it is whole");
+    writer.write(&ODOMETRY, 7_000_000_000, &[0, 1, 0, 0, 1]).unwrap();
+    writer.write(&IMU, 5_000_000_000, &[0, 1, 0, 0, 2]).unwrap();
+    writer.write(&ODOMETRY, 9_000_000_000, &[0, 1, 0, 0, 3]).unwrap();
+    let counts = writer.finish().unwrap();
+    assert_eq!(counts, BTreeMap::from([("/imu".to_owned(), 1), ("/odom".to_owned(), 2)]));
+
+    let bag = Bag::open(&path).unwrap();
+    let metadata = bag.metadata().unwrap().unwrap();
+    assert_eq!((metadata.storage.as_str(), metadata.n_messages), ("mcap", 3));
+    assert_eq!(metadata.files, [PathBuf::from("drive_0.mcap")]);
+    let mut read = Vec::new();
+    let ended_early = bag.take_all(|message| {
+        let RecordedChannel { topic, schema, schema_data, encoding } = &*message.channel;
+        assert_eq!((schema_data.as_slice(), encoding.as_str()), (ODOMETRY.definition.as_bytes(), "cdr"));
+        read.push((topic.clone(), schema.clone(), message.log_time_ns, message.data[4]));
+        Ok(())
+    });
+    assert_eq!(ended_early, None);
+    let expected = [(ODOMETRY, 7, 1), (IMU, 5, 2), (ODOMETRY, 9, 3)];
+    let expected = expected
+        .map(|(topic, s, byte)| (topic.name.to_owned(), topic.kind.to_owned(), s * 1_000_000_000, byte));
+    assert_eq!(read, expected);
+    // What rosbag2 reads beside it.
+    let text = std::fs::read_to_string(path.join("metadata.yaml")).unwrap();
+    for line in [
+        "  version: 9",
+        "    nanoseconds: 4000000000",
+        "    nanoseconds_since_epoch: 5000000000",
+        "type_description_hash: RIHS01_3cc9",
+        "offered_qos_profiles: []",
+        "  ros_distro: jazzy",
+    ] {
+        assert!(text.contains(line), "{line}:\n{text}");
+    }
+}
+
+#[test]
+fn a_bag_is_written_over_nothing_and_leaves_nothing_before_its_end() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("drive");
+    let mut writer = BagWriter::create(&path).unwrap();
+    writer.write(&ODOMETRY, 0, &[0, 1, 0, 0]).unwrap();
+    drop(writer);
+    assert_eq!(folder.path().read_dir().unwrap().count(), 0);
+    BagWriter::create(&path).unwrap().finish().unwrap();
+    let told = BagWriter::create(&path).err().unwrap().to_string();
+    assert!(told.ends_with("drive: expected a name that is free, found a file or folder"), "{told}");
 }

@@ -1,10 +1,11 @@
-//! What a bag holds: its messages read, and the drive in it as a log. No network is needed for it.
+//! What a bag holds: its messages read and written, and the drive in it as a log. No network is needed for it.
 //!
 //! Messages are read as the ones of [`crate::message`], by the name of their type: the definitions that a bag brings
 //! along, or leaves out, are not needed.
 
 mod drive;
 mod topics;
+mod writer;
 
 use std::fmt::Display;
 
@@ -17,6 +18,7 @@ use serde::de::DeserializeOwned;
 
 pub use drive::{BagDrive, BagDriveError, Robot, drive_log};
 pub use topics::{LogTopics, LogTopicsError};
+pub use writer::{MessageWriteError, MessageWriter};
 
 use crate::bridge;
 use crate::cloud::LabelsError;

@@ -3,6 +3,7 @@
 //! Definitions are those of ROS 2 Jazzy; the ones here have not changed since Humble. A message's name on the wire is its
 //! package and type, [`Named`].
 
+mod definition;
 mod diagnostic;
 mod geometry;
 mod grid_map;
@@ -12,6 +13,7 @@ mod visualization;
 
 use serde::{Deserialize, Serialize};
 
+pub use definition::Defined;
 pub use diagnostic::{DiagnosticArray, DiagnosticStatus, KeyValue};
 pub use geometry::{
     Point, Pose, PoseArray, PoseStamped, PoseWithCovariance, Quaternion, TfMessage, Transform,

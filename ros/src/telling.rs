@@ -2,6 +2,7 @@
 
 mod layers;
 mod markers;
+mod measured;
 
 use bicycle::{Command, Decision, HoldReason, Limits};
 use nalgebra::UnitQuaternion;
@@ -15,6 +16,7 @@ use crate::message::{
 use crate::rigid;
 pub use layers::grid_map;
 pub use markers::{moving, plan as plan_markers};
+pub use measured::{cloud, imu, odometry, transforms};
 
 /// Occupancy of a cell that must not be touched.
 const OBSTACLE: i8 = 100;

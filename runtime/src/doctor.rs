@@ -1,7 +1,8 @@
 //! What an engineer looks at before a robot drives: the machine that the processes run on, and what the sensors of a run
 //! say of one another.
 //!
-//! Nothing here decides anything, and nothing is published: a run is looked on at as by any third party.
+//! Nothing here decides anything, and nothing is published: a run is looked on at as by any third party, and what a bag
+//! holds is handed in.
 
 mod inertial;
 mod machine;

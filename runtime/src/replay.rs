@@ -22,7 +22,7 @@ use crate::setup::{MachineSetup, SetupError};
 use bus::message::{DecisionRecord, Source};
 use choice::Choice;
 use maps::{Maps, Unmade};
-pub use records::{Key, ReadError, Records, recorded_decision, recorded_stamp};
+pub use records::{Key, ReadError, Records, recorded_decision, recorded_message, recorded_stamp};
 pub use tables::{Row, recorded_odometry, recorded_rows};
 
 /// What a replay came to.

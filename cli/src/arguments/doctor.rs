@@ -10,6 +10,10 @@ use super::{AskedRun, JsonArguments, values};
 #[derive(Args, Clone, Debug)]
 #[command(after_long_help = AFTER_HELP)]
 pub struct DoctorArguments {
+    /// A bag of ROS 2 that the robot recorded, in place of machine and run: its folder, or a file ending in .mcap or .db3
+    #[arg(value_name = "BAG", requires = "robot", conflicts_with_all = ["run", "seconds", "recordings"])]
+    pub bag: Option<PathBuf>,
+
     /// The robot: its run, vehicle, rates and sensors; a TOML file
     #[arg(long, value_name = "FILE")]
     pub robot: Option<PathBuf>,
@@ -36,7 +40,8 @@ Checks the machine that this runs on (cores, priority, locked memory, how late i
 run is there, looks on at it for some seconds: rates, gaps and delays of odometry, scans and inertial samples beside the \
 robot file's; velocities against positions and rates against headings; the ground that each range sensor sees against the \
 ground under the wheels, and whether what stands out of the ground stays where it is while the vehicle drives; gravity \
-where the odometry has it; and how every process keeps its times. Nothing is sent.";
+where the odometry has it; and how every process keeps its times. Nothing is sent. Of a bag the same is checked, but for machine \
+and processes.";
 
 const AFTER_HELP: &str = "\
 Each check is one line:
@@ -52,6 +57,7 @@ A run needs a place for one reader more (--third-parties).
 Examples:
   surefoot doctor                                    the machine, and the run if there is one
   surefoot doctor --robot mine.toml --seconds 20     while somebody drives a circle by hand
+  surefoot doctor field_1 --robot mine.toml          what a bag of ROS 2 says of the robot's sensors
 
 Exit codes:
   0  nothing is wrong

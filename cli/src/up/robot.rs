@@ -1,10 +1,12 @@
 //! A robot's file in place of the words that describe a simulated vehicle.
 
+use std::path::Path;
+
 use bus::ages::Periods;
 use bus::channel::RunName;
 use bus::status::Role;
 use clap::ValueEnum;
-use formats::{RobotFile, RobotSafety, read_robot, read_vehicle};
+use formats::{RobotFile, RobotRos, RobotSafety, read_robot, read_vehicle};
 use navigator::{Areas, GuardConfig};
 use runtime::ages::AskedAges;
 
@@ -57,6 +59,13 @@ pub(crate) fn described(arguments: &UpArguments) -> Result<UpArguments, UsageErr
     arguments.described = Some(Box::new(robot));
     refuse_other_roles(&arguments)?;
     Ok(arguments)
+}
+
+/// What the robot's file says of ROS 2, which reading a bag needs.
+pub(crate) fn ros<'a>(arguments: &'a UpArguments, file: &Path) -> Result<&'a RobotRos, UsageError> {
+    let ros = arguments.described.as_ref().and_then(|robot| robot.ros.as_ref());
+    let file = file.display();
+    ros.ok_or_else(|| UsageError(format!("{file}: expected a robot file with a part [ros], found none")))
 }
 
 fn unknown_method(name: &str) -> String {

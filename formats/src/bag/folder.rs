@@ -8,7 +8,7 @@ use serde::Deserialize;
 use super::Storage;
 
 /// The file in which a bag tells of itself.
-const METADATA: &str = "metadata.yaml";
+pub(super) const METADATA: &str = "metadata.yaml";
 /// Longest such file that is read.
 const METADATA_BYTES_MAX: u64 = 1 << 24;
 

@@ -44,7 +44,7 @@ drive_log_row! {
 
 /// Where the drive log's fields stand in the messages of a recording, by the names that its own schema gives them: a
 /// recording of a program with other columns, or in another order, is read for what it says.
-pub(super) struct Fields(BTreeMap<u64, Field>);
+pub struct Fields(BTreeMap<u64, Field>);
 
 #[derive(Clone, Copy)]
 enum Field {
@@ -66,7 +66,7 @@ impl Field {
 
 impl Fields {
     /// From a schema, a `FileDescriptorSet` of protobuf; `None` for other bytes and for messages without a time.
-    pub(super) fn of(schema: &[u8]) -> Option<Self> {
+    pub fn of(schema: &[u8]) -> Option<Self> {
         // Numbers of the fields in protobuf's own descriptors: file, message, field, its name and its number.
         let file = part(schema, 1)?;
         let message = part(file, 4)?;
@@ -84,7 +84,7 @@ impl Fields {
     }
 
     /// Run and row of an encoded message; `None` when the bytes are none. Unknown fields are passed over.
-    pub(super) fn decode(&self, bytes: &[u8]) -> Option<(String, DriveRow)> {
+    pub fn decode(&self, bytes: &[u8]) -> Option<(String, DriveRow)> {
         let (mut run, mut row) = (String::new(), DriveRow::new(0.0));
         for (number, value) in Wire(bytes) {
             match (self.0.get(&number), value?) {

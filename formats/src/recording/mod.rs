@@ -30,8 +30,11 @@ use raw::RawChannels;
 use syncer::Syncer;
 use watched_file::{Fault, WatchedFile};
 
+pub use drive_row::Fields as DriveLogFields;
 pub use messages::{RecordedChannel, RecordedMessage, RecordingError, RecordingMessages, open_recording};
-pub use recorded::{RecordedRisk, read_recorded_maps, recorded_elevation, recorded_risk, recorded_scan};
+pub use recorded::{
+    RecordedRisk, read_recorded_maps, recorded_best_rollout, recorded_elevation, recorded_risk, recorded_scan,
+};
 pub use table::{RecordedCell, RecordedColumn, RecordedTable, json_row, read_recorded_table};
 pub use topics::DriveTopics;
 

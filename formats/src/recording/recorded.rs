@@ -4,7 +4,7 @@ use std::io;
 use std::path::Path;
 
 use foxglove::Decode;
-use foxglove::messages::{Grid, PackedElementField, PointCloud};
+use foxglove::messages::{Grid, PackedElementField, PointCloud, SceneUpdate};
 use terrain::{GridGeometry, GridMap, Knowledge, RangePoint, Scan, SurfaceCell, TerrainClass};
 use traversability::{Ground, GroundFlags};
 
@@ -83,6 +83,16 @@ pub fn recorded_scan(message: &RecordedMessage) -> Result<Scan, String> {
     });
     let points = points.collect::<Result<Vec<_>, String>>()?;
     Ok(Scan { valid_at_ns: message.log_time_ns, points, ..Scan::default() })
+}
+
+/// The points of the best future in a message of topic `/rollouts` [m], in the map frame; none where nothing was tried.
+///
+/// Errors: those of [`recorded_elevation`].
+pub fn recorded_best_rollout(message: &RecordedMessage) -> Result<Vec<[f64; 3]>, String> {
+    let scene = SceneUpdate::decode(&message.data[..]).map_err(|error| error.to_string())?;
+    let lines = scene.entities.into_iter().flat_map(|entity| entity.lines);
+    let best = lines.map(|line| line.points).next().unwrap_or_default();
+    Ok(best.iter().map(|point| [point.x, point.y, point.z]).collect())
 }
 
 fn surface_cell(bytes: &[u8]) -> Result<SurfaceCell, String> {
@@ -211,6 +221,14 @@ mod tests {
         let points = vec![RangePoint { position_m: [1.0, -2.0, 0.5], class: TerrainClass::Obstacle }; 3];
         let scan = Scan { valid_at_ns: 7, points, ..Scan::default() };
         assert_eq!(recorded_scan(&message(&scene::point_cloud(7, &scan))).unwrap().points, scan.points);
+    }
+
+    #[test]
+    fn the_best_future_comes_back_as_it_went() {
+        let best = vec![[0.0, 1.0, 2.0], [0.5, -1.25, 2.5]];
+        let told = message(&scene::rollouts(7, &[best.clone(), vec![[9.0; 3]]]));
+        assert_eq!(recorded_best_rollout(&told), Ok(best));
+        assert_eq!(recorded_best_rollout(&message(&scene::rollouts(7, &[]))), Ok(Vec::new()));
     }
 
     #[test]

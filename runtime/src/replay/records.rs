@@ -215,23 +215,23 @@ impl Records {
                 self.decisions.insert(stamp.source().into(), decision);
             }
             topic::IMU => {
-                let (stamp, samples): (Stamp, Vec<ImuRecord>) = split(bytes)?;
+                let (stamp, samples): (Stamp, Vec<ImuRecord>) = recorded_message(bytes)?;
                 self.imu.insert(stamp.source().into(), samples);
             }
             topic::SCAN => {
-                let (header, points): (ScanHeader, Vec<PointRecord>) = split(bytes)?;
+                let (header, points): (ScanHeader, Vec<PointRecord>) = recorded_message(bytes)?;
                 self.scans.insert(header.stamp.source().into(), (header, points));
             }
             topic::TRACKS => {
-                let (header, tracks): (TracksHeader, Vec<TrackRecord>) = split(bytes)?;
+                let (header, tracks): (TracksHeader, Vec<TrackRecord>) = recorded_message(bytes)?;
                 self.tracks.insert(header.stamp.source().into(), (header, tracks));
             }
             topic::SURFACE => {
-                let (header, _): (SurfaceHeader, Vec<u8>) = split(bytes)?;
+                let (header, _): (SurfaceHeader, Vec<u8>) = recorded_message(bytes)?;
                 self.surfaces.insert(header.stamp.source().into(), header);
             }
             topic::CHECKPOINT => {
-                let (header, bytes): (CheckpointHeader, Vec<u8>) = split(bytes)?;
+                let (header, bytes): (CheckpointHeader, Vec<u8>) = recorded_message(bytes)?;
                 if let Entry::Vacant(place) = self.checkpoints.entry(header.checkpoint) {
                     let (weights, sidecar) = bytes.split_at_checked(header.n_weight_bytes as usize)?;
                     let checkpoint = Checkpoint::from_bytes(weights, sidecar).ok()?;
@@ -243,7 +243,7 @@ impl Records {
                 }
             }
             topic::RISK | topic::RISK_PHYSICS => {
-                let (header, _): (RiskHeader, Vec<u8>) = split(bytes)?;
+                let (header, _): (RiskHeader, Vec<u8>) = recorded_message(bytes)?;
                 let place = usize::from(name == topic::RISK_PHYSICS);
                 self.risks[place].insert(header.stamp.source().into(), header);
             }
@@ -278,7 +278,8 @@ fn one<T: AnyBitPattern>(bytes: &[u8]) -> Option<(Stamp, T)> {
     Some((bytemuck::try_pod_read_unaligned(stamp).ok()?, record))
 }
 
-fn split<H: Header, T: AnyBitPattern>(bytes: &[u8]) -> Option<(H, Vec<T>)> {
+/// Header and elements of a message of a recording, under any topic of a channel; `None` for other bytes.
+pub fn recorded_message<H: Header, T: AnyBitPattern>(bytes: &[u8]) -> Option<(H, Vec<T>)> {
     let (header, rest) = bytes.split_at_checked(size_of::<H>())?;
     if !rest.len().is_multiple_of(size_of::<T>()) {
         return None;
