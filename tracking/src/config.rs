@@ -33,7 +33,7 @@ pub struct TrackingConfig {
     pub speed_min_mps: f64,
     /// A thing must be this much farther than its radius from where it was first seen to count as moving [m], > 0.
     pub moved_min_m: f64,
-    /// What has moved and stands for so long is told of no longer until it sets off again [s], > 0.
+    /// What is larger than people, has moved and stands for so long is told of no longer until it sets off again [s], > 0.
     pub standing_max_s: f64,
     /// A moving thing is given up that its place has not shown for so long [s], > 0.
     pub unseen_max_s: f64,

@@ -5,7 +5,8 @@
 //! become clusters, each with a centre and a radius; clusters are assigned to the tracks of before so that all distances
 //! together are least (Kuhn and Munkres), within a gate; each track is a Kalman filter of constant velocity. A track that
 //! left the place where it was first seen is one of something that moves, and [`Tracker::moving`] tells it with velocity and
-//! variance; [`Track::predicted`] says where it will be and how sure that is. What never moves is the map's business.
+//! variance; [`Track::predicted`] says where it will be and how sure that is. What stands and is no larger than people is told
+//! of, too, with no velocity: it may set off. What is larger and never moves is the map's business.
 //!
 //! `examples/track_a_walker.rs` follows a person through scans of one's own.
 //!

@@ -113,8 +113,8 @@ impl Tracker {
         self.tell([pose.x_m, pose.y_m]);
     }
 
-    /// What moves, or has moved and stands, at the time of the last scan; the nearest to the vehicle first, at most
-    /// [`TRACKS_MAX`].
+    /// What moves, has moved and stands, or stands and is no larger than people, at the time of the last scan; the nearest
+    /// to the vehicle first, at most [`TRACKS_MAX`].
     pub fn moving(&self) -> &[Track] {
         &self.moving
     }
