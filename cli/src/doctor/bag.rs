@@ -13,6 +13,7 @@ use runtime::doctor::{Expected, Finding, Observed, Source, Verdict};
 use serde::de::DeserializeOwned;
 
 use crate::arguments::UpArguments;
+use crate::up::robot;
 use crate::{UsageError, WorkFailed, interrupt};
 
 /// Returns of a scan at the most, as on the bus.
@@ -85,9 +86,7 @@ fn topics(ros: &RobotRos) -> BTreeMap<String, Topic> {
         (&names.tf_static, Topic::Fixed),
         (&names.clock, Topic::Clock),
     ];
-    let points = names.points.iter().map(|name| (name, Topic::Points));
-    let named = single.into_iter().chain(points);
-    named.filter_map(|(name, topic)| Some((bag::topic_name(ros, name)?, topic))).collect()
+    robot::topics(ros, &single, Topic::Points)
 }
 
 impl Examiner {

@@ -103,9 +103,7 @@ fn topics(ros: &RobotRos) -> BTreeMap<String, Topic> {
         (&names.pause, Topic::Pause),
         (&names.command, Topic::Command),
     ];
-    let points = names.points.iter().map(|name| (name, Topic::Points));
-    let named = single.into_iter().chain(points);
-    named.filter_map(|(name, topic)| Some((bag::topic_name(ros, name)?, topic))).collect()
+    robot::topics(ros, &single, Topic::Points)
 }
 
 impl<'a> Player<'a> {

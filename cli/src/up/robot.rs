@@ -1,5 +1,6 @@
 //! A robot's file in place of the words that describe a simulated vehicle.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use bus::ages::Periods;
@@ -66,6 +67,13 @@ pub(crate) fn ros<'a>(arguments: &'a UpArguments, file: &Path) -> Result<&'a Rob
     let ros = arguments.described.as_ref().and_then(|robot| robot.ros.as_ref());
     let file = file.display();
     ros.ok_or_else(|| UsageError(format!("{file}: expected a robot file with a part [ros], found none")))
+}
+
+/// What the topics of a bag are by their names from the root: those that the file names once, and every one of clouds.
+pub(crate) fn topics<T: Copy>(ros: &RobotRos, single: &[(&String, T)], clouds: T) -> BTreeMap<String, T> {
+    let clouds = ros.topics.points.iter().map(|name| (name, clouds));
+    let named = single.iter().copied().chain(clouds);
+    named.filter_map(|(name, topic)| Some((ros::bag::topic_name(ros, name)?, topic))).collect()
 }
 
 fn unknown_method(name: &str) -> String {
