@@ -96,11 +96,26 @@ fn a_localisation_that_jumps_moves_the_map_and_not_the_vehicle() {
     let mut surfaces = bus.inlet(&SURFACE).unwrap();
     witness.until_driving("all is well");
 
-    // Mapping follows: what was known is known, elsewhere.
+    // A jump tells all that mapping knows, other scans what is urgent alone: it stands until a scan in between has told all,
+    // so that the last map before the jump is what the jump moves.
+    let held = Misbehaviour { is_held: true, ..Misbehaviour::default() };
+    driver.behave(held);
+    witness.until_standing("an operator holds it");
     let mut before = (0, [0.0; 2]);
+    let mut n_scans = 0;
+    let told_whole = eventually(60.0, || {
+        surfaces.poll(|header, cells| {
+            n_scans += 1;
+            before = known(header, cells);
+        });
+        (n_scans > 2 * u64::from(machine().1.elevation.publish_period_scans)).then_some(())
+    });
+    assert!(told_whole.is_some(), "{n_scans} scans mapped");
+
+    // Mapping follows: what was known is known, elsewhere.
     let mut jumped = None;
     let (mut offset_m, turn_rad) = ([6.0, -9.0], 0.4);
-    driver.behave(Misbehaviour { offset_m, turn_rad, ..Misbehaviour::default() });
+    driver.behave(Misbehaviour { offset_m, turn_rad, ..held });
     eventually(60.0, || {
         surfaces.poll(|header, cells| match header.event {
             JUMPED => jumped = Some((*header, known(header, cells))),
@@ -109,6 +124,7 @@ fn a_localisation_that_jumps_moves_the_map_and_not_the_vehicle() {
         });
         jumped
     });
+    driver.behave(Misbehaviour { offset_m, turn_rad, ..Misbehaviour::default() });
     let (header, after) = jumped.expect("mapping makes out the jump");
     assert!((header.jump_yaw_rad - turn_rad).abs() < 0.03, "{}", header.jump_yaw_rad);
     let expected = Jump { step_m: [offset_m[0], offset_m[1], 0.0], yaw_rad: turn_rad };
