@@ -10,9 +10,9 @@ use std::fmt::Debug;
 use iceoryx2::prelude::ZeroCopySend;
 
 use crate::message::{
-    CheckpointHeader, CommandRecord, DecisionRecord, ImuRecord, MissionRecord, OdometryRecord, OrderHeader,
-    PlanRecord, PointRecord, RiskHeader, ScanHeader, Stamp, StatusRecord, StuckRecord, SurfaceHeader,
-    TrackRecord, TracksHeader,
+    CheckpointHeader, CommandRecord, DecisionRecord, FutureRecord, ImuRecord, MissionRecord, OdometryRecord,
+    OrderHeader, PlanRecord, PointRecord, RiskHeader, ScanHeader, Stamp, StatusRecord, StuckRecord,
+    SurfaceHeader, TrackRecord, TracksHeader,
 };
 use crate::payload;
 pub use bus::{Bus, Cleared, RunName, RunNameError, free_shared_memory_bytes};
@@ -104,6 +104,10 @@ pub const DECISION: Channel<Stamp, DecisionRecord> =
 /// every command to drive.
 pub const PLAN: Channel<Stamp, PlanRecord> =
     Channel { name: "plan", depth: 1, history: 0, n_readers: 1, check: payload::check_plan };
+/// Some of the futures that were tried for it, cheap and dear, for whoever wants to see them: control, twice a second while
+/// it drives.
+pub const FUTURES: Channel<Stamp, FutureRecord> =
+    Channel { name: "futures", depth: 1, history: 0, n_readers: 1, check: payload::check_futures };
 /// Where the vehicle got stuck: control.
 pub const STUCK: Channel<Stamp, StuckRecord> =
     Channel { name: "stuck", depth: 8, history: 0, n_readers: 3, check: payload::check_stuck };

@@ -297,6 +297,18 @@ record! {
 }
 
 record! {
+    /// A place of one of the futures that were tried.
+    FutureRecord = "surefoot.Future" {
+        /// Rear axle's centre in the frame of the map that it was tried on, east and north [m].
+        position_m: [f64; 2],
+        /// Cost of the whole future [s].
+        cost_s: f64,
+        /// Which future; the places of one follow one another.
+        number: u64,
+    }
+}
+
+record! {
     /// Where the vehicle got stuck.
     StuckRecord = "surefoot.Stuck" {
         /// Rear axle's centre [m].
@@ -421,6 +433,7 @@ pub fn layouts() -> Vec<RecordLayout> {
         CommandRecord::layout(),
         DecisionRecord::layout(),
         PlanRecord::layout(),
+        FutureRecord::layout(),
         StuckRecord::layout(),
         MissionRecord::layout(),
         OrderHeader::layout(),

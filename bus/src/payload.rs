@@ -8,8 +8,8 @@ use xxhash_rust::xxh3::xxh3_64;
 
 use crate::message::{RiskHeader, SurfaceHeader};
 pub(crate) use check::{
-    check_anything, check_checkpoint, check_command, check_imu, check_mission, check_odometry, check_order,
-    check_plan, check_risk, check_scan, check_stuck, check_surface, check_tracks,
+    check_anything, check_checkpoint, check_command, check_futures, check_imu, check_mission, check_odometry,
+    check_order, check_plan, check_risk, check_scan, check_stuck, check_surface, check_tracks,
 };
 
 /// Yaw bins beyond which nobody believes a map.
@@ -154,8 +154,8 @@ mod tests {
     use super::*;
     use crate::channel::{FUTURE_NS, Refusal};
     use crate::message::{
-        CheckpointHeader, CommandRecord, Grid, ImuRecord, MissionRecord, OrderHeader, PlanRecord,
-        PointRecord, ScanHeader, Stamp, StuckRecord, TRACKS_MAX, TrackRecord, TracksHeader,
+        CheckpointHeader, CommandRecord, FutureRecord, Grid, ImuRecord, MissionRecord, OrderHeader,
+        PlanRecord, PointRecord, ScanHeader, Stamp, StuckRecord, TRACKS_MAX, TrackRecord, TracksHeader,
     };
     use traversability::{GroundFlags, RiskMap};
 
@@ -301,6 +301,18 @@ mod tests {
         let wild = PlanRecord { speed_mps: f64::INFINITY, ..place };
         for broken in [nowhere, wild] {
             assert_eq!(check_plan(&stamp, &[place, broken]), Err(Refusal::NonFinite));
+        }
+    }
+
+    #[test]
+    fn futures_are_places_of_numbers_with_costs_that_are_some() {
+        let (stamp, place) = (Stamp::default(), FutureRecord::default());
+        assert_eq!(check_futures(&stamp, &[place, place]), Ok(()));
+        assert_eq!(check_futures(&stamp, &[]), Err(Refusal::Malformed));
+        let nowhere = FutureRecord { position_m: [f64::NAN, 0.0], ..place };
+        let priceless = FutureRecord { cost_s: f64::INFINITY, ..place };
+        for broken in [nowhere, priceless] {
+            assert_eq!(check_futures(&stamp, &[place, broken]), Err(Refusal::NonFinite));
         }
     }
 

@@ -3,6 +3,7 @@
 use crate::controller::Controller;
 use crate::cost::{RolloutCost, StepCost};
 use crate::driven::Driven;
+use crate::kernel::CHUNK;
 use crate::sampling::Control;
 use bicycle::{MotionState, State};
 use traversability::RiskMapView;
@@ -32,6 +33,18 @@ impl<M: Driven, S: StepCost, R: RolloutCost> Controller<M, S, R> {
     /// The same, state by state as they are asked for. Allocates nothing.
     pub fn nominal_states<'a>(&'a self, map: RiskMapView<'a>) -> impl Iterator<Item = M::State> + 'a {
         self.states(map, self.plan.nominal.iter().copied())
+    }
+
+    /// What a rollout of the last cycle costs [s], and where it leads over `map`, the predicted start first; `None` where
+    /// none has this number. Allocates nothing.
+    pub fn sampled_states<'a>(
+        &'a self,
+        rollout: usize,
+        map: RiskMapView<'a>,
+    ) -> Option<(f32, impl Iterator<Item = M::State> + 'a)> {
+        let chunk = self.chunks[..self.n_used].get(rollout / CHUNK)?;
+        let lane = rollout % CHUNK;
+        Some((chunk.costs.0[lane], self.states(map, chunk.controls_of(lane))))
     }
 
     /// The `n` cheapest rollouts of the last cycle over `map`, the cheapest first.

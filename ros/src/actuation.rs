@@ -1,5 +1,7 @@
 //! What the vehicle is told in the end: the bus's watchdog, and above it an emergency stop that waits for nobody.
 
+use std::collections::BTreeSet;
+
 use bicycle::{Applied, AppliedBy, Command, Decision, Limits, StopReason};
 
 use bus::ages::AgeLimits;
@@ -12,12 +14,21 @@ pub struct Actuation {
     watchdog: Watchdog,
     steering_rate_max_radps: f64,
     speed_limit_mps: f32,
-    is_stopped: bool,
+    halts: BTreeSet<Halt>,
     applied: Applied,
     /// Where the front wheels are by what they were told, and when [rad], [ns].
     steering: (f64, u64),
     /// When the odometry was measured that the last command was decided on [ns].
     decided_on_ns: u64,
+}
+
+/// Why the vehicle stands, whatever is commanded.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Halt {
+    /// Somebody has said so.
+    Emergency,
+    /// Another node of the same name commands it, too, and nobody knows which of the two it follows.
+    Namesake,
 }
 
 /// What to tell the vehicle.
@@ -40,7 +51,7 @@ impl Actuation {
             watchdog,
             steering_rate_max_radps: limits.steering_rate_max_radps,
             speed_limit_mps: f32::INFINITY,
-            is_stopped: false,
+            halts: BTreeSet::new(),
             steering: (0.0, 0),
             decided_on_ns: 0,
         }
@@ -56,13 +67,13 @@ impl Actuation {
     }
 
     /// From now on the vehicle stands, whatever is commanded.
-    pub fn stop(&mut self) {
-        self.is_stopped = true;
+    pub fn stop(&mut self, why: Halt) {
+        self.halts.insert(why);
     }
 
-    /// From now on commands count again.
-    pub fn release(&mut self) {
-        self.is_stopped = false;
+    /// From now on commands count again, unless it stands for another reason.
+    pub fn release(&mut self, why: Halt) {
+        self.halts.remove(&why);
     }
 
     /// From now on the vehicle is told no greater speed, either way [m/s]; as one that holds itself back, it says so with
@@ -82,7 +93,7 @@ impl Actuation {
             (decision, next) =
                 (Decision::Drive(command), Applied { command, since_ns: now_ns, by: AppliedBy::Vehicle });
         }
-        if self.is_stopped {
+        if !self.halts.is_empty() {
             decision = Decision::Stop(StopReason::EmergencyStop);
             let command = decision.command(self.applied.command);
             next = Applied { command, since_ns: now_ns, by: AppliedBy::Vehicle };
@@ -169,14 +180,14 @@ mod tests {
     fn an_emergency_stop_has_the_last_word_until_it_is_released() {
         let mut actuation = actuation();
         assert_eq!(actuation.carry_out(0).decision, Decision::Hold(HoldReason::NoMap));
-        actuation.stop();
+        actuation.stop(Halt::Emergency);
         actuation.admit(&drive(1.0, 0.2, 10 * STEP_NS), 10 * STEP_NS);
         let told = actuation.carry_out(10 * STEP_NS);
         assert_eq!(told.decision, Decision::Stop(StopReason::EmergencyStop));
         assert_eq!(told.command.speed_mps, 0.0);
         let record = actuation.complete(OdometryRecord::default(), 10 * STEP_NS);
         assert_eq!((record.applied_speed_mps, record.applied_by), (0.0, 1));
-        actuation.release();
+        actuation.release(Halt::Emergency);
         assert_eq!(actuation.carry_out(11 * STEP_NS).command.speed_mps, 1.0);
         assert_eq!(actuation.complete(OdometryRecord::default(), 11 * STEP_NS).applied_by, 0);
     }

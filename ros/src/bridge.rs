@@ -16,7 +16,7 @@ use bus::message::{CommandRecord, MissionRecord, Stamp};
 use bus::status::{Health, Meter, Role};
 use formats::{RobotRos, RobotSensor, RosClock};
 
-use crate::actuation::Actuation;
+use crate::actuation::{Actuation, Halt};
 use crate::cloud::{ClassLabels, Classes, GeometryClasses, LabelsError, Meaning};
 use crate::complaints::Complaints;
 use crate::environment::Discovery;
@@ -106,6 +106,8 @@ struct Bridge {
     meter: Meter,
     command_period_ns: u64,
     commanded_at_ns: u64,
+    /// When others of its name were looked for.
+    heeded_at_ns: u64,
     services: Services,
 }
 
@@ -141,6 +143,7 @@ impl Bridge {
             meter: Meter::new(bus, Role::Ros)?,
             command_period_ns: clock::nanoseconds(ros.command_hz.recip()),
             commanded_at_ns: 0,
+            heeded_at_ns: 0,
             services,
         })
     }
@@ -194,7 +197,7 @@ impl Bridge {
 
     /// The last word of a bridge that ends.
     fn stand(&mut self) -> Result<(), BridgeError> {
-        self.actuation.stop();
+        self.actuation.stop(Halt::Emergency);
         self.command(clock::now_ns())
     }
 
@@ -202,6 +205,7 @@ impl Bridge {
         let stamps = self.intake.clock();
         let stamp_ns = |at_ns: u64| stamps.stamp_ns(at_ns, arrival());
         self.voices.plan(&stamp_ns)?;
+        self.voices.futures(&stamp_ns)?;
         self.voices.maps(&stamp_ns)?;
         self.voices.moving(&stamp_ns)?;
         let diagnosis = saying::Diagnosis {

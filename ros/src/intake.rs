@@ -1,5 +1,6 @@
 //! What comes from the robot, as the bus says it: frames found, stamps told on the bus's clock, everything checked.
 
+mod globe;
 mod pace;
 
 use std::collections::BTreeMap;
@@ -11,6 +12,7 @@ use bus::clock;
 use bus::message::{ImuRecord, OdometryRecord};
 
 use crate::cloud::{self, LayoutError, Meaning, Sweep, Twist};
+use crate::globe::{Georeference, GlobeError};
 use crate::goals::{self, GoalError};
 use crate::message::{Imu, Odometry, Path, PointCloud2, PoseArray, PoseStamped, TfMessage};
 use crate::odometry::{self, Agreement, Disagreement, Frames, OdometryError};
@@ -52,6 +54,9 @@ pub enum IntakeError {
     /// It is nowhere to go to.
     #[error(transparent)]
     Goal(#[from] GoalError),
+    /// It tells nothing of where the map lies on the globe.
+    #[error(transparent)]
+    Globe(#[from] GlobeError),
     /// Of a cloud, no point could be used.
     #[error("data: expected returns of the sensor, found {found} points, none of which is a place")]
     NoReturn {
@@ -91,7 +96,7 @@ pub struct Clouds {
     pub sensors: Vec<(String, Isometry3<f64>)>,
 }
 
-/// Odometry that is farther from a cloud in time than this says nothing of how the vehicle moved meanwhile [ns].
+/// Odometry that is farther from a cloud or fix in time than this says nothing of how the vehicle moved meanwhile [ns].
 const MOTION_AGE_MAX_NS: u64 = 300_000_000;
 
 /// What is known of the robot's frames and clocks.
@@ -106,8 +111,9 @@ pub struct Intake {
     scanned_at_ns: u64,
     seen_at_ns: BTreeMap<String, u64>,
     felt_at_ns: u64,
-    /// How the vehicle moves, and the time that was told of [ns].
-    twist: Option<(u64, Twist)>,
+    /// Where the vehicle is and how it moves, and the time that was told of [ns].
+    told: Option<(u64, OdometryRecord)>,
+    georeference: Georeference,
     paces: Option<Paces>,
 }
 
@@ -132,7 +138,8 @@ impl Intake {
             scanned_at_ns: 0,
             seen_at_ns: BTreeMap::new(),
             felt_at_ns: 0,
-            twist: None,
+            told: None,
+            georeference: Georeference::default(),
             paces: None,
         }
     }
@@ -164,9 +171,7 @@ impl Intake {
             paces.odometry.check(at_ns)?;
         }
         self.agreement.check(&record, at_ns)?;
-        let [forward_mps, left_mps] = record.velocity_mps;
-        let velocity_mps = Vector3::new(forward_mps, left_mps, 0.0);
-        self.twist = Some((at_ns, Twist { velocity_mps, rate_radps: Vector3::z() * record.yaw_rate_radps }));
+        self.told = Some((at_ns, record));
         Ok((at_ns, record))
     }
 
@@ -188,7 +193,7 @@ impl Intake {
         let stamp_ns = cloud.header.stamp.nanoseconds();
         let at_ns = self.at_ns(stamp_ns, arrival)?;
         let frame = &cloud.header.frame_id;
-        let twist = self.twist.filter(|(told_at_ns, _)| told_at_ns.abs_diff(at_ns) <= MOTION_AGE_MAX_NS);
+        let twist = self.told_near(at_ns).map(|(_, record)| twist_of(&record));
         let late_s = self.late_s(frame, at_ns, twist.is_some())?;
         let Clouds { meaning, sensors } = &self.clouds;
         let (sensor, mounting, motion) = match sensors.iter().position(|(sensor, _)| sensor == frame) {
@@ -204,7 +209,7 @@ impl Intake {
         }
         let told = |after_s: f64| match twist {
             // From the sensor to the vehicle then, to the vehicle at the time that is told, and to the frame that is told.
-            Some((_, twist)) if after_s != late_s => {
+            Some(twist) if after_s != late_s => {
                 motion * mounting.inverse() * twist.over(after_s - late_s) * mounting
             }
             _ => motion,
@@ -219,6 +224,11 @@ impl Intake {
         self.scanned_at_ns = self.scanned_at_ns.max(at_ns);
         let origin_m = told(0.0).translation.vector.map(|axis_m| axis_m as f32).into();
         Ok(TakenScan { at_ns: self.scanned_at_ns, origin_m, sensor, sweep })
+    }
+
+    /// The newest odometry, if it was told of about this time.
+    fn told_near(&self, at_ns: u64) -> Option<(u64, OdometryRecord)> {
+        self.told.filter(|(told_at_ns, _)| told_at_ns.abs_diff(at_ns) <= MOTION_AGE_MAX_NS)
     }
 
     /// How much older a cloud is than the newest of another sensor [s]. What lies so far back that nobody knows how the
@@ -340,6 +350,13 @@ impl Intake {
         }
         Ok(told?)
     }
+}
+
+/// How the vehicle moves, in its own frame.
+fn twist_of(record: &OdometryRecord) -> Twist {
+    let [forward_mps, left_mps] = record.velocity_mps;
+    let velocity_mps = Vector3::new(forward_mps, left_mps, 0.0);
+    Twist { velocity_mps, rate_radps: Vector3::z() * record.yaw_rate_radps }
 }
 
 #[cfg(test)]

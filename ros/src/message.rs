@@ -5,6 +5,7 @@
 
 mod definition;
 mod diagnostic;
+mod geographic;
 mod geometry;
 mod grid_map;
 mod navigation;
@@ -15,6 +16,7 @@ use serde::{Deserialize, Serialize};
 
 pub use definition::Defined;
 pub use diagnostic::{DiagnosticArray, DiagnosticStatus, KeyValue};
+pub use geographic::{GeoPoint, GeoPose, GeoPoseStamped, NavSatFix, NavSatStatus};
 pub use geometry::{
     Point, Pose, PoseArray, PoseStamped, PoseWithCovariance, Quaternion, TfMessage, Transform,
     TransformStamped, Twist, TwistStamped, TwistWithCovariance, Vector3,

@@ -1,5 +1,7 @@
 //! A node of ROS 2: what it hears and what it says.
 
+mod namesakes;
+
 use std::net::{IpAddr, Ipv4Addr};
 
 use ros2_client::qos::{Durability, History, QosProfile, WhenFull};
@@ -7,9 +9,9 @@ use ros2_client::{
     Context, Gid, Message, MessageTypeName, Name, NodeName, NodeOptions, Publisher, Server, ServiceMapping,
     ServiceTypeName, Subscription,
 };
-use rustdds::DomainParticipantBuilder;
 use rustdds::mio1::event::Source;
 use rustdds::mio1::{Events, Interest, Poll, Token};
+use rustdds::{DomainParticipantBuilder, DomainParticipantStatusListener, StatusEvented};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use std::time::Duration;
@@ -17,6 +19,7 @@ use std::time::Duration;
 use crate::environment::{Discovery, Range};
 use crate::message::Named;
 use crate::quality::{Mismatch, Quality};
+use namesakes::Namesakes;
 
 /// Messages of one topic that are taken in at one look: whoever floods a topic keeps no other waiting.
 const BATCH: usize = 64;
@@ -173,7 +176,9 @@ pub(crate) struct Node {
     events: Events,
     n_ears: usize,
     full_name: String,
+    events_of_others: DomainParticipantStatusListener,
     quality: Quality,
+    namesakes: Namesakes,
 }
 
 impl Node {
@@ -194,12 +199,14 @@ impl Node {
         let participant = builder.build().map_err(|error| refused(error.to_string()))?;
         let context =
             Context::from_domain_participant(participant).map_err(|error| refused(error.to_string()))?;
-        let quality = Quality::new(context.domain_participant().status_listener());
+        let events_of_others = context.domain_participant().status_listener();
         let options = NodeOptions::new().enable_rosout(false);
-        let node = context.new_node(named, options).map_err(|error| refused(error.to_string()))?;
+        let mut node = context.new_node(named, options).map_err(|error| refused(error.to_string()))?;
         let poll = Poll::new().map_err(|error| refused(error.to_string()))?;
         let full_name = absolute(namespace, name);
-        Ok(Self { node, poll, events: Events::with_capacity(64), n_ears: 0, full_name, quality })
+        let namesakes = Namesakes::new(&context, &mut node, &full_name)?;
+        let (events, quality) = (Events::with_capacity(64), Quality::default());
+        Ok(Self { node, poll, events, n_ears: 0, full_name, events_of_others, quality, namesakes })
     }
 
     /// Namespace and name.
@@ -208,8 +215,18 @@ impl Node {
     }
 
     /// Ends of its topics that cannot be joined to those of others, found since the last look.
-    pub(crate) fn mismatches(&self) -> Vec<(String, Mismatch)> {
-        self.quality.mismatches()
+    pub(crate) fn mismatches(&mut self) -> Vec<(String, Mismatch)> {
+        let mut found = Vec::new();
+        while let Some(event) = self.events_of_others.try_recv_status() {
+            self.namesakes.follow(&event);
+            found.extend(self.quality.mismatch(event));
+        }
+        found
+    }
+
+    /// How many other nodes of its name there are.
+    pub(crate) fn n_namesakes(&mut self) -> usize {
+        self.namesakes.look()
     }
 
     /// Listens to a topic; to none of an empty name.

@@ -2,9 +2,7 @@
 //! nothing else says so.
 
 use rustdds::policy::{Durability, Reliability};
-use rustdds::{
-    DomainParticipantStatusEvent, DomainParticipantStatusListener, GUID, QosPolicies, StatusEvented,
-};
+use rustdds::{DomainParticipantStatusEvent, GUID, QosPolicies};
 
 /// Two ends of a topic that cannot be joined. Every message is one line.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -33,16 +31,12 @@ pub(crate) enum Mismatch {
 }
 
 /// Looks for such ends among those of one node.
+#[derive(Default)]
 pub(crate) struct Quality {
-    listener: DomainParticipantStatusListener,
     endpoints: Vec<(GUID, String)>,
 }
 
 impl Quality {
-    pub(crate) fn new(listener: DomainParticipantStatusListener) -> Self {
-        Self { listener, endpoints: Vec::new() }
-    }
-
     /// Looks at a topic from now on, by the first end of it: a second one hears who the first does not.
     pub(crate) fn watch(&mut self, endpoint: GUID, topic: &str) {
         if self.endpoints.iter().all(|(_, watched)| watched != topic) {
@@ -50,13 +44,8 @@ impl Quality {
         }
     }
 
-    /// What has been found since the last look, each with its topic.
-    pub(crate) fn mismatches(&self) -> Vec<(String, Mismatch)> {
-        let events = std::iter::from_fn(|| self.listener.try_recv_status());
-        events.filter_map(|event| self.mismatch(event)).collect()
-    }
-
-    fn mismatch(&self, event: DomainParticipantStatusEvent) -> Option<(String, Mismatch)> {
+    /// What an event tells of, with its topic.
+    pub(crate) fn mismatch(&self, event: DomainParticipantStatusEvent) -> Option<(String, Mismatch)> {
         use DomainParticipantStatusEvent::{RemoteReaderQosIncompatible, RemoteWriterQosIncompatible};
         let (endpoint, mismatch) = match event {
             RemoteWriterQosIncompatible { local_reader, requested_qos, offered_qos, .. } => {

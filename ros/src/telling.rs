@@ -15,7 +15,7 @@ use crate::message::{
 };
 use crate::rigid;
 pub use layers::grid_map;
-pub use markers::{moving, plan as plan_markers};
+pub use markers::{futures, moving, plan as plan_markers};
 pub use measured::{cloud, imu, odometry, transforms};
 
 /// Occupancy of a cell that must not be touched.

@@ -132,6 +132,20 @@ class Pose(IdlStruct, typename="surefoot_test::Pose"):
 
 
 @dataclass
+class GeoPose(IdlStruct, typename="geographic_msgs::msg::dds_::GeoPose_"):
+    latitude: float64
+    longitude: float64
+    altitude: float64
+    orientation: Quaternion
+
+
+@dataclass
+class GeoPoseStamped(IdlStruct, typename="geographic_msgs::msg::dds_::GeoPoseStamped_"):
+    header: Header
+    pose: GeoPose
+
+
+@dataclass
 class Dimension(IdlStruct, typename="std_msgs::msg::dds_::MultiArrayDimension_"):
     label: str
     size: uint32

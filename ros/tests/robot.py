@@ -1,6 +1,6 @@
 """A robot of ROS 2 as others build them: a node of rclpy with a simple vehicle on a plain with one rock in the way.
 
-It tells odometry and clouds, follows TwistStamped, and stops when the last command is of a time too long ago. Told lines
+It tells odometry, clouds and where it is on the globe, follows TwistStamped, and stops when the last command is of a time too long ago. Told lines
 on standard input, it breaks what it says; see `BREAKS`. Every 0.1 s it says on standard output where it is.
 """
 
@@ -16,7 +16,7 @@ from nav_msgs.msg import Odometry
 from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from rclpy.qos import qos_profile_sensor_data
-from sensor_msgs.msg import Imu, PointCloud2, PointField
+from sensor_msgs.msg import Imu, NavSatFix, PointCloud2, PointField
 
 PERIOD_S = 0.02
 CYCLES_PER_SCAN = 20
@@ -28,6 +28,11 @@ LAG_S = 0.2
 SENSOR_M = (0.12, 0.0, 0.40)
 ROCK_M, ROCK_RADIUS_M, ROCK_HEIGHT_M = (2.5, 0.1), 0.35, 0.5
 GROUND, ROCK = 1, 9
+# Where its map begins on the globe, and how far to the left of east its x axis points.
+ORIGIN_DEG, MAP_YAW_RAD = (46.5, 7.25), math.radians(40.0)
+# Metres of a degree there, 500 m above the ellipsoid, by its radii of curvature.
+NORTH_M_PER_DEG, EAST_M_PER_DEG = 111_169.8, 76_768.6
+FIX_DEVIATION_M = 0.02
 # What a line on standard input may ask for.
 BREAKS = {"whole", "silent cloud", "cloud of nan", "cloud without z", "odometry of another clock", "odometry of nan"}
 
@@ -79,6 +84,13 @@ class Vehicle:
         return np.where(is_met, along_m - depth_m, np.inf)
 
 
+def on_globe(x_m: float, y_m: float) -> tuple[float, float]:
+    """Latitude and longitude of a place of its map [deg]."""
+    east_m = x_m * math.cos(MAP_YAW_RAD) - y_m * math.sin(MAP_YAW_RAD)
+    north_m = x_m * math.sin(MAP_YAW_RAD) + y_m * math.cos(MAP_YAW_RAD)
+    return ORIGIN_DEG[0] + north_m / NORTH_M_PER_DEG, ORIGIN_DEG[1] + east_m / EAST_M_PER_DEG
+
+
 class Robot(Node):
     def __init__(self) -> None:
         super().__init__("robot", namespace="/car")
@@ -90,6 +102,7 @@ class Robot(Node):
         self.n_commands = 0
         self.odometry = self.create_publisher(Odometry, "odom", 10)
         self.cloud = self.create_publisher(PointCloud2, "points", qos_profile_sensor_data)
+        self.fix = self.create_publisher(NavSatFix, "fix", qos_profile_sensor_data)
         self.imu = self.create_publisher(Imu, "imu", qos_profile_sensor_data)
         self.create_subscription(TwistStamped, "command", self.hear, 10)
         self.create_timer(PERIOD_S, self.work)
@@ -109,6 +122,7 @@ class Robot(Node):
         if self.cycle % CYCLES_PER_SCAN == 0 and self.broken != "silent cloud":
             self.tell_cloud(stamp)
         if self.cycle % CYCLES_PER_WORD == 0:
+            self.tell_fix(stamp)
             vehicle = self.vehicle
             place = {"x_m": vehicle.x_m, "y_m": vehicle.y_m, "speed_mps": vehicle.speed_mps}
             print(json.dumps({**place, "commands": self.n_commands, "command_age_s": min(age_s, 1e9)}), flush=True)
@@ -135,6 +149,13 @@ class Robot(Node):
         told.angular_velocity.z = self.vehicle.yaw_rate_radps
         told.linear_acceleration.z = 9.81
         self.imu.publish(told)
+
+    def tell_fix(self, stamp) -> None:
+        told = NavSatFix(altitude=500.0, position_covariance_type=NavSatFix.COVARIANCE_TYPE_DIAGONAL_KNOWN)
+        told.header.stamp, told.header.frame_id = stamp, "base_link"
+        told.latitude, told.longitude = on_globe(self.vehicle.x_m, self.vehicle.y_m)
+        told.position_covariance[0] = told.position_covariance[4] = FIX_DEVIATION_M**2
+        self.fix.publish(told)
 
     def tell_cloud(self, stamp) -> None:
         returns = self.vehicle.returns()

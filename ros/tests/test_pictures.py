@@ -1,4 +1,4 @@
-"""What operators look at: the ground and its risks as layers, the plan as markers."""
+"""What operators look at: the ground and its risks as layers, the plan and what else was tried as markers."""
 
 import math
 
@@ -43,10 +43,30 @@ def test_the_plan_is_told_as_a_line_that_begins_at_the_robot(loop, node):
     told = []
     node.create_subscription(MarkerArray, "markers", told.append, 10)
     operator.goal(GOAL_M)
-    until(lambda: robot.drives() and told, 30, "the robot drives and tells how")
-    line = told[-1].markers[0]
-    assert (line.ns, line.type, line.header.frame_id) == ("plan", line.LINE_STRIP, "odom")
+    plans = lambda: [message.markers[0] for message in told if message.markers[0].ns == "plan"]
+    until(lambda: robot.drives() and plans(), 30, "the robot drives and tells how")
+    line = plans()[-1]
+    assert (line.type, line.header.frame_id) == (line.LINE_STRIP, "odom")
     assert len(line.points) == len(line.colors) > 5
     assert robot.distance_m((line.points[0].x, line.points[0].y)) < 0.5
     length_m = math.dist((line.points[0].x, line.points[0].y), (line.points[-1].x, line.points[-1].y))
     assert length_m > 0.5, "it leads somewhere"
+
+
+def test_futures_that_were_tried_are_told_as_lines_that_part_from_the_robot(loop, node):
+    robot, _, operator = loop
+    told = []
+    node.create_subscription(MarkerArray, "markers", told.append, 50)
+    operator.goal(GOAL_M)
+    futures = lambda: [message.markers for message in told if message.markers[0].ns == "futures"]
+    until(lambda: robot.drives() and futures(), 30, "the robot drives and tells what else it tried")
+    lines = futures()[-1]
+    assert [line.id for line in lines] == list(range(32))
+    begin, ends = lines[0].points[0], [line.points[-1] for line in lines]
+    assert robot.distance_m((begin.x, begin.y)) < 0.7
+    assert all(line.points[0] == begin for line in lines), "all begin where the vehicle is"
+    assert len({(end.x, end.y) for end in ends}) == len(ends), "no two are one"
+    green = {line.color.g for line in lines}
+    assert len(green) > 8, "and their colours tell what they cost"
+    seconds = [stamped.header.stamp.sec + 1e-9 * stamped.header.stamp.nanosec for stamped, *_ in futures()]
+    assert all(later - earlier > 0.4 for earlier, later in zip(seconds, seconds[1:])), "twice a second"

@@ -3,7 +3,10 @@
 use std::sync::Arc;
 
 use bicycle::{Decision, ImuSample, Model, State};
+use mppi::{Controller, StepCost};
 use navigator::{Config, Pilot, PilotAges, RiskMapSource, RiskMessage, RiskMessages};
+
+use traversability::RiskMapView;
 
 use crate::RuntimeError;
 use crate::budget::Budget;
@@ -12,19 +15,24 @@ use crate::convert::{
 };
 use bus::ages::AgeLimits;
 use bus::channel::{
-    Bus, COMMAND, Counts, DECISION, IMU, Inlet, MISSION, Message, ODOMETRY, Outlet, PLAN, RISK, RISK_PHYSICS,
-    STUCK, TRACKS,
+    Bus, COMMAND, Counts, DECISION, FUTURES, IMU, Inlet, MISSION, Message, ODOMETRY, Outlet, PLAN, RISK,
+    RISK_PHYSICS, STUCK, TRACKS,
 };
 use bus::clock::{self, Clock, Cycle};
 use bus::message::{
-    CommandRecord, DecisionRecord, ImuRecord, MissionRecord, OdometryRecord, PlanRecord, RiskHeader, Stamp,
-    StuckRecord, TrackRecord, TracksHeader,
+    CommandRecord, DecisionRecord, FutureRecord, ImuRecord, MissionRecord, OdometryRecord, PlanRecord,
+    RiskHeader, Stamp, StuckRecord, TrackRecord, TracksHeader,
 };
 use bus::payload::risk_views;
 use bus::status::{Health, Meter, Role};
 
 /// Share of the period that a decision may take; the rest is for what else the processor does.
 const BUDGET_SHARE: f64 = 0.5;
+
+/// Futures that are told of those that were tried.
+const FUTURES_TOLD: usize = 32;
+/// Time between two tellings of them [ns].
+const FUTURES_PERIOD_NS: u64 = 500_000_000;
 
 /// What controls.
 pub struct ControlSetup {
@@ -66,6 +74,9 @@ pub struct Control {
     commands: Outlet<Stamp, CommandRecord>,
     decisions: Outlet<Stamp, DecisionRecord>,
     plans: Outlet<Stamp, PlanRecord>,
+    futures: Outlet<Stamp, FutureRecord>,
+    /// When futures were told last [ns].
+    futures_at_ns: u64,
     stuck: Outlet<Stamp, StuckRecord>,
     meter: Meter,
 }
@@ -164,6 +175,8 @@ impl Control {
             commands: bus.outlet(&COMMAND, 1)?,
             decisions: bus.outlet(&DECISION, 1)?,
             plans: bus.outlet(&PLAN, n_steps + 1)?,
+            futures: bus.outlet(&FUTURES, FUTURES_TOLD * (n_steps + 1))?,
+            futures_at_ns: 0,
             stuck: bus.outlet(&STUCK, 1)?,
             meter: Meter::new(bus, Role::Control)?,
         })
@@ -197,7 +210,7 @@ impl Control {
         Ok(())
     }
 
-    /// Where the plan leads over the map that it was made on.
+    /// Where the plan leads over the map that it was made on, and now and then, where others would have led.
     fn tell_plan(&mut self, source: RiskMapSource, at_ns: u64) -> Result<(), RuntimeError> {
         let Inputs { learned, physics, .. } = &self.inputs;
         let map = match source {
@@ -206,6 +219,13 @@ impl Control {
         };
         let views = map.held.as_ref().and_then(|map| risk_views(map.header(), map.payload()));
         let Some((view, _)) = views else { return Ok(()) };
+        if at_ns.saturating_sub(self.futures_at_ns) >= FUTURES_PERIOD_NS {
+            self.futures_at_ns = at_ns;
+            let mut places = futures(self.pilot.controller(), view);
+            let n_max = self.futures.n_max();
+            let loan = self.futures.write(n_max, |_| places.next().unwrap_or_default())?;
+            self.futures.send(loan, at_ns)?;
+        }
         let mut states = self.pilot.controller().nominal_states(view);
         let place = |state: State| PlanRecord {
             position_m: [state.x_m, state.y_m],
@@ -241,4 +261,18 @@ impl Control {
             .with(inputs.imu.as_ref().map_or(&Counts::default(), Inlet::counts))
         })?)
     }
+}
+
+/// Every so many of the futures of the last decision, place by place.
+fn futures<'a>(
+    controller: &'a Controller<Model, impl StepCost>,
+    map: RiskMapView<'a>,
+) -> impl Iterator<Item = FutureRecord> + 'a {
+    // Whole blocks of 64 are sampled, so that there are always as many.
+    let stride = controller.n_rollouts() / FUTURES_TOLD;
+    let told = (0..FUTURES_TOLD).filter_map(move |k| Some((k, controller.sampled_states(k * stride, map)?)));
+    told.flat_map(|(number, (cost_s, states))| {
+        let (cost_s, number) = (f64::from(cost_s), number as u64);
+        states.map(move |State { x_m, y_m, .. }| FutureRecord { position_m: [x_m, y_m], cost_s, number })
+    })
 }

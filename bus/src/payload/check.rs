@@ -8,9 +8,9 @@ use super::risk_views;
 use crate::channel::{FUTURE_NS, Refusal};
 use crate::message::mission::EMERGENCY_STOP;
 use crate::message::{
-    CheckpointHeader, CommandRecord, ImuRecord, MissionRecord, OdometryRecord, OrderHeader, PlanRecord,
-    PointRecord, RiskHeader, ScanHeader, Stamp, StuckRecord, SurfaceHeader, TRACKS_MAX, TrackRecord,
-    TracksHeader,
+    CheckpointHeader, CommandRecord, FutureRecord, ImuRecord, MissionRecord, OdometryRecord, OrderHeader,
+    PlanRecord, PointRecord, RiskHeader, ScanHeader, Stamp, StuckRecord, SurfaceHeader, TRACKS_MAX,
+    TrackRecord, TracksHeader,
 };
 
 fn check_one<T>(payload: &[T]) -> Result<&T, Refusal> {
@@ -64,6 +64,15 @@ pub(crate) fn check_plan(_: &Stamp, places: &[PlanRecord]) -> Result<(), Refusal
     let is_finite = |place: &PlanRecord| {
         let [x_m, y_m] = place.position_m;
         [x_m, y_m, place.yaw_rad, place.speed_mps].iter().all(|value| value.is_finite())
+    };
+    require(places.iter().all(is_finite), Refusal::NonFinite)
+}
+
+pub(crate) fn check_futures(_: &Stamp, places: &[FutureRecord]) -> Result<(), Refusal> {
+    require(!places.is_empty(), Refusal::Malformed)?;
+    let is_finite = |place: &FutureRecord| {
+        let [x_m, y_m] = place.position_m;
+        [x_m, y_m, place.cost_s].iter().all(|value| value.is_finite())
     };
     require(places.iter().all(is_finite), Refusal::NonFinite)
 }

@@ -146,6 +146,10 @@ pub struct RosTopics {
     pub goal: String,
     /// `geometry_msgs/PoseArray`, in: goals, one after the other.
     pub goals: String,
+    /// `geographic_msgs/GeoPoseStamped`, in: a goal in latitude and longitude.
+    pub goal_on_globe: String,
+    /// `sensor_msgs/NavSatFix`, in: where the vehicle is on the globe.
+    pub fix: String,
     /// `nav_msgs/Path`, in: a path to be followed.
     pub path: String,
     /// `std_msgs/Bool`, in: true stops, false after it resets.
@@ -172,6 +176,7 @@ impl Default for RosTopics {
             ["odom", "points", "imu", "/tf", "/tf_static", "/clock"].map(str::to_owned);
         let [goal, goals, path, emergency_stop, pause] =
             ["goal_pose", "goals", "path", "emergency_stop", "pause"].map(str::to_owned);
+        let [goal_on_globe, fix] = ["goal_on_globe", "fix"].map(str::to_owned);
         let [command, plan, risk, markers, diagnostics] =
             ["command", "plan", "risk", "markers", "/diagnostics"].map(str::to_owned);
         let points = vec![points];
@@ -184,6 +189,8 @@ impl Default for RosTopics {
             clock,
             goal,
             goals,
+            goal_on_globe,
+            fix,
             path,
             emergency_stop,
             pause,

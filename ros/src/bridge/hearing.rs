@@ -3,16 +3,20 @@
 use std::fmt::Display;
 
 use bus::channel::{Bus, ChannelError, IMU, ODOMETRY, Outlet, SCAN};
-use bus::clock;
+use bus::clock::{self, SECOND_NS};
 use bus::message::{ImuRecord, OdometryRecord, PointRecord, ScanHeader, Stamp};
 use formats::RosTopics;
 use ros2_client::Gid;
 
 use super::{Bridge, BridgeError, arrival};
+use crate::actuation::Halt;
 use crate::alarm::{Alarm, Turn};
 use crate::complaints::Complaints;
 use crate::intake::{IntakeError, TakenScan};
-use crate::message::{Bool, Clock, Imu, Odometry, Path, PointCloud2, PoseArray, PoseStamped, TfMessage};
+use crate::message::{
+    Bool, Clock, GeoPoseStamped, Imu, NavSatFix, Odometry, Path, PointCloud2, PoseArray, PoseStamped,
+    TfMessage,
+};
 use crate::node::{Ear, Hearing, Node};
 use crate::orders::Order;
 
@@ -31,6 +35,8 @@ pub(super) struct Ears {
     clock: Option<Ear<Clock>>,
     goal: Option<Ear<PoseStamped>>,
     goals: Option<Ear<PoseArray>>,
+    goal_on_globe: Option<Ear<GeoPoseStamped>>,
+    fix: Option<Ear<NavSatFix>>,
     path: Option<Ear<Path>>,
     emergency: Vec<Ear<Bool>>,
     alarm: Alarm<Gid>,
@@ -72,6 +78,8 @@ impl Ears {
             clock: node.listen(&topics.clock, Hearing::Loose(8))?,
             goal: node.listen(&topics.goal, Hearing::Sure(8))?,
             goals: node.listen(&topics.goals, Hearing::Sure(8))?,
+            goal_on_globe: node.listen(&topics.goal_on_globe, Hearing::Sure(8))?,
+            fix: node.listen(&topics.fix, Hearing::Loose(8))?,
             path: node.listen(&topics.path, Hearing::Sure(8))?,
             emergency,
             alarm: Alarm::default(),
@@ -127,12 +135,31 @@ impl Bridge {
         for (topic, mismatch) in self.node.mismatches() {
             refused.note(&topic, &mismatch);
         }
+        self.heed_namesakes(&mut refused);
         self.hear_emergency(&mut refused);
         self.hear_frames(&mut refused);
         let heard = self.hear_measurements(&mut refused);
         self.hear_orders(&mut refused);
         self.complaints = complaints;
         Ok(heard?)
+    }
+
+    /// Once a second.
+    fn heed_namesakes(&mut self, refused: &mut Refused<'_>) {
+        let now_ns = clock::now_ns();
+        if now_ns.saturating_sub(self.heeded_at_ns) < SECOND_NS {
+            return;
+        }
+        self.heeded_at_ns = now_ns;
+        let found = self.node.n_namesakes();
+        if found == 0 {
+            return self.actuation.release(Halt::Namesake);
+        }
+        self.actuation.stop(Halt::Namesake);
+        let why = format!(
+            "expected no other node of this name, found {found}; the vehicle stands until there is none"
+        );
+        refused.note(&format!("node {}", self.node.full_name()), &why);
     }
 
     fn hear_emergency(&mut self, refused: &mut Refused<'_>) {
@@ -147,11 +174,11 @@ impl Bridge {
             // The vehicle stands before anybody has answered.
             match self.ears.alarm.hear(origin.publisher, origin.sequence, is_emergency) {
                 Some(Turn::On) => {
-                    self.actuation.stop();
+                    self.actuation.stop(Halt::Emergency);
                     self.order(Order::EmergencyStop, refused);
                 }
                 Some(Turn::Off) => {
-                    self.actuation.release();
+                    self.actuation.release(Halt::Emergency);
                     self.order(Order::Reset, refused);
                 }
                 None => {}
@@ -182,6 +209,11 @@ impl Bridge {
                 ears.odometry_at_ns = Some(at_ns);
             }
         }
+        // After the odometry of about the same time.
+        for fix in heard(&mut ears.fix, refused) {
+            ears.n_heard += 1;
+            refused.kept("fix", intake.fix(&fix, arrival()));
+        }
         let mut samples = Vec::new();
         for imu in heard(&mut ears.imu, refused) {
             ears.n_heard += 1;
@@ -209,6 +241,11 @@ impl Bridge {
         }
         for goals in heard(&mut self.ears.goals, refused) {
             if let Some(places_m) = refused.kept("goals", self.intake.goals(&goals)) {
+                self.order(Order::Goals(places_m), refused);
+            }
+        }
+        for goal in heard(&mut self.ears.goal_on_globe, refused) {
+            if let Some(places_m) = refused.kept("goal on globe", self.intake.goal_on_globe(&goal)) {
                 self.order(Order::Goals(places_m), refused);
             }
         }

@@ -2,9 +2,9 @@
 
 use bicycle::{Command, Decision, Limits, Vehicle};
 use bus::ages::Periods;
-use bus::channel::{Bus, Inlet, PLAN, RISK, RISK_PHYSICS, TRACKS};
+use bus::channel::{Bus, FUTURES, Inlet, PLAN, RISK, RISK_PHYSICS, TRACKS};
 use bus::clock::{self, SECOND_NS};
-use bus::message::{MissionRecord, PlanRecord, RiskHeader, Stamp, TrackRecord, TracksHeader};
+use bus::message::{FutureRecord, MissionRecord, PlanRecord, RiskHeader, Stamp, TrackRecord, TracksHeader};
 use bus::payload::risk_views;
 use formats::{RobotRos, RosCommand};
 
@@ -40,6 +40,7 @@ pub(super) struct Voices {
     markers: Option<Voice<MarkerArray>>,
     diagnostics: Option<Voice<DiagnosticArray>>,
     plans: Inlet<Stamp, PlanRecord>,
+    futures: Inlet<Stamp, FutureRecord>,
     maps: [Inlet<RiskHeader, [f32; 4]>; 2],
     heights: Heights,
     tracks: Inlet<TracksHeader, TrackRecord>,
@@ -86,6 +87,7 @@ impl Voices {
             markers: node.speak(&topics.markers, Saying::Passing)?,
             diagnostics: node.speak(&topics.diagnostics, Saying::Passing)?,
             plans: bus.inlet(&PLAN)?,
+            futures: bus.inlet(&FUTURES)?,
             maps: [bus.inlet(&RISK)?, bus.inlet(&RISK_PHYSICS)?],
             heights: Heights::new(bus)?,
             tracks: bus.inlet(&TRACKS)?,
@@ -122,6 +124,17 @@ impl Voices {
         }
         let Some(voice) = &self.markers else { return Ok(()) };
         voice.say(telling::plan_markers(header, &places, self.limits.speed_max_mps))
+    }
+
+    /// What else was tried.
+    pub(super) fn futures(&mut self, stamp_ns: &StampNs<'_>) -> Result<(), NodeError> {
+        let Self { markers: Some(voice), futures, map_frame, .. } = self else { return Ok(()) };
+        let mut newest = None;
+        futures.poll(|stamp, places| {
+            let stamp_ns = stamp_ns(stamp.valid_at_ns);
+            newest = stamp_ns.map(|stamp_ns| telling::futures(&header(map_frame, stamp_ns), places));
+        });
+        newest.map_or(Ok(()), |told| voice.say(told))
     }
 
     /// What moves.

@@ -1,3 +1,4 @@
+mod globe;
 mod sensors;
 
 use super::*;
