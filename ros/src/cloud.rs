@@ -73,9 +73,13 @@ pub fn sweep(
     };
     let layout = Layout::new(cloud, label, times.as_ref().map(|times| times.field.as_str()))?;
     let stride = layout.n_points().div_ceil(n_max.max(1)).max(1);
-    let mut sweep = Sweep::default();
-    // Points of one firing have one time.
-    let mut moment = (0.0, motion(0.0));
+    let mut sweep = Sweep { points: Vec::with_capacity(layout.n_points() / stride), ..Sweep::default() };
+    // Points of one firing have one time. A matrix turns a point by less work than a quaternion.
+    let at = |after_s: f64| {
+        let motion = motion(after_s);
+        (after_s, motion.rotation.to_rotation_matrix(), motion.translation)
+    };
+    let mut moment = at(0.0);
     for place in (0..layout.n_points()).step_by(stride) {
         let Read { position_m, label, time } = layout.point(&cloud.data, place);
         let range_m = position_m.iter().fold(0.0_f32, |range_m, axis_m| range_m.max(axis_m.abs()));
@@ -93,10 +97,11 @@ pub fn sweep(
         if let Some((times, time)) = times.as_ref().zip(time) {
             let after_s = offset_s(times, time, cloud.header.stamp.nanoseconds())?;
             if after_s != moment.0 {
-                moment = (after_s, motion(after_s));
+                moment = at(after_s);
             }
         }
-        let moved = moment.1 * Point3::from(position_m.map(f64::from));
+        let (_, rotation, translation) = &moment;
+        let moved = translation * (rotation * Point3::from(position_m.map(f64::from)));
         let position_m = [moved.x, moved.y, moved.z].map(|axis_m| axis_m as f32);
         sweep.points.push(PointRecord { position_m, class_number });
     }

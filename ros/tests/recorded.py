@@ -8,7 +8,7 @@ from nav_msgs.msg import OccupancyGrid, Odometry
 from nav_msgs.msg import Path as Way
 from rclpy.serialization import serialize_message
 from rosgraph_msgs.msg import Clock
-from sensor_msgs.msg import Imu, PointCloud2, PointField
+from sensor_msgs.msg import Imu, NavSatFix, PointCloud2, PointField
 from std_msgs.msg import Bool, ColorRGBA, Header
 from visualization_msgs.msg import Marker, MarkerArray
 
@@ -48,6 +48,13 @@ def imu() -> Imu:
     return told
 
 
+def fix() -> NavSatFix:
+    told = NavSatFix(header=header("antenna"), latitude=46.5, longitude=-7.25, altitude=512.0)
+    told.status.status, told.status.service = 2, 5
+    told.position_covariance[0], told.position_covariance[8], told.position_covariance_type = 0.25, 4.0, 2
+    return told
+
+
 def grid() -> OccupancyGrid:
     told = OccupancyGrid(header=header("map"), data=[0, 100, -1])
     told.info.resolution, told.info.width, told.info.height, told.info.origin = 0.25, 3, 1, pose(-1.0)
@@ -83,6 +90,7 @@ def messages() -> dict:
         "odometry": odometry(),
         "point_cloud": cloud(),
         "imu": imu(),
+        "nav_sat_fix": fix(),
         "pose_stamped": stamped,
         "pose_array": PoseArray(header=header("map"), poses=[pose(1.0), pose(-1.0)]),
         "path": Way(header=header("odom"), poses=[stamped]),

@@ -16,7 +16,7 @@ from nav_msgs.msg import Odometry
 from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from rclpy.qos import qos_profile_sensor_data
-from sensor_msgs.msg import Imu, NavSatFix, PointCloud2, PointField
+from sensor_msgs.msg import Imu, NavSatFix, NavSatStatus, PointCloud2, PointField
 
 PERIOD_S = 0.02
 CYCLES_PER_SCAN = 20
@@ -153,6 +153,7 @@ class Robot(Node):
     def tell_fix(self, stamp) -> None:
         told = NavSatFix(altitude=500.0, position_covariance_type=NavSatFix.COVARIANCE_TYPE_DIAGONAL_KNOWN)
         told.header.stamp, told.header.frame_id = stamp, "base_link"
+        told.status.status = NavSatStatus.STATUS_FIX
         told.latitude, told.longitude = on_globe(self.vehicle.x_m, self.vehicle.y_m)
         told.position_covariance[0] = told.position_covariance[4] = FIX_DEVIATION_M**2
         self.fix.publish(told)

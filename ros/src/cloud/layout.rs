@@ -1,5 +1,7 @@
 //! Where the numbers of a cloud's points lie.
 
+use byteorder::{BigEndian, ByteOrder, LittleEndian};
+
 use crate::message::{PointCloud2, PointField};
 
 /// Longest that a sweep is believed to last [s].
@@ -118,6 +120,20 @@ impl Kind {
             Self::F64 => 8,
         }
     }
+
+    /// The number that the bytes begin with.
+    fn read<Order: ByteOrder>(self, bytes: &[u8]) -> f64 {
+        match self {
+            Self::I8 => f64::from(bytes[0] as i8),
+            Self::U8 => f64::from(bytes[0]),
+            Self::I16 => f64::from(Order::read_i16(bytes)),
+            Self::U16 => f64::from(Order::read_u16(bytes)),
+            Self::I32 => f64::from(Order::read_i32(bytes)),
+            Self::U32 => f64::from(Order::read_u32(bytes)),
+            Self::F32 => f64::from(Order::read_f32(bytes)),
+            Self::F64 => Order::read_f64(bytes),
+        }
+    }
 }
 
 /// A point as it stands in a cloud.
@@ -182,23 +198,8 @@ impl Layout {
     }
 
     fn number(&self, point: &[u8], Number { offset, kind }: Number) -> f64 {
-        let size = kind.size();
-        let mut bytes = [0_u8; 8];
-        bytes[..size].copy_from_slice(&point[offset..offset + size]);
-        if self.is_bigendian {
-            bytes[..size].reverse();
-        }
-        let [a, b, c, d, ..] = bytes;
-        match kind {
-            Kind::I8 => f64::from(a as i8),
-            Kind::U8 => f64::from(a),
-            Kind::I16 => f64::from(i16::from_le_bytes([a, b])),
-            Kind::U16 => f64::from(u16::from_le_bytes([a, b])),
-            Kind::I32 => f64::from(i32::from_le_bytes([a, b, c, d])),
-            Kind::U32 => f64::from(u32::from_le_bytes([a, b, c, d])),
-            Kind::F32 => f64::from(f32::from_le_bytes([a, b, c, d])),
-            Kind::F64 => f64::from_le_bytes(bytes),
-        }
+        let bytes = &point[offset..];
+        if self.is_bigendian { kind.read::<BigEndian>(bytes) } else { kind.read::<LittleEndian>(bytes) }
     }
 }
 

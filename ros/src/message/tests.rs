@@ -58,6 +58,17 @@ fn what_the_robot_says_is_read_as_rclpy_writes_it() {
     imu.angular_velocity = vector([0.1, 0.2, 0.3]);
     imu.linear_acceleration = vector([1.0, 2.0, 9.81]);
     same(recorded!("imu"), imu);
+    let mut fix = NavSatFix {
+        header: header("antenna"),
+        status: NavSatStatus { status: 2, service: 5 },
+        latitude: 46.5,
+        longitude: -7.25,
+        altitude: 512.0,
+        position_covariance_type: 2,
+        ..NavSatFix::default()
+    };
+    (fix.position_covariance[0], fix.position_covariance[8]) = (0.25, 4.0);
+    same(recorded!("nav_sat_fix"), fix);
     let field =
         |name: &str, offset, datatype, count| PointField { name: name.into(), offset, datatype, count };
     let cloud = PointCloud2 {

@@ -1,6 +1,6 @@
 //! Fixes of an antenna beside the middle of a vehicle that turns and drives, and goals in degrees.
 
-use crate::message::{GeoPoint, GeoPose, NavSatStatus};
+use crate::message::{GeoPoint, GeoPose, GeoPoseStamped, NavSatFix, NavSatStatus};
 
 use super::*;
 
