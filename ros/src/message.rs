@@ -7,6 +7,7 @@ mod definition;
 mod diagnostic;
 mod geometry;
 mod grid_map;
+mod navigate;
 mod navigation;
 mod sensor;
 mod visualization;
@@ -20,6 +21,7 @@ pub use geometry::{
     TransformStamped, Twist, TwistStamped, TwistWithCovariance, Vector3,
 };
 pub use grid_map::{Float32MultiArray, GridMap, GridMapInfo, MultiArrayDimension, MultiArrayLayout};
+pub use navigate::{NavigateToPoseFeedback, NavigateToPoseGoal, NavigateToPoseResult};
 pub use navigation::{AckermannDrive, AckermannDriveStamped, MapMetaData, OccupancyGrid, Odometry, Path};
 pub use sensor::{Imu, PointCloud2, PointField};
 pub use visualization::{ColorRgba, CompressedImage, Duration, Marker, MarkerArray, MeshFile, UvCoordinate};

@@ -1,5 +1,7 @@
 //! A node of ROS 2: what it hears and what it says.
 
+mod action;
+
 use std::net::{IpAddr, Ipv4Addr};
 
 use ros2_client::qos::{Durability, History, QosProfile, WhenFull};
@@ -17,6 +19,7 @@ use std::time::Duration;
 use crate::environment::{Discovery, Range};
 use crate::message::Named;
 use crate::quality::{Mismatch, Quality};
+pub(crate) use action::Action;
 
 /// Messages of one topic that are taken in at one look: whoever floods a topic keeps no other waiting.
 const BATCH: usize = 64;
