@@ -124,3 +124,32 @@ fn say_all(orders: &Receiver<(Ticket, Order)>, director: &Director, answer: &Sen
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn orders_are_answered_by_their_tickets_and_urgent_ones_wait_for_nobody() {
+        let (begin, begun) = sync_channel::<()>(0);
+        let begun = std::sync::Mutex::new(begun);
+        let mut orders = Orders::new(Arc::new(move |order: &Order| match order {
+            Order::EmergencyStop => Ok(MissionRecord::default()),
+            _ => {
+                begun.lock().unwrap().recv().unwrap();
+                Err("refused".to_owned())
+            }
+        }));
+        let tickets = [Order::Pause, Order::EmergencyStop].map(|order| orders.say(order).unwrap());
+        assert_eq!((tickets, orders.last()), ([Ticket(1), Ticket(2)], Ticket(1)));
+        let mut next = || loop {
+            if let Some(answer) = orders.answers().pop() {
+                break (answer.ticket, answer.said.is_ok(), orders.answered());
+            }
+            thread::yield_now();
+        };
+        assert_eq!(next(), (Ticket(2), true, Ticket(0)), "the first is still waiting");
+        begin.send(()).unwrap();
+        assert_eq!(next(), (Ticket(1), false, Ticket(1)));
+    }
+}
