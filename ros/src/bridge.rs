@@ -1,5 +1,6 @@
 //! The node beside the bus: what comes from the robot goes in, what is decided goes out.
 
+mod errands;
 mod hearing;
 mod heights;
 mod saying;
@@ -23,10 +24,11 @@ use crate::environment::Discovery;
 use crate::intake::{Clouds, Intake};
 use crate::node::{Node, NodeError};
 use crate::odometry::Frames;
-use crate::orders::{Director, Order, Orders};
+use crate::orders::{Answer, Director, Order, Orders};
 use crate::parameters::{Change, Parameters};
 use crate::stamps::{Arrival, StampClock, StampSource};
 use crate::transforms::Transforms;
+use errands::Navigation;
 use hearing::Ears;
 use saying::Voices;
 use services::Services;
@@ -109,6 +111,7 @@ struct Bridge {
     /// When others of its name were looked for.
     heeded_at_ns: u64,
     services: Services,
+    navigation: Option<Navigation>,
 }
 
 impl Bridge {
@@ -131,6 +134,7 @@ impl Bridge {
         Ok(Self {
             ears: Ears::new(bus, &mut node, &ros.topics)?,
             voices: Voices::new(bus, &mut node, ros, vehicle, &periods)?,
+            navigation: Navigation::offer(&mut node, ros)?,
             node,
             intake: Intake::new(frames, clouds(ros, vehicle, sensors)?, stamps, transforms).kept_to(&periods),
             actuation: Actuation::new(vehicle.limits, ages),
@@ -153,15 +157,20 @@ impl Bridge {
         self.node.wait(Duration::from_nanos(POLL_NS));
         self.hear(tell)?;
         self.follow_answers(tell);
-        let (actuation, mission) = (&mut self.actuation, &mut self.mission);
+        let (actuation, mission, navigation) = (&mut self.actuation, &mut self.mission, &mut self.navigation);
         let mut is_new = false;
         self.commands.poll(|stamp, commands| {
             commands.iter().for_each(|command| actuation.admit(command, stamp.published_at_ns));
             is_new = true;
         });
-        self.missions.poll(|_, records| *mission = records.last().copied().or(*mission));
-        self.mission.iter().for_each(|mission| self.services.follow(mission));
         let now_ns = clock::now_ns();
+        self.missions.poll(|_, records| {
+            let navigation = navigation.as_mut().into_iter();
+            navigation.for_each(|one| records.iter().for_each(|record| one.errands.follow(record, now_ns)));
+            *mission = records.last().copied().or(*mission);
+        });
+        self.mission.iter().for_each(|mission| self.services.follow(mission));
+        self.run_errands(now_ns, tell)?;
         self.set_parameters(now_ns, tell)?;
         if is_new || now_ns.saturating_sub(self.commanded_at_ns) >= self.command_period_ns {
             self.meter.count(now_ns.saturating_sub(self.commanded_at_ns + self.command_period_ns));
@@ -176,7 +185,9 @@ impl Bridge {
         let stamp_ns = self.intake.clock().stamp_ns(now_ns, arrival()).unwrap_or_default();
         for change in self.services.answer(stamp_ns)? {
             match change {
-                Change::Alpha(alpha) if self.orders.say(Order::Tolerate(alpha)) => self.services.note_asked(),
+                Change::Alpha(alpha) if self.orders.say(Order::Tolerate(alpha)).is_some() => {
+                    self.services.note_asked();
+                }
                 Change::Alpha(_) => tell("alpha: expected no more orders than the mission can answer"),
                 Change::SpeedLimit(speed_mps) => self.actuation.limit_speed(speed_mps),
                 Change::PathSpeed(_) => {}
@@ -211,7 +222,7 @@ impl Bridge {
         let diagnosis = saying::Diagnosis {
             decision: self.decision,
             mission: self.mission,
-            odometry_at_ns: self.ears.odometry_at_ns,
+            odometry_at_ns: self.ears.odometry.map(|(at_ns, _)| at_ns),
             scan_at_ns: self.ears.scan_at_ns,
             complaints: &self.complaints,
         };
@@ -219,11 +230,15 @@ impl Bridge {
     }
 
     fn follow_answers(&mut self, tell: &mut dyn FnMut(&str)) {
-        for (order, answer) in self.orders.answers() {
+        let now_ns = clock::now_ns();
+        for Answer { ticket, order, said } in self.orders.answers() {
             if matches!(order, Order::Tolerate(_)) {
                 self.services.note_answered();
             }
-            match answer {
+            if let Some(navigation) = &mut self.navigation {
+                navigation.errands.note_answer(ticket, &said, now_ns);
+            }
+            match said {
                 Ok(mission) => tell(&format!("{}: {mission}", name_of(&order))),
                 Err(problem) => tell(&format!("{}: {problem}", name_of(&order))),
             }
@@ -233,7 +248,8 @@ impl Bridge {
     fn report(&mut self, now_ns: u64) -> Result<(), BridgeError> {
         let since_s = |at_ns: Option<u64>| at_ns.map_or(-1.0, |at_ns| clock::age_s(now_ns, at_ns));
         let command_s = self.actuation.age_ns(now_ns).map_or(-1.0, |age_ns| age_ns as f64 / SECOND_NS as f64);
-        let (odometry_s, scan_s) = (since_s(self.ears.odometry_at_ns), since_s(self.ears.scan_at_ns));
+        let (odometry_s, scan_s) =
+            (since_s(self.ears.odometry.map(|(at_ns, _)| at_ns)), since_s(self.ears.scan_at_ns));
         let health = Health {
             age_s: [command_s, odometry_s, scan_s, -1.0],
             messages: [0, self.actuation.n_refused() + self.complaints.n(), 0],
@@ -274,6 +290,7 @@ fn name_of(order: &Order) -> &'static str {
         Order::Tolerate(_) => "alpha",
         Order::Pause => "pause",
         Order::Resume => "resume",
+        Order::Cancel => "cancel",
         Order::EmergencyStop => "emergency stop",
         Order::Reset => "reset",
     }

@@ -156,6 +156,11 @@ impl Intake {
         &self.clock
     }
 
+    /// The frame that everything is carried to.
+    pub fn map_frame(&self) -> &str {
+        &self.frames.map
+    }
+
     /// Where the vehicle is, and when it was there [ns].
     ///
     /// # Errors

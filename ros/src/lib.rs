@@ -14,6 +14,7 @@ pub mod bridge;
 pub mod cloud;
 mod complaints;
 pub mod environment;
+mod errand;
 pub mod globe;
 pub mod goals;
 pub mod intake;

@@ -8,6 +8,7 @@ mod diagnostic;
 mod geographic;
 mod geometry;
 mod grid_map;
+mod navigate;
 mod navigation;
 mod sensor;
 mod visualization;
@@ -22,6 +23,7 @@ pub use geometry::{
     TransformStamped, Twist, TwistStamped, TwistWithCovariance, Vector3,
 };
 pub use grid_map::{Float32MultiArray, GridMap, GridMapInfo, MultiArrayDimension, MultiArrayLayout};
+pub use navigate::{NavigateToPoseFeedback, NavigateToPoseGoal, NavigateToPoseResult};
 pub use navigation::{AckermannDrive, AckermannDriveStamped, MapMetaData, OccupancyGrid, Odometry, Path};
 pub use sensor::{Imu, PointCloud2, PointField};
 pub use visualization::{ColorRgba, CompressedImage, Duration, Marker, MarkerArray, MeshFile, UvCoordinate};

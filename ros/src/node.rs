@@ -1,5 +1,6 @@
 //! A node of ROS 2: what it hears and what it says.
 
+mod action;
 mod namesakes;
 
 use std::net::{IpAddr, Ipv4Addr};
@@ -19,6 +20,7 @@ use std::time::Duration;
 use crate::environment::{Discovery, Range};
 use crate::message::Named;
 use crate::quality::{Mismatch, Quality};
+pub(crate) use action::Action;
 use namesakes::Namesakes;
 
 /// Messages of one topic that are taken in at one look: whoever floods a topic keeps no other waiting.

@@ -6,6 +6,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from geometry_msgs.msg import Point, Pose, PoseArray, PoseStamped, Quaternion, TwistStamped, Vector3
 from nav_msgs.msg import OccupancyGrid, Odometry
 from nav_msgs.msg import Path as Way
+from nav2_msgs.action import NavigateToPose
 from rclpy.serialization import serialize_message
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import Imu, NavSatFix, PointCloud2, PointField
@@ -82,6 +83,13 @@ def markers() -> MarkerArray:
     return MarkerArray(markers=[line, Marker(header=header("odom"), ns="moving", type=Marker.CYLINDER)])
 
 
+def feedback() -> NavigateToPose.Feedback:
+    told = NavigateToPose.Feedback(number_of_recoveries=-2, distance_remaining=2.5)
+    told.current_pose = PoseStamped(header=header("map"), pose=pose(1.0))
+    told.navigation_time.sec, told.navigation_time.nanosec = 3, 500_000_000
+    return told
+
+
 def messages() -> dict:
     stamped = PoseStamped(header=header("map"), pose=pose(1.0))
     return {
@@ -98,6 +106,9 @@ def messages() -> dict:
         "twist_stamped": twist(),
         "diagnostic_array": diagnosis(),
         "marker_array": markers(),
+        "navigate_goal": NavigateToPose.Goal(pose=stamped, behavior_tree="tree"),
+        "navigate_result": NavigateToPose.Result(error_code=9000, error_msg="emergency stop"),
+        "navigate_feedback": feedback(),
     }
 
 

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use bus::ages::AgeLimits;
 use bus::channel::{Bus, RunName};
+use bus::message::MissionRecord;
 use navigator::Route;
 use ros::bridge::{self, BridgeError, BridgeSetup};
 use ros::environment;
@@ -55,16 +56,17 @@ pub(super) fn run(arguments: &UpArguments, machine: &Machine, ages: AgeLimits) -
 }
 
 /// Says an order to the mission of the run.
-fn direct(run: &RunName, order: &Order) -> Result<String, String> {
+fn direct(run: &RunName, order: &Order) -> Result<MissionRecord, String> {
     let order = navigators(order)?;
     let bus = Bus::visit(run).map_err(|error| error.to_string())?;
-    operator::tell(&bus, &order).map(|mission| mission.to_string()).map_err(|error| error.to_string())
+    operator::tell(&bus, &order).map_err(|error| error.to_string())
 }
 
 fn navigators(order: &Order) -> Result<navigator::Order, String> {
     let route = match order {
         Order::Pause => return Ok(navigator::Order::Pause),
         Order::Resume => return Ok(navigator::Order::Resume),
+        Order::Cancel => return Ok(navigator::Order::Cancel),
         Order::EmergencyStop => return Ok(navigator::Order::EmergencyStop),
         Order::Reset => return Ok(navigator::Order::Reset),
         Order::Tolerate(alpha) => {

@@ -126,7 +126,7 @@ pub enum RosPointEpoch {
     Epoch,
 }
 
-/// The names of topics. An empty one is not spoken, or not listened to.
+/// The names of topics, and of the action. An empty one is not spoken, not listened to, or not offered.
 #[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct RosTopics {
@@ -152,6 +152,8 @@ pub struct RosTopics {
     pub fix: String,
     /// `nav_msgs/Path`, in: a path to be followed.
     pub path: String,
+    /// `nav2_msgs/NavigateToPose`, an action: a goal, and how it ends.
+    pub navigate: String,
     /// `std_msgs/Bool`, in: true stops, false after it resets.
     pub emergency_stop: String,
     /// `std_msgs/Bool`, in: true pauses, false goes on.
@@ -174,8 +176,8 @@ impl Default for RosTopics {
     fn default() -> Self {
         let [odometry, points, imu, tf, tf_static, clock] =
             ["odom", "points", "imu", "/tf", "/tf_static", "/clock"].map(str::to_owned);
-        let [goal, goals, path, emergency_stop, pause] =
-            ["goal_pose", "goals", "path", "emergency_stop", "pause"].map(str::to_owned);
+        let [goal, goals, path, navigate, emergency_stop, pause] =
+            ["goal_pose", "goals", "path", "navigate_to_pose", "emergency_stop", "pause"].map(str::to_owned);
         let [goal_on_globe, fix] = ["goal_on_globe", "fix"].map(str::to_owned);
         let [command, plan, risk, markers, diagnostics] =
             ["command", "plan", "risk", "markers", "/diagnostics"].map(str::to_owned);
@@ -192,6 +194,7 @@ impl Default for RosTopics {
             goal_on_globe,
             fix,
             path,
+            navigate,
             emergency_stop,
             pause,
             command,

@@ -18,7 +18,7 @@ use crate::message::{
     TfMessage,
 };
 use crate::node::{Ear, Hearing, Node};
-use crate::orders::Order;
+use crate::orders::{FLOOD, Order};
 
 /// Returns of a scan at the most.
 const POINTS_MAX: usize = 1 << 16;
@@ -27,7 +27,7 @@ const SAMPLES_MAX: usize = 256;
 
 /// What is listened to, and where it goes on the bus.
 pub(super) struct Ears {
-    odometry: Option<Ear<Odometry>>,
+    movement: Option<Ear<Odometry>>,
     points: Vec<Ear<PointCloud2>>,
     imu: Option<Ear<Imu>>,
     moving: Option<Ear<TfMessage>>,
@@ -42,7 +42,8 @@ pub(super) struct Ears {
     alarm: Alarm<Gid>,
     pause: Option<Ear<Bool>>,
     outlets: Outlets,
-    pub(super) odometry_at_ns: Option<u64>,
+    /// Where the vehicle was last, and when [ns].
+    pub(super) odometry: Option<(u64, OdometryRecord)>,
     pub(super) scan_at_ns: Option<u64>,
     /// Messages so far.
     pub(super) n_heard: u64,
@@ -70,7 +71,7 @@ impl Ears {
             emergency.extend(node.listen(&topics.emergency_stop, hearing)?);
         }
         Ok(Self {
-            odometry: node.listen(&topics.odometry, Hearing::Loose(32))?,
+            movement: node.listen(&topics.odometry, Hearing::Loose(32))?,
             points,
             imu: node.listen(&topics.imu, Hearing::Loose(128))?,
             moving: node.listen(&topics.tf, Hearing::Loose(128))?,
@@ -85,7 +86,7 @@ impl Ears {
             alarm: Alarm::default(),
             pause: node.listen(&topics.pause, Hearing::Sure(8))?,
             outlets,
-            odometry_at_ns: None,
+            odometry: None,
             scan_at_ns: None,
             n_heard: 0,
         })
@@ -110,13 +111,13 @@ fn heard_by<M: serde::de::DeserializeOwned + 'static>(ear: &mut Ear<M>, refused:
 }
 
 /// Where what is wrong is counted and told.
-struct Refused<'a> {
-    complaints: &'a mut Complaints,
-    tell: &'a mut dyn FnMut(&str),
+pub(super) struct Refused<'a> {
+    pub(super) complaints: &'a mut Complaints,
+    pub(super) tell: &'a mut dyn FnMut(&str),
 }
 
 impl Refused<'_> {
-    fn note(&mut self, topic: &str, why: &dyn Display) {
+    pub(super) fn note(&mut self, topic: &str, why: &dyn Display) {
         if let Some(line) = self.complaints.note(topic, why, clock::now_ns()) {
             (self.tell)(&line);
         }
@@ -201,12 +202,12 @@ impl Bridge {
 
     fn hear_measurements(&mut self, refused: &mut Refused<'_>) -> Result<(), ChannelError> {
         let Self { ears, intake, actuation, .. } = self;
-        for odometry in heard(&mut ears.odometry, refused) {
+        for odometry in heard(&mut ears.movement, refused) {
             ears.n_heard += 1;
             if let Some((at_ns, record)) = refused.kept("odometry", intake.odometry(&odometry, arrival())) {
                 let record = actuation.complete(record, clock::now_ns());
                 ears.outlets.odometry.send_one(Stamp::default(), record, at_ns)?;
-                ears.odometry_at_ns = Some(at_ns);
+                ears.odometry = Some((at_ns, record));
             }
         }
         // After the odometry of about the same time.
@@ -260,9 +261,9 @@ impl Bridge {
         }
     }
 
-    fn order(&self, order: Order, refused: &mut Refused<'_>) {
-        if !self.orders.say(order) {
-            refused.note("orders", &"expected no more than the mission can answer, found a flood of them");
+    fn order(&mut self, order: Order, refused: &mut Refused<'_>) {
+        if self.orders.say(order).is_none() {
+            refused.note("orders", &FLOOD);
         }
     }
 }

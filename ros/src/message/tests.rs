@@ -109,6 +109,26 @@ fn what_the_robot_is_told_is_written_as_rclpy_reads_it() {
 }
 
 #[test]
+fn an_action_is_told_as_rclpy_tells_it() {
+    let stamped = PoseStamped { header: header("map"), pose: pose(1.0) };
+    let goal = NavigateToPoseGoal { pose: stamped.clone(), behavior_tree: "tree".into() };
+    same(recorded!("navigate_goal"), goal);
+    let result = NavigateToPoseResult {
+        error_code: NavigateToPoseResult::UNKNOWN,
+        error_msg: "emergency stop".into(),
+    };
+    same(recorded!("navigate_result"), result);
+    let feedback = NavigateToPoseFeedback {
+        current_pose: stamped,
+        navigation_time: Duration { sec: 3, nanosec: 500_000_000 },
+        estimated_time_remaining: Duration::default(),
+        number_of_recoveries: -2,
+        distance_remaining: 2.5,
+    };
+    same(recorded!("navigate_feedback"), feedback);
+}
+
+#[test]
 fn markers_are_written_as_rclpy_reads_them() {
     let color = |[r, g, b, a]: [f32; 4]| ColorRgba { r, g, b, a };
     let line = Marker {
