@@ -71,7 +71,8 @@ pub use results::{OutputError, config_hash, prepare_out_dir, write_bytes_atomic,
 pub use robot::{
     CONTROL_RATES_HZ, ODOMETRY_RATES_HZ, RobotAges, RobotAreas, RobotCorrection, RobotFile, RobotGround,
     RobotMission, RobotRates, RobotRos, RobotSafety, RobotSensor, RosClock, RosCommand, RosLabels,
-    RosPointEpoch, RosPointTime, RosTopics, SCAN_RATES_HZ, THIRD_PARTIES_MAX, parse_robot, read_robot,
+    RosNavigateResult, RosPointEpoch, RosPointTime, RosTopics, SCAN_RATES_HZ, THIRD_PARTIES_MAX, parse_robot,
+    read_robot,
 };
 pub use scan::{parse_scan_points, read_scan_points};
 pub use skid_steer::{parse_skid_steer_vehicle, read_skid_steer_vehicle};

@@ -9,7 +9,9 @@ use serde::Deserialize;
 use terrain::Mount;
 
 use crate::{ConfigError, ConfigText, shipped_vehicle_text};
-pub use ros::{RobotRos, RosClock, RosCommand, RosLabels, RosPointEpoch, RosPointTime, RosTopics};
+pub use ros::{
+    RobotRos, RosClock, RosCommand, RosLabels, RosNavigateResult, RosPointEpoch, RosPointTime, RosTopics,
+};
 
 /// Version of the robot files that this program reads.
 const FORMAT: u32 = 1;

@@ -90,7 +90,7 @@ enum Stage {
     /// It is the mission of this number, and, if heard, has been said to be so.
     UnderWay { number: u64, is_heard: bool },
     /// It ended then [ns].
-    Over { ending: Ending, at_ns: u64 },
+    Over { ending: Ending, at_ns: u64, is_noted: bool },
 }
 
 /// What becomes of a wish to cancel.
@@ -243,6 +243,18 @@ impl<R> Errands<R> {
         told
     }
 
+    /// Why goals were not reached that have ended since the last look.
+    pub(crate) fn problems(&mut self) -> Vec<String> {
+        let mut problems = Vec::new();
+        for errand in &mut self.errands {
+            let Stage::Over { ending, is_noted, .. } = &mut errand.stage else { continue };
+            if !std::mem::replace(is_noted, true) && !ending.problem.is_empty() {
+                problems.push(ending.problem.clone());
+            }
+        }
+        problems
+    }
+
     /// The goal that is under way, when it is due to be told how far it is.
     pub(crate) fn progress(&mut self, now_ns: u64) -> Option<Accepted> {
         let is_under_way = |errand: &&Errand<R>| matches!(errand.stage, Stage::UnderWay { .. });
@@ -319,7 +331,7 @@ impl<R> Errand<R> {
         if self.cancel.is_some() && ending.status == GoalStatusEnum::Aborted {
             ending.status = GoalStatusEnum::Canceled;
         }
-        self.stage = Stage::Over { ending, at_ns };
+        self.stage = Stage::Over { ending, at_ns, is_noted: false };
     }
 }
 

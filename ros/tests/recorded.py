@@ -107,7 +107,7 @@ def messages() -> dict:
         "diagnostic_array": diagnosis(),
         "marker_array": markers(),
         "navigate_goal": NavigateToPose.Goal(pose=stamped, behavior_tree="tree"),
-        "navigate_result": NavigateToPose.Result(error_code=9000, error_msg="emergency stop"),
+        "navigate_result": NavigateToPose.Result(error_code=9000),
         "navigate_feedback": feedback(),
     }
 

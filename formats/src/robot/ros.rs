@@ -31,6 +31,8 @@ pub struct RobotRos {
     pub transform_age_max_s: f64,
     /// Speed along paths that are to be followed [m/s].
     pub path_speed_mps: f64,
+    /// What is told of a goal of the action that has ended.
+    pub navigate_result: RosNavigateResult,
     /// Which field of clouds says what points are of; by geometry where there is none.
     pub labels: Option<RosLabels>,
     /// Which field of clouds says when points were measured; all at the cloud's stamp where there is none.
@@ -53,6 +55,7 @@ impl Default for RobotRos {
             command_hz: 20.0,
             transform_age_max_s: 1.0,
             path_speed_mps: 1.0,
+            navigate_result: RosNavigateResult::Code,
             labels: None,
             point_time: None,
             topics: RosTopics::default(),
@@ -80,6 +83,16 @@ pub enum RosCommand {
     Ackermann,
     /// `geometry_msgs/TwistStamped`, of the rear axle's centre.
     Twist,
+}
+
+/// What the result of `nav2_msgs/NavigateToPose` consists of, which differs between distributions of ROS 2.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum RosNavigateResult {
+    /// A number, as in Iron and Jazzy.
+    Code,
+    /// A number and a text, as since Kilted.
+    CodeAndText,
 }
 
 /// What the numbers of a cloud's field mean.

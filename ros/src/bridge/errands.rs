@@ -2,7 +2,7 @@
 
 use bus::clock::SECOND_NS;
 use bus::message::OdometryRecord;
-use formats::RobotRos;
+use formats::{RobotRos, RosNavigateResult};
 use nalgebra::UnitQuaternion;
 use ros2_client::RmwRequestId;
 use ros2_client::action::{CancelGoalResponse, GoalId, GoalInfo, GoalStatusEnum};
@@ -39,18 +39,20 @@ enum Unaccepted {
 pub(super) struct Navigation {
     action: Action<NavigateToPoseGoal, NavigateToPoseResult, NavigateToPoseFeedback>,
     pub(super) errands: Errands<RmwRequestId>,
+    result: RosNavigateResult,
 }
 
 impl Navigation {
     /// None if the robot file has no name for it.
     pub(super) fn offer(node: &mut Node, ros: &RobotRos) -> Result<Option<Self>, NodeError> {
         let action = node.act(&ros.topics.navigate, "nav2_msgs", "NavigateToPose")?;
-        Ok(action.map(|action| Self { action, errands: Errands::default() }))
+        Ok(action.map(|action| Self { action, errands: Errands::default(), result: ros.navigate_result }))
     }
 
     /// Tells those who asked of goals that have ended, and everybody of goals that have changed.
     fn tell_ends(&mut self, now_ns: u64) -> Result<(), NodeError> {
-        let Self { action, errands } = self;
+        let Self { action, errands, result: kind } = self;
+        let result = |ending| result(ending, *kind);
         action.askers(|id, asker| {
             if let Some(ending) = errands.ask(id, asker) {
                 action.tell_end(asker, ending.status, result(ending));
@@ -71,7 +73,7 @@ impl Bridge {
         let Some(mut navigation) = self.navigation.take() else { return Ok(()) };
         let mut complaints = std::mem::take(&mut self.complaints);
         let mut refused = Refused { complaints: &mut complaints, tell };
-        let Navigation { action, errands } = &mut navigation;
+        let Navigation { action, errands, .. } = &mut navigation;
         action.goals(|id, goal| {
             let accepted = self.accept(errands, id, &goal, now_ns);
             accepted.map_err(|why| refused.note(WHAT, &why)).ok()
@@ -80,6 +82,7 @@ impl Bridge {
         action.cancels(|asked| answer_of(errands.cancel(asked.id, asked.stamp_ns(), now_ns, last)));
         let answered = self.orders.answered();
         errands.cancel_due(now_ns, answered, || self.orders.say(Order::Cancel));
+        errands.problems().iter().for_each(|problem| tell(&format!("{WHAT}: {problem}")));
         self.complaints = complaints;
         navigation.tell_ends(now_ns)?;
         if let Some((accepted, feedback)) = self.progress(&mut navigation.errands, now_ns) {
@@ -143,12 +146,16 @@ fn info(accepted: &Accepted) -> GoalInfo {
     GoalInfo { goal_id: accepted.id, stamp: builtin_interfaces::Time::from_nanos(accepted.stamp_ns) }
 }
 
-fn result(ending: Ending) -> NavigateToPoseResult {
+fn result(ending: Ending, kind: RosNavigateResult) -> NavigateToPoseResult {
     let error_code = match ending.status {
         GoalStatusEnum::Succeeded | GoalStatusEnum::Canceled => NavigateToPoseResult::NONE,
         _ => NavigateToPoseResult::UNKNOWN,
     };
-    NavigateToPoseResult { error_code, error_msg: ending.problem }
+    let error_msg = match kind {
+        RosNavigateResult::Code => None,
+        RosNavigateResult::CodeAndText => Some(ending.problem),
+    };
+    NavigateToPoseResult { error_code, error_msg }
 }
 
 fn answer_of(cancelled: Result<Vec<Accepted>, Uncancelled>) -> CancelGoalResponse {

@@ -95,6 +95,7 @@ fn a_goal_is_accepted_driven_and_reached() {
     client.errands.follow(&over(3, REACHED), 0);
     assert_eq!(client.ends(), [(1, GoalStatusEnum::Succeeded, String::new())]);
     assert_eq!(client.ends(), [], "told once");
+    assert!(client.errands.problems().is_empty());
     assert_eq!(client.errands.ask(id, 7).unwrap().status, GoalStatusEnum::Succeeded, "who asks later");
     assert_eq!(client.errands.ask(GoalId::new_random(), 7).unwrap().status, GoalStatusEnum::Unknown);
     assert_eq!(client.errands.progress(9 * SECOND), None);
@@ -120,6 +121,8 @@ fn what_ends_a_goal_short_of_its_place_is_said() {
     let (_, ticket) = client.says();
     client.is_answered(ticket, Err("refused: it leads out of the geofence"));
     let problem = "refused: it leads out of the geofence".to_owned();
+    assert_eq!(client.errands.problems(), [problem.clone()]);
+    assert!(client.errands.problems().is_empty(), "said once");
     assert_eq!(client.ends(), [(1, GoalStatusEnum::Aborted, problem)]);
 }
 

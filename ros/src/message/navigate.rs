@@ -1,10 +1,9 @@
 //! The action `nav2_msgs/NavigateToPose`, part by part.
 //!
-//! The result is that of Kilted. Those of Jazzy and Iron end before its text and that of Humble is empty: whoever expects
-//! one of them reads what comes first and leaves the rest.
+//! The result has a text since Kilted. A client of Jazzy on Fast DDS takes no more bytes than its own result can have.
 
 use ros2_client::Message;
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use super::{Duration, PoseStamped};
 
@@ -22,8 +21,22 @@ pub struct NavigateToPoseGoal {
 pub struct NavigateToPoseResult {
     /// [`NavigateToPoseResult::NONE`] or [`NavigateToPoseResult::UNKNOWN`].
     pub error_code: u16,
-    /// Why it was not reached, in one line; empty where it was.
-    pub error_msg: String,
+    /// Why it was not reached, in one line; empty where it was. Before Kilted there is none.
+    #[serde(
+        skip_serializing_if = "Option::is_none",
+        serialize_with = "tell_text",
+        deserialize_with = "read_text"
+    )]
+    pub error_msg: Option<String>,
+}
+
+/// As if it could not be left out, which nothing on the wire says.
+fn tell_text<S: Serializer>(text: &Option<String>, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.serialize_str(text.as_deref().unwrap_or_default())
+}
+
+fn read_text<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<String>, D::Error> {
+    String::deserialize(deserializer).map(Some)
 }
 
 impl NavigateToPoseResult {

@@ -113,11 +113,12 @@ fn an_action_is_told_as_rclpy_tells_it() {
     let stamped = PoseStamped { header: header("map"), pose: pose(1.0) };
     let goal = NavigateToPoseGoal { pose: stamped.clone(), behavior_tree: "tree".into() };
     same(recorded!("navigate_goal"), goal);
-    let result = NavigateToPoseResult {
-        error_code: NavigateToPoseResult::UNKNOWN,
-        error_msg: "emergency stop".into(),
+    let told = |error_msg| {
+        let result = NavigateToPoseResult { error_code: NavigateToPoseResult::UNKNOWN, error_msg };
+        to_vec::<_, LittleEndian>(&result).unwrap()
     };
-    same(recorded!("navigate_result"), result);
+    assert_eq!(told(None), recorded!("navigate_result")[ENCAPSULATION.len()..][..2]);
+    assert_eq!(told(Some("why".into())), b"\x28\x23\0\0\x04\0\0\0why\0", "since Kilted");
     let feedback = NavigateToPoseFeedback {
         current_pose: stamped,
         navigation_time: Duration { sec: 3, nanosec: 500_000_000 },
