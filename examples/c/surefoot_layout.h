@@ -375,6 +375,20 @@ static_assert(offsetof(SurefootPlanRecord, position_m) == 0, "PlanRecord.positio
 static_assert(offsetof(SurefootPlanRecord, yaw_rad) == 16, "PlanRecord.yaw_rad");
 static_assert(offsetof(SurefootPlanRecord, speed_mps) == 24, "PlanRecord.speed_mps");
 
+/* A place of one of the futures that were tried. Known to the channels as surefoot.Future. */
+typedef struct SurefootFutureRecord {
+    /* Rear axle's centre in the frame of the map that it was tried on, east and north [m]. */
+    double position_m[2];
+    /* Cost of the whole future [s]. */
+    double cost_s;
+    /* Which future; the places of one follow one another. */
+    uint64_t number;
+} SurefootFutureRecord;
+static_assert(sizeof(SurefootFutureRecord) == 32, "FutureRecord");
+static_assert(offsetof(SurefootFutureRecord, position_m) == 0, "FutureRecord.position_m");
+static_assert(offsetof(SurefootFutureRecord, cost_s) == 16, "FutureRecord.cost_s");
+static_assert(offsetof(SurefootFutureRecord, number) == 24, "FutureRecord.number");
+
 /* Where the vehicle got stuck. Known to the channels as surefoot.Stuck. */
 typedef struct SurefootStuckRecord {
     /* Rear axle's centre [m]. */

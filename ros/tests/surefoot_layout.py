@@ -498,6 +498,29 @@ assert PlanRecord.yaw_rad.offset == 16
 assert PlanRecord.speed_mps.offset == 24
 
 
+class FutureRecord(ctypes.Structure):
+    """A place of one of the futures that were tried."""
+
+    _fields_ = [
+        # Rear axle's centre in the frame of the map that it was tried on, east and north [m].
+        ("position_m", ctypes.c_double * 2),
+        # Cost of the whole future [s].
+        ("cost_s", ctypes.c_double),
+        # Which future; the places of one follow one another.
+        ("number", ctypes.c_uint64),
+    ]
+
+    @staticmethod
+    def type_name() -> str:
+        return "surefoot.Future"
+
+
+assert ctypes.sizeof(FutureRecord) == 32
+assert FutureRecord.position_m.offset == 0
+assert FutureRecord.cost_s.offset == 16
+assert FutureRecord.number.offset == 24
+
+
 class StuckRecord(ctypes.Structure):
     """Where the vehicle got stuck."""
 
