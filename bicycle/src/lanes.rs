@@ -26,7 +26,7 @@ pub struct Constant {
 
 impl Constant {
     /// Both forms of a value.
-    pub fn new(value: f64) -> Self {
+    pub const fn new(value: f64) -> Self {
         Self { double: value, single: value as f32 }
     }
 

@@ -67,6 +67,17 @@ pub(crate) trait Kernel: Lanes {
     fn as_bits(self, value: Self::Value) -> Self::Bits;
     /// Towards zero; NaN and what does not fit give some word.
     fn truncate(self, value: Self::Value) -> Self::Bits;
+    /// Towards zero and at most `last`, a whole number; of a negative number or of NaN, some word that is.
+    #[inline(always)]
+    fn truncate_up_to(self, value: Self::Value, last: Self::Value) -> Self::Bits {
+        self.truncate(self.min(value, last))
+    }
+    /// Towards zero, at least 0 and at most `last`, a whole number; of NaN, 0.
+    #[inline(always)]
+    fn truncate_within(self, value: Self::Value, last: Self::Value) -> Self::Bits {
+        // In this order NaN becomes a place too.
+        self.truncate(self.min(self.max(value, self.single(0.0)), last))
+    }
     /// Signed words as numbers.
     fn convert(self, bits: Self::Bits) -> Self::Value;
     /// Linear traction, angular traction, roll, pitch at these indices; beyond the table, of its last entry.

@@ -2,7 +2,7 @@
 
 use crate::cost_to_go::CostToGoView;
 use crate::kernel::Kernel;
-use bicycle::lanes::{Lanes, Real};
+use bicycle::lanes::{Constant, Lanes, Real};
 use bicycle::{MotionState, State};
 use std::f64::consts::FRAC_PI_2;
 use traversability::{GridGeometry, RiskMapView};
@@ -85,13 +85,13 @@ impl Objective<'_> {
 /// Where the reference is at the end of one step, in cells, and what the distance from it costs.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct ReferenceStep {
-    pub(crate) x_cells: f64,
-    pub(crate) y_cells: f64,
-    pub(crate) tangent: [f64; 2],
+    pub(crate) x_cells: Constant,
+    pub(crate) y_cells: Constant,
+    pub(crate) tangent: [Constant; 2],
     /// Of a cell along the path, squared [s].
-    pub(crate) along_s: f64,
+    pub(crate) along_s: Constant,
     /// Of a cell across the path, squared [s].
-    pub(crate) across_s: f64,
+    pub(crate) across_s: Constant,
 }
 
 impl ReferencePath<'_> {

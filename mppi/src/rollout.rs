@@ -15,7 +15,7 @@ use crate::judgement::TRACTION_LEAST;
 use crate::kernel::{self, CHUNK, Kernel, Row, Work};
 use crate::objective::{ReferenceStep, TerminalField};
 use crate::trace::TraceRows;
-use bicycle::lanes::{Instructions, Real};
+use bicycle::lanes::{Constant, Instructions, Real};
 use bicycle::{Extent, GroundSample, LaneState, MotionStepper, Rates};
 use motion::{Bare, Leaving, Motion, Plain, Whole};
 use stage::{Lateral, PathTask, Reverse, Stage};
@@ -31,7 +31,7 @@ pub(crate) struct Scene<'a, S, C> {
     pub(crate) grid: Grid<'a>,
     pub(crate) start: Start,
     /// |roll| and |pitch| up to which the vehicle may leave, if it stands beyond a limit [rad].
-    pub(crate) leaning_start_rad: Option<[f64; 2]>,
+    pub(crate) leaning_start_rad: Option<[Constant; 2]>,
     /// What the effects remember at the start.
     pub(crate) slots: &'a [f32],
     pub(crate) prices: Prices,
@@ -76,20 +76,20 @@ pub(crate) struct Start {
 /// What things cost, and limits.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Prices {
-    pub(crate) roll_max_rad: f64,
-    pub(crate) pitch_max_rad: f64,
+    pub(crate) roll_max_rad: Constant,
+    pub(crate) pitch_max_rad: Constant,
     /// Of a step over a limit of attitude [s].
-    pub(crate) attitude_s: f64,
-    pub(crate) lateral_max_mps2: f64,
+    pub(crate) attitude_s: Constant,
+    pub(crate) lateral_max_mps2: Constant,
     /// Of a step over the limit of lateral acceleration [s].
-    pub(crate) lateral_s: f64,
+    pub(crate) lateral_s: Constant,
     /// Of a step in reverse [s].
-    pub(crate) reverse_s: f64,
+    pub(crate) reverse_s: Constant,
 }
 
 impl Prices {
     fn has_manoeuvres(&self) -> bool {
-        self.lateral_s > 0.0 || self.reverse_s > 0.0
+        self.lateral_s.value() > 0.0 || self.reverse_s.value() > 0.0
     }
 }
 
@@ -105,15 +105,16 @@ pub(crate) enum Task<'a> {
 /// A point to reach, in cells.
 #[derive(Clone, Copy)]
 pub(crate) struct GoalTask<'a> {
-    pub(crate) x_cells: f64,
-    pub(crate) y_cells: f64,
-    pub(crate) tolerance_cells: f64,
+    pub(crate) x_cells: Constant,
+    pub(crate) y_cells: Constant,
+    /// Square of the distance at which it is reached, with the sign of the distance [cells2].
+    pub(crate) tolerance_square: Constant,
     /// Of a step on the way [s].
-    pub(crate) step_s: f64,
+    pub(crate) step_s: Constant,
     /// Of a cell of distance to the goal, per step [s].
-    pub(crate) distance_s: f64,
+    pub(crate) distance_s: Constant,
     /// Of a cell of distance at the end [s].
-    pub(crate) rest_s: f64,
+    pub(crate) rest_s: Constant,
     pub(crate) rest: Rest<'a>,
 }
 
@@ -283,10 +284,9 @@ impl<K: Kernel> Index<K> {
     /// Position in the ground array; poses beyond the map count as on its border.
     #[inline(always)]
     fn cell(&self, state: &LaneState<K>) -> K::Bits {
-        let (kernel, zero) = (state.x.0, state.x.0.real(0.0));
-        // In this order NaN becomes a place too.
-        let col = kernel.truncate(state.x.max(zero).min(self.last_col).1);
-        let row = kernel.truncate(state.y.max(zero).min(self.last_row).1);
+        let kernel = state.x.0;
+        let col = kernel.truncate_within(state.x.1, self.last_col.1);
+        let row = kernel.truncate_within(state.y.1, self.last_row.1);
         kernel.add_bits(kernel.mul_bits(row, self.cols), col)
     }
 
@@ -295,7 +295,7 @@ impl<K: Kernel> Index<K> {
     fn risk(&self, cell: K::Bits, turns: Real<K>) -> K::Bits {
         let kernel = turns.0;
         let positive = turns.add_where(turns.less(kernel.real(0.0)), kernel.real(1.0));
-        let yaw = kernel.truncate((positive * self.n_yaws).min(self.last_yaw).1);
+        let yaw = kernel.truncate_up_to((positive * self.n_yaws).1, self.last_yaw.1);
         kernel.add_bits(kernel.mul_bits(cell, self.yaws), yaw)
     }
 }
@@ -455,12 +455,13 @@ fn watch_attitude<K: Kernel, P, C, M: Motion>(
 ) {
     let kernel = roll.0;
     let (one, prices) = (kernel.real(1.0), &scene.prices);
-    let beyond = kernel
-        .or(roll.exceeds(kernel.real(prices.roll_max_rad)), pitch.exceeds(kernel.real(prices.pitch_max_rad)));
+    let [roll_max, pitch_max] =
+        [prices.roll_max_rad, prices.pitch_max_rad].map(|limit| Real::constant(kernel, limit));
+    let beyond = kernel.or(roll.exceeds(roll_max), pitch.exceeds(pitch_max));
     let tilted = kernel.and(beyond, flight.under_way);
     flight.n_tilted = flight.n_tilted.add_where(tilted, one);
     if let Some(start) = scene.leaning_start_rad.filter(|_| M::IS_LEAVING) {
-        let [start_roll, start_pitch] = start.map(|angle_rad| kernel.real(angle_rad));
+        let [start_roll, start_pitch] = start.map(|angle| Real::constant(kernel, angle));
         let added = kernel.real(f64::from(Risk::BLOCKED_RAD));
         let open = roll.less(added);
         let [roll, pitch] = [roll, pitch].map(|angle| angle.or_else(open, angle - added));
@@ -485,7 +486,7 @@ fn store_costs<K: Kernel, P, C: StepCost, S: Stage<K>, M: Motion>(
     let mut total = control;
     for (term, value) in [
         (CostTerm::Running, flight.running),
-        (CostTerm::Attitude, flight.n_tilted * kernel.real(scene.prices.attitude_s)),
+        (CostTerm::Attitude, flight.n_tilted * Real::constant(kernel, scene.prices.attitude_s)),
         (CostTerm::Lateral, flight.lateral),
         (CostTerm::Reverse, flight.reverse),
         (CostTerm::Terminal, terminal),

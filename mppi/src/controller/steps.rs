@@ -17,7 +17,7 @@ use crate::sampling::{Control, Sample, Sampler};
 use crate::summary::Accumulate;
 use crate::trace::{Kept, Trace};
 use crate::weights::{Weigh, WeightSummary};
-use bicycle::lanes::Instructions;
+use bicycle::lanes::{Constant, Instructions};
 use bicycle::{MotionLimits, MotionState, MotionStepper};
 use std::f64::consts::TAU;
 use std::ops::Range;
@@ -156,6 +156,7 @@ impl<M: Driven, S: StepCost, R: RolloutCost> Controller<M, S, R> {
             }
         };
         let [x_cells, y_cells] = frame.cells([self.start.x_m, self.start.y_m]);
+        let leaning_rad = self.judge_over(input.map).leaning_start_rad(&self.start);
         let scene = Scene {
             stepper: &self.cell_stepper,
             grid: grid(&input.map),
@@ -166,7 +167,7 @@ impl<M: Driven, S: StepCost, R: RolloutCost> Controller<M, S, R> {
                 speed_mps: self.start.speed_mps,
                 turn: self.start.turn,
             },
-            leaning_start_rad: self.judge_over(input.map).leaning_start_rad(&self.start),
+            leaning_start_rad: leaning_rad.map(|angles_rad| angles_rad.map(Constant::new)),
             slots: &self.slots[..self.cell_stepper.n_slots()],
             prices: self.prices(&order),
             task,
@@ -194,10 +195,11 @@ impl<M: Driven, S: StepCost, R: RolloutCost> Controller<M, S, R> {
         let (costs, step_s, cell_m) = (&self.config.costs, self.config.step_s, frame.cell_m);
         for (t, step) in self.reference.iter_mut().enumerate() {
             let (at_m, tangent) = path.at(passed_m + path.speed_mps * step_s * (t + 1) as f64);
-            let [x_cells, y_cells] = frame.cells(at_m);
-            let along_s = costs.path_along_s_per_m2 * cell_m * cell_m;
-            let across_s = costs.path_across_s_per_m2 * cell_m * cell_m;
-            *step = ReferenceStep { x_cells, y_cells, tangent, along_s, across_s };
+            let [x_cells, y_cells] = frame.cells(at_m).map(Constant::new);
+            let along_s = Constant::new(costs.path_along_s_per_m2 * cell_m * cell_m);
+            let across_s = Constant::new(costs.path_across_s_per_m2 * cell_m * cell_m);
+            *step =
+                ReferenceStep { x_cells, y_cells, tangent: tangent.map(Constant::new), along_s, across_s };
         }
     }
 
@@ -231,13 +233,14 @@ impl<M: Driven, S: StepCost, R: RolloutCost> Controller<M, S, R> {
     /// Who is to back up pays nothing for it: a metre would cost more than it gains.
     fn prices(&self, order: &TaskOrder<'_>) -> Prices {
         let (limits, costs) = (&self.limits, &self.config.costs);
+        let reverse_s = if matches!(order, TaskOrder::Back(..)) { 0.0 } else { costs.reverse_s };
         Prices {
-            roll_max_rad: limits.roll_max_rad,
-            pitch_max_rad: limits.pitch_max_rad,
-            attitude_s: costs.attitude_s,
-            lateral_max_mps2: limits.lateral_acceleration_max_mps2,
-            lateral_s: costs.lateral_s,
-            reverse_s: if matches!(order, TaskOrder::Back(..)) { 0.0 } else { costs.reverse_s },
+            roll_max_rad: Constant::new(limits.roll_max_rad),
+            pitch_max_rad: Constant::new(limits.pitch_max_rad),
+            attitude_s: Constant::new(costs.attitude_s),
+            lateral_max_mps2: Constant::new(limits.lateral_acceleration_max_mps2),
+            lateral_s: Constant::new(costs.lateral_s),
+            reverse_s: Constant::new(reverse_s),
         }
     }
 
@@ -319,7 +322,8 @@ impl GoalTerms<'_> {
     fn onward<'a>(&self, goal_m: [f64; 2], tolerance_m: f64, terminal: Terminal<'a>) -> GoalTask<'a> {
         let rest = self.field(terminal).map_or(Rest::Straight, Rest::Field);
         let tolerance_cells = tolerance_m / self.frame.cell_m;
-        GoalTask { tolerance_cells, ..self.to(goal_m, self.config.costs.distance_s_per_m, rest) }
+        let tolerance_square = Constant::new(tolerance_cells * tolerance_cells.abs());
+        GoalTask { tolerance_square, ..self.to(goal_m, self.config.costs.distance_s_per_m, rest) }
     }
 
     /// Nothing ends at the target, so it counts to be near early.
@@ -329,15 +333,15 @@ impl GoalTerms<'_> {
     }
 
     fn to<'a>(&self, at_m: [f64; 2], distance_s_per_m: f64, rest: Rest<'a>) -> GoalTask<'a> {
-        let [x_cells, y_cells] = self.frame.cells(at_m);
+        let [x_cells, y_cells] = self.frame.cells(at_m).map(Constant::new);
         let cell_m = self.frame.cell_m;
         GoalTask {
             x_cells,
             y_cells,
-            tolerance_cells: 0.0,
-            step_s: self.config.step_s,
-            distance_s: distance_s_per_m * cell_m,
-            rest_s: cell_m / self.config.costs.rest_speed_mps,
+            tolerance_square: Constant::new(0.0),
+            step_s: Constant::new(self.config.step_s),
+            distance_s: Constant::new(distance_s_per_m * cell_m),
+            rest_s: Constant::new(cell_m / self.config.costs.rest_speed_mps),
             rest,
         }
     }

@@ -79,6 +79,17 @@ impl Kernel for Neon {
         value.map(|value| cast!(self.neon.vcvtq_s32_f32(cast!(value))))
     }
     #[inline(always)]
+    fn truncate_up_to(self, value: Pack, last: Pack) -> Words {
+        // To words without a sign, negative numbers and NaN become 0.
+        let words = |pack: Pack| pack.map(|value| self.neon.vcvtq_u32_f32(cast!(value)));
+        let (words, last) = (words(value), words(last));
+        from_fn(|half| cast!(self.neon.vminq_u32(words[half], last[half])))
+    }
+    #[inline(always)]
+    fn truncate_within(self, value: Pack, last: Pack) -> Words {
+        self.truncate_up_to(value, last)
+    }
+    #[inline(always)]
     fn convert(self, bits: Words) -> Pack {
         bits.map(|bits| cast!(self.neon.vcvtq_f32_s32(cast!(bits))))
     }

@@ -6,7 +6,7 @@ use crate::cost::{Place, Step, StepCost};
 use crate::kernel::Kernel;
 use crate::objective::ReferenceStep;
 use bicycle::LaneState;
-use bicycle::lanes::{Lanes, Real};
+use bicycle::lanes::{Constant, Lanes, Real};
 
 /// The task of the rollouts: a cost that knows when it is done, and where its end may be looked up in a table.
 pub(super) trait Stage<K: Kernel>: StepCost {
@@ -27,8 +27,8 @@ impl GoalTask<'_> {
     #[inline(always)]
     fn square<L: Lanes>(&self, place: &Place<'_, L>) -> Real<L> {
         let lanes = place.lanes();
-        let dx = place.state.x - lanes.real(self.x_cells);
-        let dy = place.state.y - lanes.real(self.y_cells);
+        let dx = place.state.x - Real::constant(lanes, self.x_cells);
+        let dy = place.state.y - Real::constant(lanes, self.y_cells);
         dx.mul_add(dx, dy * dy)
     }
 }
@@ -36,18 +36,18 @@ impl GoalTask<'_> {
 impl StepCost for GoalTask<'_> {
     #[inline(always)]
     fn step<L: Lanes>(&self, step: &Step<'_, L>) -> Real<L> {
-        let time = step.lanes().real(self.step_s);
+        let time = Real::constant(step.lanes(), self.step_s);
         // A square root a step is a fifth of the rollouts' time: none is taken for what nobody prices.
-        if self.distance_s == 0.0 {
+        if self.distance_s.value() == 0.0 {
             return time;
         }
-        self.distance(step).mul_add(step.lanes().real(self.distance_s), time)
+        self.distance(step).mul_add(Real::constant(step.lanes(), self.distance_s), time)
     }
 
     /// The straight line.
     #[inline(always)]
     fn end<L: Lanes>(&self, end: &Place<'_, L>) -> Real<L> {
-        self.distance(end) * end.lanes().real(self.rest_s)
+        self.distance(end) * Real::constant(end.lanes(), self.rest_s)
     }
 }
 
@@ -56,7 +56,7 @@ impl<K: Kernel> Stage<K> for GoalTask<'_> {
     fn goes_on(&self, step: &Step<'_, K>, under_way: K::Mask) -> K::Mask {
         let kernel = step.lanes();
         // As the distance beside the tolerance, which may be negative. What is no number has not arrived.
-        let square = kernel.real(self.tolerance_cells * self.tolerance_cells.abs());
+        let square = Real::constant(kernel, self.tolerance_square);
         kernel.and(under_way, self.square(step).exceeds(square))
     }
 
@@ -79,12 +79,12 @@ impl StepCost for PathTask<'_> {
     #[inline(always)]
     fn step<L: Lanes>(&self, step: &Step<'_, L>) -> Real<L> {
         let (lanes, reference) = (step.lanes(), &self.0[step.t]);
-        let dx = step.state.x - lanes.real(reference.x_cells);
-        let dy = step.state.y - lanes.real(reference.y_cells);
-        let [tx, ty] = reference.tangent.map(|value| lanes.real(value));
+        let dx = step.state.x - Real::constant(lanes, reference.x_cells);
+        let dy = step.state.y - Real::constant(lanes, reference.y_cells);
+        let [tx, ty] = reference.tangent.map(|value| Real::constant(lanes, value));
         let (along, across) = (dx.mul_add(tx, dy * ty), dy.mul_add(tx, -(dx * ty)));
-        let along = along * along * lanes.real(reference.along_s);
-        (across * across).mul_add(lanes.real(reference.across_s), along)
+        let along = along * along * Real::constant(lanes, reference.along_s);
+        (across * across).mul_add(Real::constant(lanes, reference.across_s), along)
     }
 }
 
@@ -102,30 +102,30 @@ impl<K: Kernel> Stage<K> for PathTask<'_> {
 
 /// Steps beyond a lateral acceleration.
 pub(super) struct Lateral {
-    pub(super) most_mps2: f64,
+    pub(super) most_mps2: Constant,
     /// Of a step [s].
-    pub(super) price_s: f64,
+    pub(super) price_s: Constant,
 }
 
 impl StepCost for Lateral {
     #[inline(always)]
     fn step<L: Lanes>(&self, step: &Step<'_, L>) -> Real<L> {
         let (lanes, rates) = (step.lanes(), step.rates());
-        let sideways = (rates.speed * rates.yaw_rate).abs().exceeds(lanes.real(self.most_mps2));
-        lanes.real(0.0).add_where(sideways, lanes.real(self.price_s))
+        let sideways = (rates.speed * rates.yaw_rate).abs().exceeds(Real::constant(lanes, self.most_mps2));
+        lanes.real(0.0).add_where(sideways, Real::constant(lanes, self.price_s))
     }
 }
 
 /// Steps in reverse.
 pub(super) struct Reverse {
     /// Of a step [s].
-    pub(super) price_s: f64,
+    pub(super) price_s: Constant,
 }
 
 impl StepCost for Reverse {
     #[inline(always)]
     fn step<L: Lanes>(&self, step: &Step<'_, L>) -> Real<L> {
         let (lanes, zero) = (step.lanes(), step.lanes().real(0.0));
-        zero.add_where(step.rates().speed.less(zero), lanes.real(self.price_s))
+        zero.add_where(step.rates().speed.less(zero), Real::constant(lanes, self.price_s))
     }
 }

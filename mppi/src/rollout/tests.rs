@@ -6,7 +6,7 @@ mod skid_steer;
 use super::*;
 use crate::cost_to_go::CostToGoView;
 use crate::kernel;
-use bicycle::lanes::Instructions;
+use bicycle::lanes::{Constant, Instructions};
 use bicycle::{Command, Effect, Limits, Model, State, Stepper};
 use traversability::{GridGeometry, Ground, RiskMap};
 
@@ -63,12 +63,12 @@ fn grid(map: &RiskMap) -> Grid<'_> {
 }
 
 const PRICES: Prices = Prices {
-    roll_max_rad: 0.5,
-    pitch_max_rad: 0.5,
-    attitude_s: 10.0,
-    lateral_max_mps2: 1.0,
-    lateral_s: 3.0,
-    reverse_s: 0.2,
+    roll_max_rad: Constant::new(0.5),
+    pitch_max_rad: Constant::new(0.5),
+    attitude_s: Constant::new(10.0),
+    lateral_max_mps2: Constant::new(1.0),
+    lateral_s: Constant::new(3.0),
+    reverse_s: Constant::new(0.2),
 };
 
 /// Controls that differ from lane to lane and over time.
@@ -124,12 +124,12 @@ fn reference(map: &RiskMap, lane: usize, distance_s_per_m: f64) -> ([f64; CostTe
 fn goal<'a>(map: &RiskMap, distance_s_per_m: f64, rest: Rest<'a>) -> GoalTask<'a> {
     let corner_m = map.geometry().south_west_m();
     GoalTask {
-        x_cells: (GOAL_M[0] - corner_m[0]) / 0.5,
-        y_cells: (GOAL_M[1] - corner_m[1]) / 0.5,
-        tolerance_cells: 1.0,
-        step_s: STEP_S,
-        distance_s: 0.5 * distance_s_per_m,
-        rest_s: 0.5 / 2.0,
+        x_cells: Constant::new((GOAL_M[0] - corner_m[0]) / 0.5),
+        y_cells: Constant::new((GOAL_M[1] - corner_m[1]) / 0.5),
+        tolerance_square: Constant::new(1.0),
+        step_s: Constant::new(STEP_S),
+        distance_s: Constant::new(0.5 * distance_s_per_m),
+        rest_s: Constant::new(0.5 / 2.0),
         rest,
     }
 }
@@ -194,8 +194,8 @@ fn the_goal_latches() {
     let stepper = stepper(0.5);
     let corner_m = map.geometry().south_west_m();
     let task = GoalTask {
-        x_cells: (START[0] + 2.01 - corner_m[0]) / 0.5,
-        y_cells: (START[1] - corner_m[1]) / 0.5,
+        x_cells: Constant::new((START[0] + 2.01 - corner_m[0]) / 0.5),
+        y_cells: Constant::new((START[1] - corner_m[1]) / 0.5),
         ..goal(&map, 0.0, Rest::Straight)
     };
     let mut scene = scene(&map, &stepper, Task::Goal(task));
@@ -222,7 +222,7 @@ fn the_cost_to_go_field_is_interpolated_between_cells() {
     let view = CostToGoView { geometry, seconds: &seconds };
     let field = TerminalField::new(view, map.geometry(), TURNING_S_PER_RAD).unwrap();
     let stepper = stepper(0.5);
-    let task = GoalTask { x_cells: 1e6, ..goal(&map, 0.0, Rest::Field(field)) };
+    let task = GoalTask { x_cells: Constant::new(1e6), ..goal(&map, 0.0, Rest::Field(field)) };
     let scene = scene(&map, &stepper, Task::Goal(task));
     for machine in machines() {
         let mut chunk = chunk();
@@ -355,7 +355,7 @@ fn rollouts_of_a_whole_model_go_where_one_vehicle_goes() {
     let slots: Vec<f32> = remembered.iter().map(|value| *value as f32).collect();
     let corner_m = map.geometry().south_west_m();
     for goal_m in [[START[0] + 20.0, START[1]], [START[0], START[1] + 20.0]] {
-        let [x_cells, y_cells] = [0, 1].map(|axis| (goal_m[axis] - corner_m[axis]) / 0.5);
+        let [x_cells, y_cells] = [0, 1].map(|axis| Constant::new((goal_m[axis] - corner_m[axis]) / 0.5));
         let task = Task::Goal(GoalTask { x_cells, y_cells, ..goal(&map, 0.0, Rest::Straight) });
         let mut scene = scene(&map, &stepper, task);
         (scene.slots, scene.start.speed_mps, scene.start.turn) = (&slots, 0.8, 0.1);
@@ -438,7 +438,7 @@ fn a_rollout_that_meets_no_number_costs_none_on_every_instruction_set() {
     ] {
         let map = broken(field, number);
         let (stepper, reference) = (Stepper::new(model, STEP_S, 0.5), Stepper::new(model, STEP_S, 1.0));
-        let task = Task::Goal(GoalTask { x_cells: 1e3, ..goal(&map, 0.0, Rest::Straight) });
+        let task = Task::Goal(GoalTask { x_cells: Constant::new(1e3), ..goal(&map, 0.0, Rest::Straight) });
         let slots = vec![0.0; stepper.n_slots()];
         let mut scene = scene(&map, &stepper, task);
         scene.slots = &slots;

@@ -47,7 +47,7 @@ fn rollouts_of_a_skid_steered_vehicle_go_where_one_vehicle_goes() {
         let model = model(lag_s);
         let stepper = model.stepper(STEP_S, 0.5);
         for goal_m in [[START[0] + 20.0, START[1]], [START[0], START[1] + 20.0]] {
-            let [x_cells, y_cells] = [0, 1].map(|axis| (goal_m[axis] - corner_m[axis]) / 0.5);
+            let [x_cells, y_cells] = [0, 1].map(|axis| Constant::new((goal_m[axis] - corner_m[axis]) / 0.5));
             let task = Task::Goal(GoalTask { x_cells, y_cells, ..goal(&map, 0.0, Rest::Straight) });
             let start = Start {
                 x_cells: (START[0] - corner_m[0]) / 0.5,
