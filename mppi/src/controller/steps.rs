@@ -96,8 +96,7 @@ impl<M: Driven, S: StepCost, R: RolloutCost> Controller<M, S, R> {
         self.stepper.n_slots() - self.stepper.n_held()..self.stepper.n_slots()
     }
 
-    /// Where the commands of the plan start from: the last command, held as near to the measured state as the lag that
-    /// the model knows of allows.
+    /// Where the plan's commands start from: the last one, as near to the measured state as the lag that is known allows.
     fn start_control(&self) -> Control {
         let reached = [self.start.speed_mps, self.start.turn];
         let last = self.ledger.last().map_or(reached, |command| {
@@ -196,10 +195,10 @@ impl<M: Driven, S: StepCost, R: RolloutCost> Controller<M, S, R> {
         for (t, step) in self.reference.iter_mut().enumerate() {
             let (at_m, tangent) = path.at(passed_m + path.speed_mps * step_s * (t + 1) as f64);
             let [x_cells, y_cells] = frame.cells(at_m).map(Constant::new);
-            let along_s = Constant::new(costs.path_along_s_per_m2 * cell_m * cell_m);
-            let across_s = Constant::new(costs.path_across_s_per_m2 * cell_m * cell_m);
-            *step =
-                ReferenceStep { x_cells, y_cells, tangent: tangent.map(Constant::new), along_s, across_s };
+            let [along_s, across_s] = [costs.path_along_s_per_m2, costs.path_across_s_per_m2]
+                .map(|price_s_per_m2| Constant::new(price_s_per_m2 * cell_m * cell_m));
+            let tangent = tangent.map(Constant::new);
+            *step = ReferenceStep { x_cells, y_cells, tangent, along_s, across_s };
         }
     }
 
