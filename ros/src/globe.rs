@@ -53,7 +53,7 @@ pub enum GlobeError {
         found_m: f64,
     },
     /// Nobody knows where the vehicle was in the map.
-    #[error("stamp: expected odometry within {within_s} s of it, found none")]
+    #[error("stamp: expected odometry within {within_s:.1} s of it, found none")]
     NoOdometry {
         /// How far it may be away [s].
         within_s: f64,
