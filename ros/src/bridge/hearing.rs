@@ -145,7 +145,7 @@ impl Bridge {
         Ok(heard?)
     }
 
-    /// Once a second.
+    /// Stands while another node has the name of this one, which is looked for once a second.
     fn heed_namesakes(&mut self, refused: &mut Refused<'_>) {
         let now_ns = clock::now_ns();
         if now_ns.saturating_sub(self.heeded_at_ns) < SECOND_NS {
