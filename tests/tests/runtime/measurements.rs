@@ -114,7 +114,7 @@ fn a_localisation_that_jumps_moves_the_map_and_not_the_vehicle() {
 
     // Mapping follows: what was known is known, elsewhere.
     let mut jumped = None;
-    let (mut offset_m, turn_rad) = ([6.0, -9.0], 0.4);
+    let (offset_m, turn_rad) = ([6.0, -9.0], 0.4);
     driver.behave(Misbehaviour { offset_m, turn_rad, ..held });
     eventually(60.0, || {
         surfaces.poll(|header, cells| match header.event {
@@ -138,8 +138,17 @@ fn a_localisation_that_jumps_moves_the_map_and_not_the_vehicle() {
     }
     // The corners of the window turn out of it.
     assert!(10 * after.0 > 8 * before.0, "of {} cells {} are left", before.0, after.0);
+    drives_on_the_map_of_before(&run, &driver, &mut witness, offset_m, turn_rad);
+}
 
-    // Control drives on meanwhile, on the map of before, laid where it belongs.
+/// Control drives on while mapping follows, on the map of before, laid where it belongs.
+fn drives_on_the_map_of_before(
+    run: &Run,
+    driver: &Driver,
+    witness: &mut Witness,
+    mut offset_m: [f64; 2],
+    turn_rad: f64,
+) {
     let has_driven = (0..ATTEMPTS).any(|_| {
         witness.until_driving("after a jump");
         [Role::Mapping, Role::Learning].into_iter().for_each(|role| run.signal(role, Signal::STOP));
