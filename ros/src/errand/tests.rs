@@ -121,7 +121,7 @@ fn what_ends_a_goal_short_of_its_place_is_said() {
     let (_, ticket) = client.says();
     client.is_answered(ticket, Err("refused: it leads out of the geofence"));
     let problem = "refused: it leads out of the geofence".to_owned();
-    assert_eq!(client.errands.problems(), [problem.clone()]);
+    assert_eq!(client.errands.problems(), std::slice::from_ref(&problem));
     assert!(client.errands.problems().is_empty(), "said once");
     assert_eq!(client.ends(), [(1, GoalStatusEnum::Aborted, problem)]);
 }
