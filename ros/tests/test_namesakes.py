@@ -10,6 +10,7 @@ def test_while_another_node_has_its_name_the_robot_stands(loop, node):
     until(robot.drives, 30, "the robot drives")
     namesake = rclpy.create_node("surefoot", namespace="/car")
     took_s = until(robot.stands, 10, "the robot stands")
+    assert robot.distance_m(GOAL_M) > 0.5, "on its way"
     line = "node /car/surefoot: expected no other node of this name, found 1; the vehicle stands until there is none"
     assert run.has_said(line)
     namesake.destroy_node()
