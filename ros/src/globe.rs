@@ -155,7 +155,8 @@ impl Georeference {
     /// Learns from a fix that was taken while the antenna was at this place of the map, east and north [m].
     ///
     /// # Errors
-    /// See [`GlobeError`]; nothing is learned then.
+    /// See [`GlobeError`]; nothing is learned then. A fix too far away leaves nothing of those before: one of the two is wrong,
+    /// and the next begins anew.
     pub fn note(&mut self, fix: &NavSatFix, antenna_m: [f64; 2]) -> Result<(), GlobeError> {
         if fix.status.status < 0 {
             return Err(GlobeError::NoFix);
@@ -167,6 +168,7 @@ impl Georeference {
         let datum = self.datum.get_or_insert(place);
         let plane_m = datum.plane_m(&place);
         if plane_m.norm() > PLANE_M {
+            *self = Self::default();
             return Err(GlobeError::TooFar { found_m: plane_m.norm() });
         }
         self.keep(Pair { map_m: antenna_m.into(), plane_m, weight: deviation_m.powi(-2) });
@@ -195,11 +197,11 @@ impl Georeference {
     /// # Errors
     /// See [`GlobeError`].
     pub fn place_m(&self, place: &GeoPoint) -> Result<[f64; 2], GlobeError> {
+        let place = Geodetic::new(place.latitude, place.longitude, 0.0)?;
         let (Some(datum), Some(alignment)) = (self.datum, self.alignment()) else {
             return Err(GlobeError::Unanchored);
         };
-        let place = Geodetic::new(place.latitude, place.longitude, datum.altitude_m)?;
-        let plane_m = datum.plane_m(&place);
+        let plane_m = datum.plane_m(&Geodetic { altitude_m: datum.altitude_m, ..place });
         let found_m = (plane_m - alignment.plane_m).norm();
         if found_m > PLANE_M {
             return Err(GlobeError::TooFar { found_m });

@@ -2,7 +2,7 @@
 
 mod agreement;
 
-use nalgebra::{Isometry3, Vector3};
+use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
 use bus::message::OdometryRecord;
 
@@ -67,6 +67,13 @@ pub fn odometry_record(
     })
 }
 
+/// Takes the vehicle's frame to the map's, as the bus says it.
+pub fn motion_of_record(record: &OdometryRecord) -> Isometry3<f64> {
+    let [roll_rad, pitch_rad, yaw_rad] = record.attitude_rad;
+    let rotation = UnitQuaternion::from_euler_angles(roll_rad, pitch_rad, yaw_rad);
+    Isometry3::from_parts(Translation3::from(record.position_m), rotation)
+}
+
 /// Velocity and angular rate of a rigid body in another of its frames, which lies in the first as `frame` says.
 fn carried([velocity, rate]: [Vector3<f64>; 2], frame: &Isometry3<f64>) -> (Vector3<f64>, Vector3<f64>) {
     let arm = frame.translation.vector;
@@ -81,7 +88,6 @@ mod tests {
         Header, Point, Pose, PoseWithCovariance, Quaternion, Time, Twist, TwistWithCovariance,
         Vector3 as Said,
     };
-    use nalgebra::{Translation3, UnitQuaternion};
 
     fn frames() -> Frames {
         Frames { map: "map".into(), vehicle: "rear_axle".into() }

@@ -3,7 +3,6 @@
 use bus::clock::SECOND_NS;
 use bus::message::OdometryRecord;
 use formats::{RobotRos, RosNavigateResult};
-use nalgebra::UnitQuaternion;
 use ros2_client::RmwRequestId;
 use ros2_client::action::{CancelGoalResponse, GoalId, GoalInfo, GoalStatusEnum};
 use ros2_client::action_msgs::{CancelGoalResponseEnum, GoalStatus};
@@ -18,6 +17,7 @@ use crate::message::{
     PoseStamped, Time,
 };
 use crate::node::{Action, Node, NodeError};
+use crate::odometry::motion_of_record;
 use crate::orders::{FLOOD, Order};
 use crate::rigid;
 
@@ -132,9 +132,9 @@ impl Bridge {
 }
 
 fn pose_of(odometry: &OdometryRecord) -> Pose {
-    let ([x, y, z], [roll_rad, pitch_rad, yaw_rad]) = (odometry.position_m, odometry.attitude_rad);
-    let rotation = UnitQuaternion::from_euler_angles(roll_rad, pitch_rad, yaw_rad);
-    Pose { position: Point { x, y, z }, orientation: rigid::quaternion_of(&rotation) }
+    let [x, y, z] = odometry.position_m;
+    let orientation = rigid::quaternion_of(&motion_of_record(odometry).rotation);
+    Pose { position: Point { x, y, z }, orientation }
 }
 
 fn duration(time_ns: u64) -> Duration {

@@ -85,6 +85,16 @@ fn a_localisation_that_jumps_takes_the_goals_along() {
     close(globe.place_m(&point(0.0, 70.0 / 111_319.49)).unwrap(), [510.0, 300.0], 0.5);
 }
 
+/// Receivers tell latitude and longitude 0 before they know better.
+#[test]
+fn a_first_fix_of_elsewhere_is_got_over() {
+    let mut globe = Georeference::default();
+    globe.note(&fix(0.0, 0.0, 0.1), [0.0; 2]).unwrap();
+    assert!(matches!(globe.note(&fix(0.0, 7.0, 0.1), [0.0; 2]), Err(GlobeError::TooFar { .. })));
+    globe.note(&fix(0.0, 7.0, 0.1), [100.0, 200.0]).unwrap();
+    close(globe.place_m(&point(0.0, 7.001)).unwrap(), [100.0 + 111.319_49, 200.0], 2e-3);
+}
+
 #[test]
 fn memory_ends_after_a_kilometre() {
     assert_eq!(driven(0.3, 0.3, 3000).pairs.len(), KEPT);

@@ -1,12 +1,12 @@
 //! Fixes, and goals in degrees.
 
-use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion};
+use nalgebra::Point3;
 
 use super::{Intake, IntakeError, MOTION_AGE_MAX_NS, twist_of};
 use crate::globe::GlobeError;
 use crate::message::{GeoPoseStamped, NavSatFix};
+use crate::odometry;
 use crate::stamps::Arrival;
-use bus::message::OdometryRecord;
 
 impl Intake {
     /// Learns where the map lies on the globe from where the antenna was when the fix was taken.
@@ -21,7 +21,7 @@ impl Intake {
         let within_s = MOTION_AGE_MAX_NS as f64 * 1e-9;
         let (told_at_ns, record) = self.told_near(at_ns).ok_or(GlobeError::NoOdometry { within_s })?;
         let after_s = (at_ns as f64 - told_at_ns as f64) * 1e-9;
-        let vehicle = pose_of(&record) * twist_of(&record).over(after_s);
+        let vehicle = odometry::motion_of_record(&record) * twist_of(&record).over(after_s);
         let antenna_m = vehicle * Point3::from(antenna.translation.vector);
         Ok(self.georeference.note(fix, [antenna_m.x, antenna_m.y])?)
     }
@@ -33,11 +33,4 @@ impl Intake {
     pub fn goal_on_globe(&self, goal: &GeoPoseStamped) -> Result<Vec<[f64; 2]>, IntakeError> {
         Ok(vec![self.georeference.place_m(&goal.pose.position)?])
     }
-}
-
-/// Takes the vehicle's frame to the map's.
-fn pose_of(record: &OdometryRecord) -> Isometry3<f64> {
-    let [roll_rad, pitch_rad, yaw_rad] = record.attitude_rad;
-    let rotation = UnitQuaternion::from_euler_angles(roll_rad, pitch_rad, yaw_rad);
-    Isometry3::from_parts(Translation3::from(record.position_m), rotation)
 }
