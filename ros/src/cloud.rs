@@ -5,7 +5,7 @@ mod geometry;
 mod layout;
 mod twist;
 
-use nalgebra::{Isometry3, Point3};
+use nalgebra::Isometry3;
 
 use bus::message::PointRecord;
 use formats::{RosPointEpoch, RosPointTime};
@@ -74,42 +74,71 @@ pub fn sweep(
     let layout = Layout::new(cloud, label, times.as_ref().map(|times| times.field.as_str()))?;
     let stride = layout.n_points().div_ceil(n_max.max(1)).max(1);
     let mut sweep = Sweep { points: Vec::with_capacity(layout.n_points() / stride), ..Sweep::default() };
-    // Points of one firing have one time. A matrix turns a point by less work than a quaternion.
-    let at = |after_s: f64| {
-        let motion = motion(after_s);
-        (after_s, motion.rotation.to_rotation_matrix(), motion.translation)
-    };
-    let mut moment = at(0.0);
-    for place in (0..layout.n_points()).step_by(stride) {
-        let Read { position_m, label, time } = layout.point(&cloud.data, place);
-        let range_m = position_m.iter().fold(0.0_f32, |range_m, axis_m| range_m.max(axis_m.abs()));
-        let is_place = position_m.iter().all(|axis_m| axis_m.is_finite());
-        if !(is_place && (RANGE_MIN_M..=RANGE_MAX_M).contains(&range_m)) {
+    // Points of one firing have one time, and those beside one another mostly one label.
+    let mut moment = Moment::new(0.0, &motion);
+    let mut labelled = (0, classes.of(0));
+    for Read { position_m, label, time } in layout.points(&cloud.data, stride) {
+        // What is no number is not within.
+        let is_within = position_m.iter().all(|axis_m| axis_m.abs() <= RANGE_MAX_M);
+        if !(is_within && position_m.iter().any(|axis_m| axis_m.abs() >= RANGE_MIN_M)) {
             sweep.n_without_place += 1;
             continue;
         }
-        let class = match (classes, label) {
-            (Classes::Labels(labels), Some(label)) => labels.class(label),
-            _ => Some(TerrainClass::Open),
-        };
+        let label = label.unwrap_or_default();
+        if label != labelled.0 {
+            labelled = (label, classes.of(label));
+        }
+        let class = labelled.1;
         sweep.n_unknown_labels += usize::from(class.is_none());
         let class_number = class.unwrap_or(TerrainClass::Obstacle) as u32;
         if let Some((times, time)) = times.as_ref().zip(time) {
             let after_s = offset_s(times, time, cloud.header.stamp.nanoseconds())?;
-            if after_s != moment.0 {
-                moment = at(after_s);
+            if after_s != moment.after_s {
+                moment = Moment::new(after_s, &motion);
             }
         }
-        let (_, rotation, translation) = &moment;
-        let moved = translation * (rotation * Point3::from(position_m.map(f64::from)));
-        let position_m = [moved.x, moved.y, moved.z].map(|axis_m| axis_m as f32);
-        sweep.points.push(PointRecord { position_m, class_number });
+        sweep.points.push(PointRecord { position_m: moment.moved(position_m), class_number });
     }
     sweep.n_left_out = layout.n_points() - layout.n_points().div_ceil(stride);
     if let Classes::Geometry(geometry) = classes {
         geometry.classify(&mut sweep.points, to_upright);
     }
     Ok(sweep)
+}
+
+impl Classes {
+    /// What a label means, if anybody has said so; without labels everything is open ground at first.
+    fn of(&self, label: i64) -> Option<TerrainClass> {
+        match self {
+            Self::Labels(labels) => labels.class(label),
+            Self::Geometry(_) => Some(TerrainClass::Open),
+        }
+    }
+}
+
+/// What is taken out of points of one time. In plain numbers: matrices are not inlined everywhere.
+struct Moment {
+    after_s: f64,
+    /// Each axis' turn, and what is added to it.
+    axes: [([f64; 3], f64); 3],
+}
+
+impl Moment {
+    fn new(after_s: f64, motion: impl Fn(f64) -> Isometry3<f64>) -> Self {
+        let motion = motion(after_s);
+        let rotation = motion.rotation.to_rotation_matrix();
+        let axis = |row: usize| ([0, 1, 2].map(|col| rotation[(row, col)]), motion.translation.vector[row]);
+        Self { after_s, axes: [0, 1, 2].map(axis) }
+    }
+
+    #[inline]
+    fn moved(&self, position_m: [f32; 3]) -> [f32; 3] {
+        let [x_m, y_m, z_m] = position_m;
+        let along = |([x, y, z], shift_m): ([f64; 3], f64)| {
+            (x * f64::from(x_m) + y * f64::from(y_m) + z * f64::from(z_m) + shift_m) as f32
+        };
+        [along(self.axes[0]), along(self.axes[1]), along(self.axes[2])]
+    }
 }
 
 /// How long after the stamp a point was measured [s].

@@ -122,6 +122,7 @@ impl Kind {
     }
 
     /// The number that the bytes begin with.
+    #[inline]
     fn read<Order: ByteOrder>(self, bytes: &[u8]) -> f64 {
         match self {
             Self::I8 => f64::from(bytes[0] as i8),
@@ -150,6 +151,8 @@ pub(super) struct Read {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Layout {
     axes: [Number; 3],
+    /// Whether the axes are little-endian floats of four bytes.
+    is_plain: bool,
     label: Option<Number>,
     time: Option<Number>,
     width: usize,
@@ -167,8 +170,10 @@ impl Layout {
         time: Option<&str>,
     ) -> Result<Self, LayoutError> {
         let number = |name: &str| number(cloud, name);
+        let axes = [number("x")?, number("y")?, number("z")?];
         let layout = Self {
-            axes: [number("x")?, number("y")?, number("z")?],
+            axes,
+            is_plain: !cloud.is_bigendian && axes.iter().all(|axis| axis.kind == Kind::F32),
             label: label.map(number).transpose()?,
             time: time.map(number).transpose()?,
             width: cloud.width as usize,
@@ -185,18 +190,33 @@ impl Layout {
         self.width * self.height
     }
 
-    pub(super) fn point(&self, data: &[u8], place: usize) -> Read {
-        let start = place / self.width * self.row_step + place % self.width * self.point_step;
-        let bytes = &data[start..start + self.point_step];
-        let read = |number: Number| self.number(bytes, number);
-        // A label is a whole number: what is none is that of nothing.
-        Read {
-            position_m: self.axes.map(|axis| read(axis) as f32),
-            label: self.label.map(|label| read(label) as i64),
-            time: self.time.map(read),
-        }
+    /// Every so many-th point, row by row.
+    pub(super) fn points<'a>(&'a self, data: &'a [u8], stride: usize) -> impl Iterator<Item = Read> + 'a {
+        let of_row = self.width * self.point_step;
+        let rows = (0..self.height).flat_map(move |row| {
+            let bytes = &data[row * self.row_step..][..of_row];
+            let first = (row * self.width).next_multiple_of(stride) - row * self.width;
+            bytes.chunks_exact(self.point_step).skip(first).step_by(stride)
+        });
+        rows.map(|point| self.read(point))
     }
 
+    #[inline]
+    fn read(&self, point: &[u8]) -> Read {
+        let read = |number: Number| self.number(point, number);
+        let [x, y, z] = self.axes;
+        // What nearly every sensor sends is read without asking of each number what it is.
+        let position_m = if self.is_plain {
+            let float = |axis: Number| LittleEndian::read_f32(&point[axis.offset..]);
+            [float(x), float(y), float(z)]
+        } else {
+            [read(x) as f32, read(y) as f32, read(z) as f32]
+        };
+        // A label is a whole number: what is none is that of nothing.
+        Read { position_m, label: self.label.map(|label| read(label) as i64), time: self.time.map(read) }
+    }
+
+    #[inline]
     fn number(&self, point: &[u8], Number { offset, kind }: Number) -> f64 {
         let bytes = &point[offset..];
         if self.is_bigendian { kind.read::<BigEndian>(bytes) } else { kind.read::<LittleEndian>(bytes) }
