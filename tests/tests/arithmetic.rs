@@ -239,9 +239,10 @@ fn the_instruction_set_of_the_configuration_makes_the_map() {
 /// What [`drive`] gives on every machine that has the instruction set, whoever made its processor and whatever its
 /// system is. A change of the computation changes these numbers on purpose; another compiler, processor or platform
 /// must not.
-const EVERYWHERE: [(Isa, [u64; 3]); 3] = [
+const EVERYWHERE: [(Isa, [u64; 3]); 4] = [
     (Isa::Avx512, [0xf437_706f_34f4_5e04, 0xc757_d259_4d49_7c63, 0x3a6c_4d99_36d4_9bfb]),
     (Isa::Avx2, [0xf437_706f_34f4_5e04, 0xc757_d259_4d49_7c63, 0x0b9c_972a_cc6a_7567]),
+    (Isa::Neon, [0xf437_706f_34f4_5e04, 0xc757_d259_4d49_7c63, 0x885e_a9d3_c235_7030]),
     (Isa::Portable, [0xf437_706f_34f4_5e04, 0x9152_217c_aeaf_7ed6, 0x1dcf_7f02_30d0_5fce]),
 ];
 
