@@ -182,8 +182,10 @@ def visibility(vehicle, truth: Truth, more: np.ndarray) -> tuple[float, str]:
         gap = _motion(seen[starts], seen[ends]) - _motion(nominal[:, 0], ends_nominal)
         way = np.sqrt(np.mean((truth.log[ends, :2] - truth.log[starts, :2]) ** 2) * 2)
         floor = np.sqrt(2.0) * np.array([noise["x"], noise["x"], noise["yaw"], noise["vx"], noise["wz"]])
-        floor[0] = math.hypot(floor[0], 0.5 * ticks * TICK_S * noise["vx"])
-        floor[1] = math.hypot(floor[1], noise["yaw"] * way)
+        seconds = ticks * TICK_S
+        floor[0] = math.hypot(floor[0], seconds * noise["vx"])
+        floor[1] = math.hypot(floor[1], noise["yaw"] * way + 0.5 * seconds * noise["vy"])
+        floor[2] = math.hypot(floor[2], 0.5 * seconds * noise["wz"])
         ratios = np.sqrt(np.mean(gap**2, axis=0)) / floor
         if ratios.max() > best:
             best, where = float(ratios.max()), f"{['along', 'across', 'yaw', 'vx', 'wz'][ratios.argmax()]} {ticks * TICK_S:g} s"

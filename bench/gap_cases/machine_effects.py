@@ -14,7 +14,7 @@ from machine_types import added
 
 VISIBILITY = {"s": 1.3, "m": 3.0, "l": 7.5}
 SEARCH_STEPS = 9
-ENOUGH = 0.75
+ENOUGH, TOO_MUCH = 0.75, 1.6
 
 
 @dataclass(frozen=True)
@@ -192,9 +192,15 @@ def find_strength(addition: Addition, target: float, vehicle, turn: Turn, habit:
             break
         low, high = (low, strength) if seen > target else (strength, high)
         strength = 0.5 * (low + high)
-    if best is None or not ENOUGH < best[2] / target < 1.6:
+    too_much = math.inf if addition.parameter == "threshold_mps" else TOO_MUCH
+    if best is None or not ENOUGH < best[2] / target < too_much:
         return None
     return best[1], best[2]
+
+
+def size_of(seen: float) -> str:
+    """The nearest of the three sizes to a visibility."""
+    return min(VISIBILITY, key=lambda size: abs(math.log(seen / VISIBILITY[size])))
 
 
 def draw_turn(generator: np.random.Generator) -> Turn:

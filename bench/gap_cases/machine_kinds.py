@@ -41,7 +41,7 @@ class Senses:
 
     pose_hz: float = 50.0
     position_m: tuple[float, float] = (0.008, 0.015)
-    yaw_rad: tuple[float, float] = (0.003, 0.006)
+    yaw_rad: tuple[float, float] = (0.005, 0.01)
     speed_mps: tuple[float, float] = (0.02, 0.035)
     gyro_radps: tuple[float, float] = (0.006, 0.012)
     wander_m: tuple[float, float] = (0.0, 0.0)

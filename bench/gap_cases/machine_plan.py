@@ -7,11 +7,11 @@ import numpy as np
 
 from machine_drive import failure, run, visibility
 from machine_drivers import POOR, RICH
-from machine_effects import CATALOGUE, UNKNOWN, VISIBILITY, Addition, applicable, draw_turn, find_strength
+from machine_effects import CATALOGUE, UNKNOWN, VISIBILITY, Addition, applicable, draw_turn, find_strength, size_of
 from machine_types import added, seed_of
 
 SINGLES, PAIRS, UNKNOWNS, NONES = 5, 1, 1, 2
-POOR_SHARE, OUTLIERS_SHARE = 1.0 / 3.0, 0.1
+OUTLIERS_SHARE, HIDDEN = 0.1, 0.02
 DRIVES = ["real_train_1", "real_train_2", "real_heldout"]
 ATTEMPTS = 15
 
@@ -92,7 +92,7 @@ class Planner:
                 case.values |= made
                 case.effects.append(name)
                 case.parameters[name] = {addition.parameter: found[0], "made": made, "reference_visibility": found[1]}
-                case.magnitude = min([case.magnitude, smaller], key="lms-".index)
+                case.magnitude = min([case.magnitude, size_of(found[1])], key="lms-".index)
                 return True
         return False
 
@@ -143,7 +143,7 @@ def drive_checks(case: Case, habit: str, truth, seed: list[int]) -> dict:
         "visibility": round(seen, 2),
         "where": where,
         "replay_apart": round(apart, 4) if math.isfinite(apart) else None,
-        "same_as_none": apart == 0.0 and not sensor,
+        "same_as_none": apart == 0.0 and not sensor or seen < HIDDEN,
         "habit": habit,
     }
 
