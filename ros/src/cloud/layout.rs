@@ -193,12 +193,13 @@ impl Layout {
     /// Every so many-th point, row by row.
     pub(super) fn points<'a>(&'a self, data: &'a [u8], stride: usize) -> impl Iterator<Item = Read> + 'a {
         let of_row = self.width * self.point_step;
-        let rows = (0..self.height).flat_map(move |row| {
-            let bytes = &data[row * self.row_step..][..of_row];
+        // By the data, not by the number of rows, which may be anything where they have no points.
+        let rows = data.chunks(self.row_step.max(1)).take(self.height).enumerate();
+        let points = rows.flat_map(move |(row, bytes)| {
             let first = (row * self.width).next_multiple_of(stride) - row * self.width;
-            bytes.chunks_exact(self.point_step).skip(first).step_by(stride)
+            bytes[..of_row].chunks_exact(self.point_step).skip(first).step_by(stride)
         });
-        rows.map(|point| self.read(point))
+        points.map(|point| self.read(point))
     }
 
     #[inline]

@@ -183,6 +183,15 @@ fn what_is_wrong_with_a_cloud_is_said() {
     assert!(told(&|cloud| cloud.width = u32::MAX).starts_with("width x height: expected at most"));
 }
 
+/// The rows are as many as a number may say, and none has a point: as if there were no rows.
+#[test]
+fn rows_without_points_are_not_gone_through() {
+    let cloud =
+        PointCloud2 { width: 0, height: u32::MAX, row_step: 0, data: Vec::new(), ..cloud(&[], &PLAIN) };
+    let sweep = here(&cloud).unwrap();
+    assert_eq!((sweep.points.len(), sweep.n_without_place, sweep.n_left_out), (0, 0, 0));
+}
+
 #[test]
 fn points_are_moved_into_the_frame_that_is_asked_for() {
     let quarter = UnitQuaternion::from_euler_angles(0.0, 0.0, std::f64::consts::FRAC_PI_2);
