@@ -12,6 +12,7 @@ from machine_types import ALL_TICKS, LEAD_TICKS, STATE, TICK_S, added
 
 HORIZON_TICKS = np.array([15, 30, 60, 100])
 WINDOW_TICKS = 100
+CHANNELS = ["along", "across", "yaw", "vx", "wz"]
 
 
 @njit(cache=True)
@@ -188,5 +189,5 @@ def visibility(vehicle, truth: Truth, more: np.ndarray) -> tuple[float, str]:
         floor[2] = math.hypot(floor[2], 0.5 * seconds * noise["wz"])
         ratios = np.sqrt(np.mean(gap**2, axis=0)) / floor
         if ratios.max() > best:
-            best, where = float(ratios.max()), f"{['along', 'across', 'yaw', 'vx', 'wz'][ratios.argmax()]} {ticks * TICK_S:g} s"
+            best, where = float(ratios.max()), f"{CHANNELS[ratios.argmax()]} {seconds:g} s"
     return best, where

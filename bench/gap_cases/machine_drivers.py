@@ -21,9 +21,8 @@ RICH, POOR = ["path", "setpoint", "human", "sweep", "stop_and_go", "slalom"], ["
 PURSUERS = {"path", "human", "stop_and_go", "cruise"}
 WAY_POINT, HOMING, FILTERED = range(3)
 
-HABIT = np.dtype(
-    [(name, "f8") for name in "pursues reaction_ticks gain look_s smooth_s reach_share pose_noise_m yaw_noise_rad".split()]
-)
+HABITS = "pursues reaction_ticks gain look_s smooth_s reach_share pose_noise_m yaw_noise_rad"
+HABIT = np.dtype([(name, "f8") for name in HABITS.split()])
 
 
 def habit_of(name: str, noise: dict) -> np.ndarray:

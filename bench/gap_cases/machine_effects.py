@@ -5,7 +5,7 @@ Each effect has a weakest and a strongest value; a strength in 0..1 runs between
 
 import math
 from dataclasses import dataclass
-from typing import Callable
+from collections.abc import Callable
 
 import numpy as np
 
@@ -95,7 +95,11 @@ CATALOGUE = {
         "steer", _speedy(0.02, 3.0, -2), _understeer, "k_s2pm2", "softer front tyres or twisting linkage"
     ),
     "friction": Addition(
-        "tyre", _fixed(0.05, 0.75), lambda value, turn, vehicle: {"friction": 1.0 - value}, "factor", "friction of tyres"
+        "tyre",
+        _fixed(0.05, 0.75),
+        lambda value, turn, vehicle: {"friction": 1.0 - value},
+        "factor",
+        "friction of tyres",
     ),
     "backlash": Addition("steer", _fixed(0.002, 0.15), _plain("backlash_rad"), "half_width_rad", "play, self-centring"),
     "speed_lag": Addition("speed", _fixed(0.02, 2.5), _plain("speed_lag_s"), "time_constant_s", "two lags, half each"),
@@ -142,7 +146,9 @@ UNKNOWN = {
     "unk_payload": _unknown(_fixed(0.04, 1.2), _plain("payload"), "load and its drag run out", ("mass",)),
     "unk_gps": _unknown(_fixed(0.01, 1.5), _plain("gps_jump_m"), "the position jumps aside for a while"),
     "unk_clock": _unknown(_fixed(0.0004, 0.05), _plain("clock_drift"), "the pose's clock drifts", ("pose_latency",)),
-    "unk_corner": _unknown(_fixed(0.05, 0.85), _plain("weak_corner"), "soft, dragging front-left tyre", ("steer_bias",)),
+    "unk_corner": _unknown(
+        _fixed(0.05, 0.85), _plain("weak_corner"), "soft, dragging front-left tyre", ("steer_bias",)
+    ),
     "unk_trailer": _unknown(
         _fixed(0.04, 0.9), _plain("trailer"), "trailer that pulls at the hitch", ("mass", "rolling_drag"), True
     ),
