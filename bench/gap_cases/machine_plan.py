@@ -8,7 +8,8 @@ import numpy as np
 from machine_drive import failure, run, visibility
 from machine_drivers import POOR, RICH
 from machine_effects import CATALOGUE, UNKNOWN, VISIBILITY, Addition, applicable, draw_turn, find_strength, size_of
-from machine_types import added, seed_of
+from machine_types import added
+from set_files import seed_of
 
 SINGLES, PAIRS, UNKNOWNS, NONES = 5, 1, 1, 2
 OUTLIERS_SHARE, HIDDEN = 0.1, 0.02

@@ -3,8 +3,6 @@
 A machine is one row of numbers, so that a kind is a set of ranges and a vehicle a draw from them.
 """
 
-import zlib
-
 import numpy as np
 
 GRAVITY_MPS2 = 9.81
@@ -82,8 +80,3 @@ def record(dtype: np.dtype, values: dict) -> np.ndarray:
 def added(values: dict) -> np.ndarray:
     """What was added to a machine; nothing where `values` is empty."""
     return record(ADDED, NEUTRAL | values)
-
-
-def seed_of(*names: str) -> int:
-    """A seed that depends on names alone."""
-    return zlib.crc32("/".join(names).encode())

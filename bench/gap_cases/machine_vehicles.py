@@ -6,7 +6,8 @@ import numpy as np
 
 from ground import Ground, GroundShape
 from machine_kinds import KINDS, NAMES, Kind, derived, draw_numbers, top_radius
-from machine_types import MACHINE, record, seed_of
+from machine_types import MACHINE, record
+from set_files import seed_of
 
 HILL_WIDTH_SHARE, NODES_A_HILL = 0.1, 6
 CORNERS_TO_EDGE = 5.0
@@ -49,6 +50,7 @@ def _ground(kind: Kind, length_m: float, radius_m: float, seed: int) -> Ground:
     resolution_m = round(width_m / NODES_A_HILL, 3)
     nodes = 2 * int(half_m / resolution_m) + 1
     ground = Ground(GroundShape(nodes, resolution_m, 1.2 * kind.hills * width_m, width_m), seed)
+    # A zero without a sign, where hills of no height were multiplied out.
     ground.height_m = ground.height_m + 0.0
     return ground
 

@@ -12,8 +12,9 @@ import numpy as np
 from machine_kinds import KINDS
 from machine_plan import DRIVES, Case, Planner, drive_checks, label, survived
 from machine_sensors import sense
-from machine_types import TICK_S, added, seed_of
+from machine_types import TICK_S, added
 from machine_vehicles import Vehicle, vehicle_of
+from set_files import seed_of, write_case, write_vehicle
 
 COLUMNS = "t,x,y,z,roll,pitch,yaw,vx,vy,wz,cmd_speed,cmd_steer"
 FORMATS = ["%.2f"] + ["%.4f"] * 9 + ["%.3f", "%.4f"]
@@ -26,40 +27,16 @@ def write_log(path: Path, rows: np.ndarray) -> None:
     np.savetxt(path, table, fmt=FORMATS, delimiter=",", header=COLUMNS, comments="")
 
 
-def vehicle_file(vehicle: Vehicle) -> str:
-    """The text of vehicle.toml."""
-    origin = -vehicle.ground.half_extent_m
-    lines = [
-        f'name = "{vehicle.name}"',
-        'reference_point = "rear_axle"',
-        f"wheelbase = {vehicle.length_m:.4f}",
-        f"max_steer = {vehicle.number('max_steer_rad'):.4f}",
-        f"max_speed = {vehicle.number('max_speed_mps'):.3f}",
-        f"min_speed = {vehicle.number('min_speed_mps')}",
-        "log_rate_hz = 50.0",
-        'sim_train = ["sim_1.csv", "sim_2.csv", "sim_3.csv"]',
-        'sim_heldout = ["sim_4.csv"]',
-        "[noise]",
-        *(f"{name} = {value}" for name, value in vehicle.noise.items()),
-        "[map]",
-        'heightmap = "heightmap.csv"',
-        'terrain_class = "terrain_class.csv"',
-        f"resolution = {vehicle.ground.shape.resolution_m}",
-        f"origin_x = {origin:.4f}",
-        f"origin_y = {origin:.4f}",
-        'index = "row = x, column = y"',
-        'classes = { 0 = "open", 1 = "loose", 2 = "vegetation" }',
-    ]
-    return "\n".join(lines) + "\n"
-
-
 def make_vehicle(folder: Path, set_name: str, vehicle: Vehicle) -> None:
     """Map, vehicle file and nominal drives."""
-    target = folder / "vehicles" / vehicle.name
-    target.mkdir(parents=True, exist_ok=True)
-    np.savetxt(target / "heightmap.csv", vehicle.ground.height_m, fmt="%.3f", delimiter=",")
-    np.savetxt(target / "terrain_class.csv", vehicle.ground.terrain_class, fmt="%d", delimiter=",")
-    (target / "vehicle.toml").write_text(vehicle_file(vehicle))
+    numbers = {
+        "name": vehicle.name,
+        "wheelbase": f"{vehicle.length_m:.4f}",
+        "max_steer": f"{vehicle.number('max_steer_rad'):.4f}",
+        "max_speed": f"{vehicle.number('max_speed_mps'):.3f}",
+        "min_speed": f"{vehicle.number('min_speed_mps')}",
+    }
+    target = write_vehicle(folder / "vehicles" / vehicle.name, numbers, vehicle.noise, vehicle.ground)
     for number, habit in enumerate(SIM_HABITS, 1):
         name = [set_name, vehicle.kind.name, f"sim_{number}"]
         found = survived(vehicle, habit, added({}), name, slides=False)
@@ -75,14 +52,7 @@ def make_case(folder: Path, set_name: str, name: str, case: Case) -> dict | None
         driven[drive] = survived(case.vehicle, habit, case.more, [set_name, case.key, drive], case.slides)
         if driven[drive] is None:
             return None
-    target = folder / "cases" / name
-    target.mkdir(parents=True, exist_ok=True)
-    base = f"../../vehicles/{case.vehicle.name}"
-    sims = ", ".join(f'"{base}/sim_{number}.csv"' for number in range(1, len(SIM_HABITS) + 1))
-    (target / "case.toml").write_text(
-        f'name = "{name}"\nvehicle = "{base}/vehicle.toml"\nsim = [{sims}]\n'
-        'real = ["real_train_1.csv", "real_train_2.csv"]\nheldout = ["real_heldout.csv"]\n'
-    )
+    target = write_case(folder / "cases" / name, case.vehicle.name, len(SIM_HABITS))
     checks = {}
     for (drive, (truth, seed)), habit in zip(driven.items(), case.habits, strict=True):
         write_log(target / f"{drive}.csv", sense(case.vehicle, truth, case.more, seed, case.outliers))

@@ -9,8 +9,9 @@ import numpy as np
 from command_path import TICK_S
 from drive import MAX_STEER_RAD, DriveFailed, simulate
 from ground import Ground
-from plan import SETS, Case, cases_of, seed_of
+from plan import SETS, Case, cases_of
 from sensors import NOISE
+from set_files import seed_of, write_case, write_vehicle
 from vehicles import VEHICLES
 
 COLUMNS = ["x", "y", "z", "roll", "pitch", "yaw", "vx", "vy", "wz", "cmd_speed", "cmd_steer"]
@@ -36,41 +37,17 @@ def surviving_drive(vehicle, ground: Ground, injection: dict, style: str, name: 
     raise SystemExit(f"{'/'.join(name)}: no drive survived with {injection}")
 
 
-def vehicle_file(vehicle, ground: Ground) -> str:
-    """The text of vehicle.toml."""
-    origin = -ground.half_extent_m
-    lines = [
-        f'name = "{vehicle.name}"',
-        'reference_point = "rear_axle"',
-        f"wheelbase = {vehicle.wheelbase_m:.4f}",
-        f"max_steer = {MAX_STEER_RAD}",
-        f"max_speed = {vehicle.speeds_mps[1]}",
-        f"min_speed = {vehicle.speeds_mps[0]}",
-        "log_rate_hz = 50.0",
-        'sim_train = ["sim_1.csv", "sim_2.csv", "sim_3.csv"]',
-        'sim_heldout = ["sim_4.csv"]',
-        "[noise]",
-        *(f"{name} = {value}" for name, value in NOISE.items()),
-        "[map]",
-        'heightmap = "heightmap.csv"',
-        'terrain_class = "terrain_class.csv"',
-        f"resolution = {ground.shape.resolution_m}",
-        f"origin_x = {origin:.4f}",
-        f"origin_y = {origin:.4f}",
-        'index = "row = x, column = y"',
-        'classes = { 0 = "open", 1 = "loose", 2 = "vegetation" }',
-    ]
-    return "\n".join(lines) + "\n"
-
-
 def make_vehicle(folder: Path, name: str) -> None:
     """Map, vehicle file and nominal drives."""
     vehicle, ground = VEHICLES[name], ground_of(name)
-    target = folder / "vehicles" / name
-    target.mkdir(parents=True, exist_ok=True)
-    np.savetxt(target / "heightmap.csv", ground.height_m, fmt="%.3f", delimiter=",")
-    np.savetxt(target / "terrain_class.csv", ground.terrain_class, fmt="%d", delimiter=",")
-    (target / "vehicle.toml").write_text(vehicle_file(vehicle, ground))
+    numbers = {
+        "name": vehicle.name,
+        "wheelbase": f"{vehicle.wheelbase_m:.4f}",
+        "max_steer": f"{MAX_STEER_RAD}",
+        "max_speed": f"{vehicle.speeds_mps[1]}",
+        "min_speed": f"{vehicle.speeds_mps[0]}",
+    }
+    target = write_vehicle(folder / "vehicles" / name, numbers, NOISE, ground)
     for number, style in enumerate(SIM_STYLES, 1):
         drive = surviving_drive(vehicle, ground, {}, style, [name, f"sim_{number}"], 1.0)
         write_log(target / f"sim_{number}.csv", drive)
@@ -83,14 +60,7 @@ def ground_of(vehicle: str) -> Ground:
 
 def make_case(folder: Path, set_name: str, name: str, case: Case) -> None:
     """Case file and the three drives with the effect."""
-    target = folder / "cases" / name
-    target.mkdir(parents=True, exist_ok=True)
-    base = f"../../vehicles/{case.vehicle}"
-    sims = ", ".join(f'"{base}/sim_{number}.csv"' for number in range(1, len(SIM_STYLES) + 1))
-    (target / "case.toml").write_text(
-        f'name = "{name}"\nvehicle = "{base}/vehicle.toml"\nsim = [{sims}]\n'
-        'real = ["real_train_1.csv", "real_train_2.csv"]\nheldout = ["real_heldout.csv"]\n'
-    )
+    target = write_case(folder / "cases" / name, case.vehicle, len(SIM_STYLES))
     vehicle, ground = VEHICLES[case.vehicle], ground_of(case.vehicle)
     styles = {"real_train_1": case.style, "real_train_2": case.style, "real_heldout": case.heldout_style}
     for drive, style in styles.items():

@@ -1,11 +1,11 @@
 """Which cases make up which set."""
 
-import zlib
 from dataclasses import dataclass
 
 import numpy as np
 
 from effects import EFFECTS, HARDER_FOR_FRICTION, MAGNITUDES, UNKNOWN, applicable, injection_of
+from set_files import seed_of
 from vehicles import VEHICLES
 
 HELDOUT_BY_ANOTHER_DRIVER = 0.4
@@ -60,11 +60,6 @@ class Case:
             "style": self.style,
             "injection": self.injection,
         }
-
-
-def seed_of(*names: str) -> int:
-    """A seed that depends on names alone."""
-    return zlib.crc32("/".join(names).encode())
 
 
 class _Planner:
