@@ -14,7 +14,7 @@ def seed_of(*names: str) -> int:
 
 
 def write_vehicle(folder: Path, numbers: dict[str, str], noise: dict[str, float], ground: Ground) -> Path:
-    """Map and vehicle.toml; `numbers` by name, as they are to stand there: the wheelbase and the limits, and the name."""
+    """Map and vehicle.toml; `numbers` by name, as they are to stand there: the wheelbase and the limits."""
     folder.mkdir(parents=True, exist_ok=True)
     np.savetxt(folder / "heightmap.csv", ground.height_m, fmt="%.3f", delimiter=",")
     np.savetxt(folder / "terrain_class.csv", ground.terrain_class, fmt="%d", delimiter=",")
