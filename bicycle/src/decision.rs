@@ -26,6 +26,16 @@ impl<C: MotionCommand> Decision<C> {
     }
 }
 
+impl<C> fmt::Display for Decision<C> {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Drive(_) => formatter.write_str("driving"),
+            Self::Hold(reason) => write!(formatter, "waiting: {reason}"),
+            Self::Stop(reason) => write!(formatter, "stopped: {reason}"),
+        }
+    }
+}
+
 /// Why the vehicle waits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -40,6 +50,18 @@ pub enum HoldReason {
     Paused,
     /// An operator has the wheel.
     Manual,
+}
+
+impl fmt::Display for HoldReason {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str(match self {
+            Self::NoMap => "nothing of the ground is known yet",
+            Self::AtGoal => "the goal is reached",
+            Self::NoMission => "there is no mission",
+            Self::Paused => "the mission is paused",
+            Self::Manual => "an operator has the wheel",
+        })
+    }
 }
 
 /// Why the vehicle must stop.

@@ -67,7 +67,7 @@ pub use robot::RobotArguments;
 pub use route::{BareGround, RouteArguments};
 pub use scaling::BenchScalingArguments;
 pub use train::{TrainArguments, TrainCommand};
-pub use up::{UpArguments, UpRole};
+pub use up::{LogLevel, UpArguments, UpRole};
 pub use values::{Goal, StartPose, WorldSource, place_with_minus};
 
 /// Everything after `surefoot`.

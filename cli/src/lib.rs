@@ -125,7 +125,7 @@ pub fn run() -> u8 {
     match Program::of_this_process() {
         Ok(program) => run_as(program),
         Err(error) => {
-            report(&format!("surefoot: expected to know its own file, found: {error}"));
+            report(&format!("expected to know its own file, found: {error}"));
             1
         }
     }
@@ -142,7 +142,7 @@ pub fn run_as(program: Program) -> u8 {
     match result {
         Ok(()) => 0,
         Err(error) => {
-            report(&format!("surefoot: {}", failure::one_line(&error)));
+            report(&failure::one_line(&error));
             failure::exit_code(&error)
         }
     }
@@ -221,7 +221,12 @@ fn answer(error: &clap::Error) -> anyhow::Result<()> {
     }
 }
 
-/// A closed standard error must not turn a failure into a panic: the exit code still tells.
+/// Says why there is no success: in the log of a process that keeps one, else on standard error. That it is closed must
+/// not turn a failure into a panic: the exit code still tells.
 fn report(line: &str) {
-    drop(writeln!(std::io::stderr(), "{line}"));
+    if tracing::dispatcher::has_been_set() {
+        tracing::error!("{line}");
+    } else {
+        drop(writeln!(std::io::stderr(), "surefoot: {line}"));
+    }
 }

@@ -2,6 +2,7 @@
 
 mod learn;
 mod live;
+mod log;
 pub(crate) mod robot;
 pub(crate) mod roles;
 mod ros;
@@ -21,10 +22,11 @@ use crate::{Program, UsageError, WorkFailed, failure, interrupt};
 pub(crate) fn run(arguments: &UpArguments) -> anyhow::Result<()> {
     refuse_what_has_no_meaning(arguments)?;
     let arguments = &robot::described(arguments)?;
+    log::begin(arguments)?;
     interrupt::catch_interrupts()?;
     match arguments.role.role() {
         Some(role) => {
-            tell_panics_in_one_line(role);
+            tell_panics_in_one_line();
             roles::run(arguments, role).map_err(refused)
         }
         None if arguments.role == UpRole::Live => live::run(arguments),
@@ -96,11 +98,9 @@ fn refuse_what_concerns_another_role(arguments: &UpArguments) -> Result<(), Usag
 }
 
 /// Whatever happens to a process, it says so in one line that names it.
-fn tell_panics_in_one_line(role: Role) {
+fn tell_panics_in_one_line() {
     std::panic::set_hook(Box::new(move |panic| {
-        let told = panic.to_string();
-        let line = told.split_whitespace().collect::<Vec<_>>().join(" ");
-        crate::report(&format!("surefoot {}: {line}", role.name()));
+        crate::report(&panic.to_string().split_whitespace().collect::<Vec<_>>().join(" "));
     }));
 }
 
@@ -136,12 +136,8 @@ fn supervise(arguments: &UpArguments) -> anyhow::Result<()> {
     if arguments.described.is_some() && !arguments.standby {
         supervisor = supervisor.until_the_mission_is_over();
     }
-    let end = supervisor.run(&interrupt::interrupted, &mut |lines, mission| {
-        if let Some(mission) = mission {
-            println!("{:.1} s, {mission}", mission.time_s);
-        }
-        lines.iter().for_each(|line| println!("  {line}"));
-    });
+    let mut telling = log::Telling::new(arguments.log_level);
+    let end = supervisor.run(&interrupt::interrupted, &mut |told| telling.tell(told));
     supervisor.unended().iter().for_each(|why| crate::report(why));
     keep(&supervisor.report(), &arguments.drive.results.out)?;
     match end {

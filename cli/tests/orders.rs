@@ -69,7 +69,7 @@ fn of_several_runs_one_must_be_named() {
 struct Standby {
     up: Child,
     name: String,
-    _folder: tempfile::TempDir,
+    folder: tempfile::TempDir,
 }
 
 impl Standby {
@@ -78,7 +78,8 @@ impl Standby {
         let words = ["up", "--standby", "--world", "arena", "--start", "1.6,1.2,1.57", "--method", "physics"];
         let mut up = surefoot(&words);
         up.args(["--threads", "1", "--time-limit", "600", "--run", &name, "--out"]).arg(folder.path());
-        Self { up: up.stdout(Stdio::null()).spawn().unwrap(), name, _folder: folder }
+        up.arg("--log").arg(folder.path().join("log"));
+        Self { up: up.stdout(Stdio::null()).spawn().unwrap(), name, folder }
     }
 
     fn say(&self, words: &[&str]) -> Output {
@@ -111,6 +112,23 @@ impl Standby {
         let told = text(&output.stderr);
         assert_eq!((output.status.code(), told.lines().count()), (Some(1), 1), "{words:?}: {told}");
         assert!(told.contains(part), "{words:?}: {told}");
+    }
+
+    fn log(&self) -> String {
+        std::fs::read_to_string(self.folder.path().join("log/supervisor.log")).unwrap()
+    }
+
+    /// Kills the process of control, and waits until that is told.
+    fn kill_control(&self) {
+        let words = format!("--run {} .*--role control", self.name);
+        let killed = Command::new("pkill").args(["-KILL", "-f", "--", &words]).status().unwrap();
+        assert!(killed.success(), "expected a process of control");
+        let began = Instant::now();
+        while !self.log().contains(" WARN control ended by signal: 9 (SIGKILL); it is started again in 0.2 s")
+        {
+            assert!(began.elapsed() < Duration::from_secs(10), "{}", self.log());
+            std::thread::sleep(Duration::from_millis(50));
+        }
     }
 
     /// As with Ctrl-C.
@@ -150,5 +168,17 @@ fn a_run_that_waits_is_sent_about_stopped_and_sent_again() {
     run.until(&["alpha", "0.3"], "goal reached");
     run.refuses(&["pause"], "there is no mission under way");
     assert_eq!(run.up.try_wait().unwrap(), None, "it stays");
+    run.kill_control();
     assert_eq!(run.end(), Some(0));
+    let log = run.log();
+    let told = [
+        " INFO waiting: there is no mission",
+        " INFO driving",
+        " INFO waiting: the mission is paused",
+        " WARN stopped: emergency stop",
+        " INFO waiting: an operator has the wheel",
+        " INFO waiting: the goal is reached",
+    ];
+    told.iter().for_each(|line| assert!(log.contains(line), "{line:?} is missing in {log}"));
+    assert!(log.lines().all(|line| line.starts_with("20") && line.contains("Z ")), "without a time: {log}");
 }

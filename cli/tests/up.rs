@@ -108,6 +108,36 @@ fn files_that_are_none_are_refused_with_what_was_expected() {
     assert_refused(&["replay", &other], &["notes.txt", "expected a recording"]);
 }
 
+#[test]
+fn a_run_tells_no_more_than_is_asked_for() {
+    let folder = tempfile::tempdir().unwrap();
+    let tell = |level: &str| {
+        let words = [
+            "up",
+            "--method",
+            "physics",
+            "--time-limit",
+            "1",
+            "--log-level",
+            level,
+            "--run",
+            &run_name(level),
+        ];
+        let output = surefoot(&words).arg("--out").arg(folder.path().join(level)).output().unwrap();
+        [&output.stdout, &output.stderr].map(|told| text(told))
+    };
+    let [shown, told] = tell("info");
+    assert!(shown.contains("  control "), "statuses are shown: {shown}");
+    assert!(told.lines().any(|line| line == "surefoot: driving"), "{told}");
+    let [shown, told] = tell("error");
+    assert!(!shown.contains("  control "), "{shown}");
+    let [plant, supervisor] = told.lines().collect::<Vec<_>>()[..] else {
+        panic!("expected two lines: {told}")
+    };
+    assert!(plant.starts_with("surefoot plant: goal not reached: time limit passed"), "{told}");
+    assert!(supervisor.starts_with("surefoot: goal not reached"), "{told}");
+}
+
 /// A recording that holds nothing but its setup, after a change of that.
 fn record_setup(path: &Path, change: impl FnOnce(&mut serde_json::Map<String, Value>)) {
     let vehicle = formats::read_vehicle("rc_car").unwrap();

@@ -4,7 +4,7 @@ mod layers;
 mod markers;
 mod measured;
 
-use bicycle::{Command, Decision, HoldReason, Limits};
+use bicycle::{Command, Limits};
 use nalgebra::UnitQuaternion;
 use terrain::GridGeometry;
 use traversability::{GroundFlags, RiskMapView};
@@ -87,24 +87,6 @@ pub fn occupancy(header: Header, map: &RiskMapView<'_>, limits: &Limits) -> Occu
         },
         header,
         data: data.collect(),
-    }
-}
-
-/// What a decision is, in words.
-pub fn decision_text(decision: &Decision) -> String {
-    match decision {
-        Decision::Drive(_) => "driving".to_owned(),
-        Decision::Hold(reason) => {
-            let why = match reason {
-                HoldReason::NoMap => "nothing of the ground is known yet",
-                HoldReason::AtGoal => "the goal is reached",
-                HoldReason::NoMission => "there is no mission",
-                HoldReason::Paused => "the mission is paused",
-                HoldReason::Manual => "an operator has the wheel",
-            };
-            format!("waiting: {why}")
-        }
-        Decision::Stop(reason) => format!("stopped: {reason}"),
     }
 }
 

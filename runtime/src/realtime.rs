@@ -13,16 +13,13 @@ use std::path::Path;
 /// Where the system says what each of its cores can do.
 const CORES: &str = "/sys/devices/system/cpu";
 
-/// Sets cores, priority and memory of this thread, and of those that it will start, as a role needs them; says what was done and what was not permitted.
+/// Sets cores, priority and memory of this thread, and of those that it will start, as a role needs them; says of each what
+/// was done, or what was not permitted.
 ///
 /// Where cores are of several sizes, as the system states them, control has the last of the largest for itself, those that
 /// the vehicle waits for share the other large ones, and learning and the recorder all the rest; where they are alike,
-/// control has the last and the others share the rest. SCHED_FIFO goes to those that the vehicle waits for. To be called before the process starts any other thread.
-pub fn configure_thread(role: Role) -> String {
-    granted(role).map(|part| part.unwrap_or_else(|refusal| refusal)).join("; ")
-}
-
-/// The same part by part: cores, priority, memory, each with what was done, or why not.
+/// control has the last and the others share the rest. SCHED_FIFO goes to those that the vehicle waits for. To be called
+/// before the process starts any other thread.
 pub fn granted(role: Role) -> [Result<String, String>; 3] {
     [pinned(role), scheduled(role), locked()]
 }
@@ -149,10 +146,12 @@ mod tests {
     #[test]
     fn it_says_what_was_done_or_why_not() {
         // A thread of its own: it stays settled.
-        let told = std::thread::spawn(|| configure_thread(Role::Learning)).join().unwrap();
-        let parts: Vec<&str> = told.split("; ").collect();
-        assert!(parts[0].contains("pinned"), "{told}");
-        assert!(parts.contains(&"ordinary priority"), "{told}");
-        assert!(told.contains("memory locked") || told.contains("memory not locked: "), "{told}");
+        let [cores, priority, memory] = std::thread::spawn(|| granted(Role::Learning))
+            .join()
+            .unwrap()
+            .map(|told| told.unwrap_or_else(|why| why));
+        assert!(cores.contains("pinned"), "{cores}");
+        assert_eq!(priority, "ordinary priority");
+        assert!(memory.contains("memory locked") || memory.contains("memory not locked: "), "{memory}");
     }
 }

@@ -1,7 +1,12 @@
 //! Keeps the processes of a run alive, and shows how they are doing.
 
+mod status_line;
+
+pub use status_line::StatusLine;
+
 use std::process::{Child, Command, ExitStatus};
 
+use bicycle::Decision;
 use rustix::io::Errno;
 use rustix::process::{Pid, Signal, kill_process};
 use serde::Serialize;
@@ -73,6 +78,24 @@ pub enum Start {
     Again,
 }
 
+/// What a run has to tell while it goes on.
+#[derive(Clone, Copy, Debug)]
+pub enum Told<'a> {
+    /// How every process is doing, and what the mission's process said last; once a second.
+    Statuses(&'a [StatusLine], Option<&'a MissionRecord>),
+    /// A process has died and is started again.
+    Died {
+        /// Which.
+        role: Role,
+        /// Of what.
+        status: ExitStatus,
+        /// The wait before it is started again [ns].
+        wait_ns: u64,
+    },
+    /// Control has decided to do something else, or for another reason, than before.
+    Decided(Decision),
+}
+
 /// A process that is kept alive.
 struct Kept {
     role: Role,
@@ -100,6 +123,7 @@ pub struct Supervisor<'a> {
     mission: Option<MissionRecord>,
     decisions: Inlet<Stamp, DecisionRecord>,
     timing: Timing,
+    decided: Option<Decision>,
     policy: RestartPolicy,
     command: &'a dyn Fn(Role, Start) -> Command,
     unended: Vec<String>,
@@ -134,6 +158,7 @@ impl<'a> Supervisor<'a> {
             mission: None,
             decisions: bus.inlet(&DECISION)?,
             timing: Timing::default(),
+            decided: None,
             policy,
             command,
             unended: Vec::new(),
@@ -147,35 +172,31 @@ impl<'a> Supervisor<'a> {
         Self { ends_with_mission: true, ..self }
     }
 
-    /// Keeps them going until the vehicle's process ends, one cannot be kept, or `is_over`; `show` is given the state
-    /// of all once a second. Ends them all before it returns.
-    pub fn run(
-        &mut self,
-        is_over: &dyn Fn() -> bool,
-        show: &mut dyn FnMut(&[StatusLine], Option<&MissionRecord>),
-    ) -> RunEnd {
+    /// Keeps them going until the vehicle's process ends, one cannot be kept, or `is_over`; `tell` is given what
+    /// happens meanwhile. Ends them all before it returns.
+    pub fn run(&mut self, is_over: &dyn Fn() -> bool, tell: &mut dyn FnMut(Told<'_>)) -> RunEnd {
         let mut shown_at_ns = clock::now_ns();
         let end = loop {
             let now_ns = clock::now_ns();
             if is_over() {
                 break RunEnd::Interrupted;
             }
-            if let Some(end) = self.tend(now_ns) {
+            if let Some(end) = self.tend(now_ns, tell) {
                 break end;
             }
-            self.listen();
+            self.listen(tell);
             if let Some(outcome) = self.outcome() {
                 break RunEnd::MissionOver(outcome);
             }
             if now_ns.saturating_sub(shown_at_ns) >= SECOND_NS {
                 shown_at_ns = now_ns;
                 self.kept.iter_mut().for_each(|kept| kept.account(now_ns));
-                show(&self.lines(now_ns), self.mission.as_ref());
+                tell(Told::Statuses(&self.lines(now_ns), self.mission.as_ref()));
             }
             clock::sleep_until(now_ns + POLL_NS);
         };
         self.end_all();
-        self.listen();
+        self.listen(tell);
         end
     }
 
@@ -201,11 +222,11 @@ impl<'a> Supervisor<'a> {
         (self.ends_with_mission && outcome != UNDER_WAY).then_some(outcome)
     }
 
-    fn tend(&mut self, now_ns: u64) -> Option<RunEnd> {
+    fn tend(&mut self, now_ns: u64, tell: &mut dyn FnMut(Told<'_>)) -> Option<RunEnd> {
         let awaits_recorder = self.awaits_recorder(now_ns);
         let Self { kept, policy, command, .. } = self;
         let mut tended = kept.iter_mut().filter(|kept| !awaits_recorder || kept.role == Role::Recorder);
-        tended.find_map(|kept| kept.tend(now_ns, policy, command))
+        tended.find_map(|kept| kept.tend(now_ns, policy, command, tell))
     }
 
     /// Whether the recorder has yet to open its channels. A robot speaks whenever it likes: what the others made of a
@@ -216,9 +237,17 @@ impl<'a> Supervisor<'a> {
         is_awaited && now_ns.saturating_sub(self.began_at_ns) < RECORDER_PATIENCE_NS
     }
 
-    fn listen(&mut self) {
-        let (mission, timing) = (&mut self.mission, &mut self.timing);
-        self.decisions.poll(|stamp, records| records.iter().for_each(|record| timing.take(stamp, record)));
+    fn listen(&mut self, tell: &mut dyn FnMut(Told<'_>)) {
+        let Self { mission, timing, decided, .. } = self;
+        self.decisions.poll(|stamp, records| {
+            for record in records {
+                timing.take(stamp, record);
+                let last = std::mem::replace(decided, record.command.decision());
+                if let Some(decision) = decided.filter(|decision| !is_as(decision, last.as_ref())) {
+                    tell(Told::Decided(decision));
+                }
+            }
+        });
         self.missions.poll(|_, missions| *mission = missions.first().copied().or(*mission));
         for kept in &mut self.kept {
             let last = &mut kept.last;
@@ -264,6 +293,7 @@ impl Kept {
         now_ns: u64,
         policy: &RestartPolicy,
         command: &dyn Fn(Role, Start) -> Command,
+        tell: &mut dyn FnMut(Told<'_>),
     ) -> Option<RunEnd> {
         let Some(child) = &mut self.child else {
             if now_ns < self.due_at_ns {
@@ -280,12 +310,18 @@ impl Kept {
         };
         match child.try_wait() {
             Ok(None) => None,
-            Ok(Some(status)) => self.bury(status, now_ns, policy),
+            Ok(Some(status)) => self.bury(status, now_ns, policy, tell),
             Err(error) => Some(RunEnd::GaveUp { role: self.role, why: error.to_string() }),
         }
     }
 
-    fn bury(&mut self, status: ExitStatus, now_ns: u64, policy: &RestartPolicy) -> Option<RunEnd> {
+    fn bury(
+        &mut self,
+        status: ExitStatus,
+        now_ns: u64,
+        policy: &RestartPolicy,
+        tell: &mut dyn FnMut(Told<'_>),
+    ) -> Option<RunEnd> {
         self.child = None;
         match status.code() {
             Some(code @ (0 | 1)) if self.role == Role::Plant => return Some(RunEnd::Plant(code)),
@@ -303,7 +339,9 @@ impl Kept {
             let why = format!("it ended {n_recent} times within {window_s} s, the last time by {status}");
             return Some(RunEnd::GaveUp { role: self.role, why });
         }
-        self.due_at_ns = now_ns + (policy.back_off_ns << (n_recent - 1).min(16)).min(policy.back_off_max_ns);
+        let wait_ns = (policy.back_off_ns << (n_recent - 1).min(16)).min(policy.back_off_max_ns);
+        self.due_at_ns = now_ns + wait_ns;
+        tell(Told::Died { role: self.role, status, wait_ns });
         None
     }
 
@@ -330,59 +368,17 @@ impl Kept {
     }
 }
 
+/// Whether a decision is to do the same as the last one for the same reason; every command to drive is to drive.
+fn is_as(decision: &Decision, last: Option<&Decision>) -> bool {
+    match (decision, last) {
+        (Decision::Drive(_), Some(Decision::Drive(_))) => true,
+        (decision, last) => Some(decision) == last,
+    }
+}
+
 /// Why a signal was not sent; one that has ended by itself just now is what is wanted.
 fn unsent(sent: Result<(), Errno>) -> Option<Errno> {
     sent.err().filter(|why| *why != Errno::SRCH)
-}
-
-/// How one process is doing.
-#[derive(Clone, Copy, Debug)]
-pub struct StatusLine {
-    /// Its role.
-    pub role: Role,
-    /// Its process, while it runs.
-    pub process: Option<u32>,
-    /// How often it had to be restarted.
-    pub n_restarts: usize,
-    /// Age of its last status [s], and that.
-    pub status: Option<(f64, StatusRecord)>,
-}
-
-impl std::fmt::Display for StatusLine {
-    fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let inputs: &[&str] = match self.role {
-            Role::Plant => &["command"],
-            Role::Mapping => &["odometry", "scan"],
-            Role::Learning => &["surface"],
-            Role::Control => &["odometry", "learned map", "physics map", "mission"],
-            Role::Recorder => &[],
-            Role::Mission => &["odometry"],
-            Role::Ros => &["command", "odometry", "scan"],
-        };
-        write!(formatter, "{:9}", self.role.name())?;
-        let Some((age_s, status)) = self.status.filter(|_| self.process.is_some()) else {
-            return write!(formatter, " not heard of yet, restarts {}", self.n_restarts);
-        };
-        if age_s > 2.0 {
-            return write!(formatter, " silent for {age_s:.1} s, restarts {}", self.n_restarts);
-        }
-        let [median_ms, largest_ms] = status.lateness_s.map(|lateness_s| 1e3 * lateness_s);
-        write!(formatter, " {:5.1} Hz  late {median_ms:.1}, {largest_ms:.1} ms", status.rate_hz)?;
-        for (name, age_s) in inputs.iter().zip(status.age_s).filter(|(_, age_s)| *age_s >= 0.0) {
-            write!(formatter, "  {name} {:.0} ms", 1e3 * age_s)?;
-        }
-        write!(
-            formatter,
-            "  missed {}  lost {}  refused {}  failed {}  restarts {}",
-            status.n_missed, status.n_lost, status.n_refused, status.n_failed, self.n_restarts
-        )?;
-        match self.role {
-            Role::Control => write!(formatter, "  futures {:.0}", status.figure),
-            Role::Recorder if status.figure < 0.0 => write!(formatter, "  no recording"),
-            Role::Recorder => write!(formatter, "  {:.1} MB", 1e-6 * status.figure),
-            _ => Ok(()),
-        }
-    }
 }
 
 #[cfg(test)]

@@ -115,6 +115,18 @@ pub struct UpArguments {
           allow_hyphen_values = true, help_heading = "Recording")]
     pub record_sync: f64,
 
+    /// How much is told of what happens: on standard error, in the files of --log, and whether statuses are shown
+    ///
+    /// Where systemd's journal takes standard error, lines carry their level: `journalctl -p warning` finds them.
+    #[arg(long, value_enum, default_value_t = LogLevel::Info, help_heading = "Log")]
+    pub log_level: LogLevel,
+
+    /// Keep what is told also in files of this folder, PROCESS.log, with times; of 4 MB each, four of before
+    ///
+    /// When one is full it becomes PROCESS.log.1, what was that PROCESS.log.2, and the last of all is dropped.
+    #[arg(long, value_name = "FOLDER", help_heading = "Log")]
+    pub log: Option<std::path::PathBuf>,
+
     /// Go on learning from the drive; networks that prove better are used and kept in OUT/learned
     ///
     /// What the vehicle does over what is asked of it becomes labels, as with `surefoot collect`; networks are fitted to
@@ -171,6 +183,18 @@ impl UpArguments {
             ..Periods::default()
         }
     }
+}
+
+/// How much is told.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, ValueEnum)]
+pub enum LogLevel {
+    /// Why a run or a process ended that should not have
+    Error,
+    /// Also what was stopped for, refused, not permitted or lost, and processes that were started again
+    Warning,
+    /// Also what goes as it should: decisions and the mission as they change, rounds of learning; and once a second, on
+    /// standard output, how every process is doing
+    Info,
 }
 
 /// A process, or all of them.
@@ -267,6 +291,8 @@ Examples:
       As regular as the system permits, 50 decisions a second.
   surefoot up --robot mine.toml
       The processes of a robot of your own, without a simulator; its driver is yours.
+  surefoot up --robot mine.toml --standby --log-level warning --log /var/log/surefoot
+      For weeks: what was wrong, in files that do not grow for ever.
   surefoot up --standby --time-limit 3600
       Wait for `surefoot goal`, `pause`, `estop` and the others; see `surefoot goal --help`.
 

@@ -6,6 +6,7 @@ use bicycle::SensorModel;
 use evidential::{Checkpoint, ShippedData, shipped_data};
 use formats::write_bytes_atomic;
 use runtime::online::{LearnerSetup, Round, SchoolSetup, Told};
+use tracing::{error, info, warn};
 
 use crate::UsageError;
 use crate::arguments::UpArguments;
@@ -56,15 +57,15 @@ pub(super) fn school(arguments: &UpArguments, machine: &Machine) -> Result<Optio
     Ok(Some(SchoolSetup { learner, unfamiliar, sensors }))
 }
 
-/// Tells what became of a round on standard error, and keeps networks that are used from now on.
+/// Tells what became of a round, and keeps networks that are used from now on.
 pub(super) fn tell(told: Told<'_>, out: &Path) {
     match told {
-        Told::Ended(why) => eprintln!("surefoot learning: {why}"),
+        Told::Ended(why) => warn!("{why}"),
         Told::Round(round, checkpoint) => {
-            eprintln!("surefoot learning: {}", in_words(round));
+            info!("{}", in_words(round));
             let kept = checkpoint.map_or(Ok(()), |checkpoint| keep(checkpoint, &out.join(LEARNED)));
             if let Err(error) = kept {
-                eprintln!("surefoot learning: {error}; driving on without having kept the networks");
+                error!("{error}; driving on without having kept the networks");
             }
         }
     }

@@ -6,6 +6,7 @@ use std::process::{Child, Stdio};
 
 use runtime::live;
 use rustix::process::{Signal, set_parent_process_death_signal};
+use tracing::info;
 
 use super::roles;
 use crate::arguments::UpArguments;
@@ -19,7 +20,7 @@ pub(super) fn run(arguments: &UpArguments) -> anyhow::Result<()> {
     let address = arguments.live.unwrap_or(SocketAddr::from((Ipv4Addr::LOCALHOST, live::PORT)));
     let host = address.ip().to_string();
     live::run(&roles::join(arguments)?, (&host, address.port()), &interrupt::interrupted, &mut |port| {
-        eprintln!("surefoot live: Foxglove WebSocket on ws://{host}:{port}");
+        info!("Foxglove WebSocket on ws://{host}:{port}");
     })?;
     Ok(())
 }

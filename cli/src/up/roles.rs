@@ -20,6 +20,7 @@ use serde::Serialize;
 use simulator::{Ending, PlantReport, PlantSetup};
 use std::ffi::OsString;
 use std::sync::Arc;
+use tracing::{info, warn};
 use traversability::CvarLevel;
 
 use super::{learn, robot, ros};
@@ -128,7 +129,12 @@ pub(super) fn run(arguments: &UpArguments, role: Role) -> anyhow::Result<()> {
         set_parent_process_death_signal(Some(Signal::TERM))?;
     }
     if arguments.realtime {
-        eprintln!("surefoot {}: {}", role.name(), realtime::configure_thread(role));
+        for part in realtime::granted(role) {
+            match part {
+                Ok(done) => info!("{done}"),
+                Err(refused) => warn!("{refused}"),
+            }
+        }
     }
     let machine = machine(arguments)?;
     let ages = ages(arguments, &machine)?;
@@ -162,9 +168,7 @@ pub(super) fn run(arguments: &UpArguments, role: Role) -> anyhow::Result<()> {
         Role::Recorder => {
             let setup = recorder_setup(arguments, machine, ages)?;
             std::fs::create_dir_all(&setup.folder)?;
-            recorder::run(&join(arguments)?, setup, is_over, &mut |line| {
-                eprintln!("surefoot recorder: {line}");
-            })?;
+            recorder::run(&join(arguments)?, setup, is_over, &mut |line| warn!("{line}"))?;
         }
     }
     Ok(())

@@ -10,6 +10,7 @@ use ros::bridge::{self, BridgeError, BridgeSetup};
 use ros::environment;
 use ros::orders::Order;
 use runtime::operator;
+use tracing::warn;
 use traversability::CvarLevel;
 
 use super::{robot, roles};
@@ -44,7 +45,7 @@ pub(super) fn run(arguments: &UpArguments, machine: &Machine, ages: AgeLimits) -
     };
     let bus = roles::join(arguments)?;
     let bridged = bridge::run(&bus, setup, &interrupt::interrupted, &mut |line| {
-        eprintln!("surefoot ros: {line}");
+        warn!("{line}");
     });
     match bridged {
         // A name or a label is no better the next time.

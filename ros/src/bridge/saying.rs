@@ -214,8 +214,8 @@ impl Voices {
 
     fn decision_status(&self, diagnosis: &Diagnosis<'_>) -> crate::message::DiagnosticStatus {
         let (level, message) = match &diagnosis.decision {
-            Some(decision @ Decision::Stop(_)) => (WARNING, telling::decision_text(decision)),
-            Some(decision) => (WELL, telling::decision_text(decision)),
+            Some(decision @ Decision::Stop(_)) => (WARNING, decision.to_string()),
+            Some(decision) => (WELL, decision.to_string()),
             None => (WARNING, "nothing is commanded".to_owned()),
         };
         let mission = diagnosis.mission.map_or_else(|| "unknown".to_owned(), |mission| mission.to_string());

@@ -33,7 +33,7 @@ fn supervise(roles: &[Role], script: &str) -> (RunEnd, Vec<(Role, u64)>) {
         command
     };
     let mut supervisor = Supervisor::new(&bus, roles, POLICY, &command).unwrap();
-    let end = supervisor.run(&|| now_ns() - began_ns > 30_000_000_000, &mut |_, _| ());
+    let end = supervisor.run(&|| now_ns() - began_ns > 30_000_000_000, &mut |_| ());
     (end, starts.into_inner())
 }
 
@@ -85,7 +85,7 @@ fn the_others_start_once_the_recorder_hears_them_or_has_died() {
         }
         starts.borrow().len() == 2 || n_looks.get() > 200
     };
-    assert_eq!(supervisor.run(&is_over, &mut |_, _| ()), RunEnd::Interrupted);
+    assert_eq!(supervisor.run(&is_over, &mut |_| ()), RunEnd::Interrupted);
     assert_eq!(starts.into_inner(), [Role::Recorder, Role::Control]);
     let (_, starts) = supervise(&roles, "[ $0 = recorder ] && exit 1; exit 2");
     assert_eq!([starts[0].0, starts[1].0], [Role::Recorder, Role::Control], "without a recording");
