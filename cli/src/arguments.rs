@@ -64,7 +64,7 @@ pub use replay::ReplayArguments;
 pub use results::{JsonArguments, ResultArguments};
 pub use risk::BenchRiskArguments;
 pub use robot::RobotArguments;
-pub use route::{BareGround, RouteArguments};
+pub use route::{BareGround, RouteArguments, RouteGround};
 pub use scaling::BenchScalingArguments;
 pub use train::{TrainArguments, TrainCommand};
 pub use up::{LogLevel, UpArguments, UpRole};

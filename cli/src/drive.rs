@@ -2,6 +2,7 @@
 #![allow(clippy::disallowed_methods, reason = "--pace real follows the wall clock")]
 
 mod correction;
+mod guided;
 pub(crate) mod knowledge;
 mod open_loop;
 pub(crate) mod record;
@@ -22,6 +23,8 @@ use crate::progress::{DriveProgress, ProgressLine};
 use crate::summary::{Milliseconds, Outcome, Summary, revision};
 use crate::{UsageError, interrupt};
 pub(crate) use correction::read_inverse_model;
+use guided::Guided;
+pub use guided::GuidedSummary;
 pub(crate) use knowledge::read_checkpoint;
 use open_loop::Script;
 use record::{KnownRisk, Recording, path_samples};
@@ -35,6 +38,7 @@ const PICTURE: &str = "drive.png";
 pub(crate) fn run(arguments: &DriveArguments) -> anyhow::Result<()> {
     arguments.bush_height_m()?;
     let scene = scene::prepare(arguments)?;
+    let mut guided = Guided::plan(arguments, &scene)?;
     let mut closed = ClosedLoop::new(drive(arguments, &scene)?).map_err(|error| refused(arguments, error))?;
     closed.follow(scene::route(arguments, &scene.task)?)?;
     let results = &arguments.results;
@@ -47,11 +51,15 @@ pub(crate) fn run(arguments: &DriveArguments) -> anyhow::Result<()> {
     if let Some(why) = &scene.knowledge.why_not_learned {
         println!("  method physics: {why}");
     }
-    let kept = follow(arguments, &scene, &mut closed, &mut recording)?;
+    let kept = follow(arguments, &scene, &mut closed, guided.as_mut(), &mut recording)?;
     recording.finish()?;
-    let summary = summarise(arguments, &scene, &closed, &kept, config_hash);
+    let summary = Summary {
+        route: guided.as_ref().map(|guided| guided.told().clone()),
+        ..summarise(arguments, &scene, &closed, &kept, config_hash)
+    };
     results.write_json(SUMMARY, &summary)?;
-    results.write(PICTURE, &drawn(&scene, &closed, &kept, &summary)?)?;
+    let planned = guided.as_ref().map_or(&[][..], Guided::line_m);
+    results.write(PICTURE, &drawn(&scene, &closed, &kept, planned, &summary)?)?;
     println!("{summary}");
     let files = [SUMMARY, RECORDING, PICTURE].map(|name| results.file(name));
     for path in files.iter().chain(&results.copy.json) {
@@ -141,6 +149,7 @@ fn follow(
     arguments: &DriveArguments,
     scene: &Scene,
     closed: &mut ClosedLoop,
+    mut guided: Option<&mut Guided>,
     recording: &mut Recording,
 ) -> anyhow::Result<Kept> {
     let [x_m, y_m, _] = scene.task.start;
@@ -155,6 +164,9 @@ fn follow(
             Some(script) => script.cycle(&mut closed.episode)?,
             None => closed.cycle()?,
         };
+        if let Some(guided) = &mut guided {
+            guided.lead(closed, cycle.map_ms.is_some())?;
+        }
         kept.tally.count(&cycle, closed.episode.cycle_s());
         if let Some(map) = closed.navigator.risk_map().filter(|_| cycle.map_ms.is_some()) {
             kept.known.update(&map);
@@ -233,6 +245,7 @@ fn summarise(
         walkers: arguments.walkers,
         walked_into: episode.n_walked_into(),
         was_avoidable: episode.strike().map(|strike| strike.was_avoidable),
+        route: None,
         correction: closed.navigator.corrector().map(|corrector| corrector.counts().clone()),
         seed: arguments.seed,
         vehicle: scene.vehicle.name.clone(),
@@ -282,6 +295,7 @@ fn drawn(
     scene: &Scene,
     closed: &ClosedLoop,
     Kept { known, walked, .. }: &Kept,
+    planned: &[[f64; 2]],
     summary: &Summary,
 ) -> Result<Vec<u8>, report::EncodeError> {
     let driven = path_samples(closed);
@@ -317,7 +331,7 @@ fn drawn(
         unfamiliar: Some(&known.unfamiliar),
         driven: &driven,
         walked,
-        planned: &[],
+        planned,
         areas: Some(&scene.config.areas),
         start_m: [x_m, y_m],
         goal_m: scene.task.goal_m,

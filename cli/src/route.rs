@@ -1,5 +1,7 @@
 //! `surefoot route`: a way over measured ground and the speeds along it, as text, CSV, JSON and picture.
 
+use std::path::Path;
+
 use ::route::{
     FrictionCurve, GroundLayers, Planner, Route, RouteConfig, RouteError, RoutePoint, SpeedLimits,
 };
@@ -9,19 +11,20 @@ use friction::FrictionTable;
 use report::route::RoutePicture;
 use serde::Serialize;
 
-use crate::arguments::{BareGround, RouteArguments};
+use crate::arguments::{BareGround, RouteArguments, RouteGround};
 use crate::{UsageError, WorkFailed, summary};
 
 /// Share of the attitude limits that a route may use; the rest is for what no map shows.
 const ATTITUDE_SHARE: f64 = 0.9;
-/// Room beside the vehicle, in all [m].
-const MARGIN_M: f64 = 0.6;
+/// Room around the vehicle, in all [m].
+pub(crate) const MARGIN_M: f64 = 0.6;
 
 pub(crate) fn run(arguments: &RouteArguments) -> anyhow::Result<()> {
     let vehicle = read_vehicle(&arguments.vehicle).map_err(UsageError::from_input)?;
-    let limits = speed_limits(&vehicle, arguments);
+    let limits = speed_limits(&vehicle, arguments.speed);
     limits.validate().map_err(UsageError::from_input)?;
-    let planner = planner(&vehicle, arguments)?;
+    let planner =
+        planner(&vehicle, &arguments.world, &arguments.ground, vehicle.geometry.width_m + MARGIN_M)?;
     arguments.results.prepare()?;
     let start = arguments.start;
     let goal_m = [arguments.goal.x_m, arguments.goal.y_m];
@@ -32,17 +35,23 @@ pub(crate) fn run(arguments: &RouteArguments) -> anyhow::Result<()> {
 }
 
 /// Places where nobody can stand are bad input; no way between them is an answer.
-fn failed(error: RouteError) -> anyhow::Error {
+pub(crate) fn failed(error: RouteError) -> anyhow::Error {
     match error {
         RouteError::Outside { .. } | RouteError::Blocked { .. } => UsageError::from_input(error).into(),
         _ => WorkFailed(error.to_string()).into(),
     }
 }
 
-fn planner(vehicle: &Vehicle, arguments: &RouteArguments) -> Result<Planner, UsageError> {
-    let file = read_elevation(&arguments.world).map_err(UsageError::from_input)?;
-    let cell_m = arguments.cell.unwrap_or_else(|| file.elevation.geometry().resolution_m.clamp(0.5, 2.0));
-    let learned = learned(arguments)?;
+/// Searches the ground of an elevation file for routes of a vehicle, which are clear of obstacles by half of a width [m].
+pub(crate) fn planner(
+    vehicle: &Vehicle,
+    world: &Path,
+    asked: &RouteGround,
+    clear_width_m: f64,
+) -> Result<Planner, UsageError> {
+    let file = read_elevation(world).map_err(UsageError::from_input)?;
+    let cell_m = asked.cell.unwrap_or_else(|| file.elevation.geometry().resolution_m.clamp(0.5, 2.0));
+    let learned = learned(asked.friction.as_deref())?;
     let curve = |(name, published): (&str, FrictionCurve)| {
         learned.as_ref().map_or(published, |table| table.curve_or(name, published))
     };
@@ -51,27 +60,28 @@ fn planner(vehicle: &Vehicle, arguments: &RouteArguments) -> Result<Planner, Usa
         low_vegetation_fraction: file.layers.low_vegetation_fraction.as_ref(),
         water: file.layers.water.as_ref(),
         ground_gap_m: file.layers.ground_gap_m.as_ref(),
-        bare: curve(arguments.bare.published()),
+        bare: curve(asked.bare.published()),
         grass: curve(BareGround::Grass.published()),
     };
     let ground = layers.ground(cell_m).map_err(UsageError::from_input)?;
-    Planner::new(ground, config(vehicle)).map_err(UsageError::from_input)
+    Planner::new(ground, config(vehicle, clear_width_m)).map_err(UsageError::from_input)
 }
 
-fn config(vehicle: &Vehicle) -> RouteConfig {
+fn config(vehicle: &Vehicle, clear_width_m: f64) -> RouteConfig {
     RouteConfig {
-        clear_width_m: vehicle.geometry.width_m + MARGIN_M,
+        clear_width_m,
         pitch_max_rad: ATTITUDE_SHARE * vehicle.limits.pitch_max_rad,
         roll_max_rad: ATTITUDE_SHARE * vehicle.limits.roll_max_rad,
         ..RouteConfig::default()
     }
 }
 
-fn speed_limits(vehicle: &Vehicle, arguments: &RouteArguments) -> SpeedLimits {
+/// How fast a vehicle may become, at most as fast as asked [m/s].
+pub(crate) fn speed_limits(vehicle: &Vehicle, asked_mps: Option<f64>) -> SpeedLimits {
     let mass_kg = vehicle.body.mass_kg + 4.0 * vehicle.wheel.mass_kg;
     let per_torque = 1.0 / (vehicle.geometry.wheel_radius_m * mass_kg);
     SpeedLimits {
-        speed_max_mps: arguments.speed.unwrap_or(vehicle.limits.speed_max_mps),
+        speed_max_mps: asked_mps.unwrap_or(vehicle.limits.speed_max_mps),
         traction_max_mps2: (vehicle.drivetrain.drive_torque_max_nm * per_torque).min(100.0),
         braking_max_mps2: (vehicle.drivetrain.brake_torque_max_nm * per_torque).min(100.0),
         ..SpeedLimits::default()
@@ -85,8 +95,8 @@ impl BareGround {
 }
 
 /// The friction that drives showed, if a file was named.
-fn learned(arguments: &RouteArguments) -> Result<Option<FrictionTable>, UsageError> {
-    let Some(path) = &arguments.friction else { return Ok(None) };
+fn learned(path: Option<&Path>) -> Result<Option<FrictionTable>, UsageError> {
+    let Some(path) = path else { return Ok(None) };
     let text = ConfigText::read(path).map_err(UsageError::from_input)?;
     let table: FrictionTable = text.parse().map_err(UsageError::from_input)?;
     match table.validate() {
@@ -128,7 +138,7 @@ impl Summary {
             revision: summary::revision(),
             world: arguments.world.file_name().unwrap_or_default().to_string_lossy().into_owned(),
             vehicle: vehicle.name.clone(),
-            length_m: route.spacing_m * (points.len() - 1) as f64,
+            length_m: route.length_m(),
             duration_s: route.duration_s,
             climb_m: climbs_m.sum(),
             steepest_deg: largest(&slope).atan().to_degrees(),

@@ -10,6 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::WorkFailed;
 use crate::arguments::{Goal, StartPose};
+pub use crate::drive::GuidedSummary;
 use bench::closed_loop::Method;
 pub use scenarios::Outcome;
 
@@ -82,6 +83,9 @@ pub struct Summary {
     /// Whether a stop would have spared whom the vehicle struck; null when it struck nobody.
     #[serde(default)]
     pub was_avoidable: Option<bool>,
+    /// What became of the routes that the drive followed; null where it followed none.
+    #[serde(default)]
+    pub route: Option<GuidedSummary>,
     /// What became of the commands on their way to the vehicle; null where nobody corrects them.
     #[serde(default)]
     pub correction: Option<CorrectionCounts>,
@@ -179,6 +183,10 @@ impl fmt::Display for Summary {
         row("stops", told_counts(&self.stops))?;
         row("localisation", format!("{} jumps", self.localisation_jumps))?;
         row("refused", told_counts(&self.measurements_refused))?;
+        if let Some(GuidedSummary { map, length_m, expected_s, n_again, n_kept }) = &self.route {
+            row("route", format!("{length_m:.0} m in {expected_s:.0} s expected, over {map}"))?;
+            row("routes again", format!("{n_again}, {n_kept} times none other was found"))?;
+        }
         if let Some(correction) = &self.correction {
             row("correction", correction.to_string())?;
         }

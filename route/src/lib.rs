@@ -15,6 +15,8 @@
 //! measured; [`far_route`] searches it.
 //! [`GroundLayers`] makes the map of measured elevation.
 //!
+//! A [`Guide`] follows a vehicle along a route and tells what to head for.
+//!
 //! `examples/around_ice.rs` goes around a frozen pond.
 //!
 //! Frames: map, x east, y north, z up. SI units.
@@ -37,6 +39,7 @@ mod edges;
 mod far;
 mod friction;
 mod ground;
+mod guide;
 mod layers;
 mod line;
 mod planner;
@@ -51,6 +54,7 @@ pub use edges::Barrier;
 pub use far::{FarRoute, FarRouteError, far_route};
 pub use friction::FrictionCurve;
 pub use ground::{GroundCell, GroundError};
+pub use guide::Guide;
 pub use layers::GroundLayers;
 pub use planner::{Planner, PlannerError, Route, RouteError, RoutePoint};
 pub use speed::{Bend, SpeedError, SpeedLimits, duration_s, fastest_speeds};

@@ -36,6 +36,13 @@ pub struct Route {
     pub duration_s: f64,
 }
 
+impl Route {
+    /// Length of the line [m].
+    pub fn length_m(&self) -> f64 {
+        self.spacing_m * self.points.len().saturating_sub(1) as f64
+    }
+}
+
 /// A point of a route's line.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RoutePoint {
@@ -165,6 +172,17 @@ impl Planner {
         Ok(())
     }
 
+    /// Has an obstacle stand on a cell.
+    pub(crate) fn block(&mut self, cell: Cell) {
+        self.ground[cell].is_obstacle = true;
+        self.edges.update(&self.ground, &self.config, &CellRegion::of_cell(cell));
+    }
+
+    /// What forbids standing on a cell, if anything does.
+    pub(crate) fn barrier_at(&self, cell: Cell) -> Option<Barrier> {
+        self.edges.barrier_at(&self.ground, &self.config, cell)
+    }
+
     /// The cheapest route from a pose to a point, and the fastest speeds along it.
     ///
     /// # Errors
@@ -202,7 +220,7 @@ impl Planner {
     pub(crate) fn open_cell(&self, name: &'static str, at_m: [f64; 2]) -> Result<Cell, RouteError> {
         let cell = self.ground.geometry().cell_at(at_m[0], at_m[1]);
         let cell = cell.ok_or(RouteError::Outside { name, found_m: at_m })?;
-        match self.edges.barrier_at(&self.ground, &self.config, cell) {
+        match self.barrier_at(cell) {
             Some(barrier) => Err(RouteError::Blocked { name, at_m, barrier }),
             None => Ok(cell),
         }

@@ -51,6 +51,14 @@ pub struct DriveArguments {
           help_heading = "World")]
     pub walkers: usize,
 
+    /// Drive along a route, searched on the file of --world as `surefoot route` does, or on a map of the ground of before;
+    /// another one is searched where this is blocked by what the vehicle sees, or leads no farther
+    ///
+    /// The vehicle heads for a place of the route within what it sees, on whatever way its own map shows to be best.
+    #[arg(long, value_name = "MAP", num_args = 0..=1, require_equals = true, conflicts_with = "commands",
+          help_heading = "World")]
+    pub route: Option<Option<PathBuf>>,
+
     /// The machine that is simulated: a name or a TOML file [default: pietra_full_size; rc_car in the arena]
     ///
     /// Names: pietra_full_size (3.4 x 1.8 m), rc_car (0.33 x 0.25 m), buggy_fifth (1/5 scale), sedan.
@@ -246,6 +254,8 @@ Examples:
       `surefoot train kinodynamics` for this vehicle.
   surefoot drive --world hills.npz --start 12,-3,1.57 --goal 60,20
       Real elevation; negative coordinates are fine.
+  surefoot drive --world hills.npz --start 12,-3,1.57 --goal 260,240 --route --time-limit 900
+      Along a route over the whole file.
   surefoot drive --walkers 3
       Among people who cross the way.
   surefoot drive --goal 30,25 --goal 12,14

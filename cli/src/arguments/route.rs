@@ -26,6 +26,22 @@ pub struct RouteArguments {
     #[arg(long, value_name = "NAME|FILE", default_value = "pietra_full_size")]
     pub vehicle: String,
 
+    /// What the map is made of.
+    #[command(flatten)]
+    pub ground: RouteGround,
+
+    /// Fastest [m/s] [default: the vehicle's]
+    #[arg(long, value_name = "M/S", allow_hyphen_values = true)]
+    pub speed: Option<f64>,
+
+    /// Where the results go.
+    #[command(flatten)]
+    pub results: super::ResultArguments,
+}
+
+/// What a route is searched on, beside the heights.
+#[derive(Args, Clone, Debug, Default)]
+pub struct RouteGround {
     /// Edge of the map's cells [m] [default: that of the file, between 0.5 and 2]
     #[arg(long, value_name = "M", allow_hyphen_values = true)]
     pub cell: Option<f64>,
@@ -37,24 +53,17 @@ pub struct RouteArguments {
     /// Friction of the vehicle's own drives in place of the published, as `surefoot train friction` writes it (TOML)
     #[arg(long, value_name = "FILE")]
     pub friction: Option<PathBuf>,
-
-    /// Fastest [m/s] [default: the vehicle's]
-    #[arg(long, value_name = "M/S", allow_hyphen_values = true)]
-    pub speed: Option<f64>,
-
-    /// Where the results go.
-    #[command(flatten)]
-    pub results: super::ResultArguments,
 }
 
 /// Grounds that AnyNav states coefficients for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub enum BareGround {
     /// 0.98 static, 0.70 sliding
     Asphalt,
     /// 0.93, 0.62
     Rock,
     /// 0.68, 0.76
+    #[default]
     Dirt,
     /// 0.61, 0.65
     Grass,
