@@ -20,11 +20,10 @@ use traversability::CvarLevel;
 
 use crate::arguments::{DriveArguments, Goal, MapSource, Pace, StartPose};
 use crate::progress::{DriveProgress, ProgressLine};
+use crate::route::Guided;
 use crate::summary::{Milliseconds, Outcome, Summary, revision};
 use crate::{UsageError, interrupt};
 pub(crate) use correction::read_inverse_model;
-use guided::Guided;
-pub use guided::GuidedSummary;
 pub(crate) use knowledge::read_checkpoint;
 use open_loop::Script;
 use record::{KnownRisk, Recording, path_samples};
@@ -38,7 +37,7 @@ const PICTURE: &str = "drive.png";
 pub(crate) fn run(arguments: &DriveArguments) -> anyhow::Result<()> {
     arguments.bush_height_m()?;
     let scene = scene::prepare(arguments)?;
-    let mut guided = Guided::plan(arguments, &scene)?;
+    let mut guided = guided::plan(arguments, &scene)?;
     let mut closed = ClosedLoop::new(drive(arguments, &scene)?).map_err(|error| refused(arguments, error))?;
     closed.follow(scene::route(arguments, &scene.task)?)?;
     let results = &arguments.results;
@@ -58,8 +57,8 @@ pub(crate) fn run(arguments: &DriveArguments) -> anyhow::Result<()> {
         ..summarise(arguments, &scene, &closed, &kept, config_hash)
     };
     results.write_json(SUMMARY, &summary)?;
-    let planned = guided.as_ref().map_or(&[][..], Guided::line_m);
-    results.write(PICTURE, &drawn(&scene, &closed, &kept, planned, &summary)?)?;
+    let planned = guided.as_ref().map(|guided| guided.route().line_m()).unwrap_or_default();
+    results.write(PICTURE, &drawn(&scene, &closed, &kept, &planned, &summary)?)?;
     println!("{summary}");
     let files = [SUMMARY, RECORDING, PICTURE].map(|name| results.file(name));
     for path in files.iter().chain(&results.copy.json) {
@@ -165,7 +164,7 @@ fn follow(
             None => closed.cycle()?,
         };
         if let Some(guided) = &mut guided {
-            guided.lead(closed, cycle.map_ms.is_some())?;
+            guided::lead(guided, closed, scene.task.goal_tolerance_m, cycle.map_ms.is_some())?;
         }
         kept.tally.count(&cycle, closed.episode.cycle_s());
         if let Some(map) = closed.navigator.risk_map().filter(|_| cycle.map_ms.is_some()) {

@@ -1,41 +1,90 @@
 //! `surefoot route`: a way over measured ground and the speeds along it, as text, CSV, JSON and picture.
 
+mod guided;
+mod lead;
+
 use std::path::Path;
 
 use ::route::{
     FrictionCurve, GroundLayers, Planner, Route, RouteConfig, RouteError, RoutePoint, SpeedLimits,
 };
 use bicycle::Vehicle;
+use bus::channel::RunName;
 use formats::{ConfigText, read_elevation, read_vehicle};
 use friction::FrictionTable;
+use navigator::Config;
 use report::route::RoutePicture;
 use serde::Serialize;
 
-use crate::arguments::{BareGround, RouteArguments, RouteGround};
+use crate::arguments::{BareGround, RouteArguments, RouteGround, StartPose};
 use crate::{UsageError, WorkFailed, summary};
+pub use guided::GuidedSummary;
+pub(crate) use guided::{Guided, Place};
+use lead::Led;
 
 /// Share of the attitude limits that a route may use; the rest is for what no map shows.
 const ATTITUDE_SHARE: f64 = 0.9;
 /// Room around the vehicle, in all [m].
-pub(crate) const MARGIN_M: f64 = 0.6;
+const MARGIN_M: f64 = 0.6;
 
 pub(crate) fn run(arguments: &RouteArguments) -> anyhow::Result<()> {
     let vehicle = read_vehicle(&arguments.vehicle).map_err(UsageError::from_input)?;
-    let limits = speed_limits(&vehicle, arguments.speed);
-    limits.validate().map_err(UsageError::from_input)?;
+    let goal_m = [arguments.goal.x_m, arguments.goal.y_m];
+    if let Some(name) = &arguments.lead {
+        return lead(arguments, &vehicle, name, goal_m);
+    }
+    let limits = speed_limits(&vehicle, arguments.speed)?;
     let planner =
         planner(&vehicle, &arguments.world, &arguments.ground, vehicle.geometry.width_m + MARGIN_M)?;
     arguments.results.prepare()?;
-    let start = arguments.start;
-    let goal_m = [arguments.goal.x_m, arguments.goal.y_m];
+    let start =
+        arguments.start.ok_or_else(|| UsageError("--start: expected X,Y,YAW, found none".to_owned()))?;
     let route = planner.route(([start.x_m, start.y_m], start.yaw_rad), goal_m, &limits).map_err(failed)?;
-    let told = Summary::of(&route, &vehicle, arguments);
-    print!("{}", told.text());
-    write(&planner, &route, &told, arguments)
+    show(&planner, &route, &vehicle, arguments)
+}
+
+/// Leads the vehicle of a run to the goal, and shows the route that it drove in the end.
+fn lead(
+    arguments: &RouteArguments,
+    vehicle: &Vehicle,
+    name: &RunName,
+    goal_m: [f64; 2],
+) -> anyhow::Result<()> {
+    arguments.results.prepare()?;
+    let (mut led, heard) = Led::join(name)?;
+    let start = arguments.start.map_or(heard, |StartPose { x_m, y_m, yaw_rad }| Place {
+        at_m: [x_m, y_m],
+        yaw_rad,
+        ..heard
+    });
+    let machine = (vehicle, &Config::for_vehicle(vehicle));
+    let mut guided = guided(&arguments.world, &arguments.ground, arguments.speed, machine, start, goal_m)?;
+    let GuidedSummary { map, length_m, expected_s, .. } = guided.told();
+    println!("run {name}: {length_m:.0} m in {expected_s:.0} s expected, over {map}");
+    led.lead(&mut guided)?;
+    let GuidedSummary { n_again, n_kept, .. } = guided.told();
+    println!("run {name}: goal reached; {n_again} routes again, {n_kept} times none other was found");
+    show(guided.planner(), guided.route(), vehicle, arguments)
+}
+
+/// A route to lead a vehicle along, over the ground of an elevation file.
+pub(crate) fn guided(
+    world: &Path,
+    asked: &RouteGround,
+    asked_mps: Option<f64>,
+    (vehicle, config): (&Vehicle, &Config),
+    start: Place,
+    goal_m: [f64; 2],
+) -> anyhow::Result<Guided> {
+    // Whoever turns on the way sweeps his length.
+    let planner = planner(vehicle, world, asked, vehicle.geometry.length_m + MARGIN_M)?;
+    let limits = speed_limits(vehicle, asked_mps)?;
+    let map = world.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    Guided::plan((planner, limits, map), (vehicle, config), start, goal_m).map_err(failed)
 }
 
 /// Places where nobody can stand are bad input; no way between them is an answer.
-pub(crate) fn failed(error: RouteError) -> anyhow::Error {
+fn failed(error: RouteError) -> anyhow::Error {
     match error {
         RouteError::Outside { .. } | RouteError::Blocked { .. } => UsageError::from_input(error).into(),
         _ => WorkFailed(error.to_string()).into(),
@@ -43,7 +92,7 @@ pub(crate) fn failed(error: RouteError) -> anyhow::Error {
 }
 
 /// Searches the ground of an elevation file for routes of a vehicle, which are clear of obstacles by half of a width [m].
-pub(crate) fn planner(
+fn planner(
     vehicle: &Vehicle,
     world: &Path,
     asked: &RouteGround,
@@ -77,15 +126,17 @@ fn config(vehicle: &Vehicle, clear_width_m: f64) -> RouteConfig {
 }
 
 /// How fast a vehicle may become, at most as fast as asked [m/s].
-pub(crate) fn speed_limits(vehicle: &Vehicle, asked_mps: Option<f64>) -> SpeedLimits {
+fn speed_limits(vehicle: &Vehicle, asked_mps: Option<f64>) -> Result<SpeedLimits, UsageError> {
     let mass_kg = vehicle.body.mass_kg + 4.0 * vehicle.wheel.mass_kg;
     let per_torque = 1.0 / (vehicle.geometry.wheel_radius_m * mass_kg);
-    SpeedLimits {
+    let limits = SpeedLimits {
         speed_max_mps: asked_mps.unwrap_or(vehicle.limits.speed_max_mps),
         traction_max_mps2: (vehicle.drivetrain.drive_torque_max_nm * per_torque).min(100.0),
         braking_max_mps2: (vehicle.drivetrain.brake_torque_max_nm * per_torque).min(100.0),
         ..SpeedLimits::default()
-    }
+    };
+    limits.validate().map_err(UsageError::from_input)?;
+    Ok(limits)
 }
 
 impl BareGround {
@@ -180,13 +231,16 @@ impl Summary {
 /// Corners that are printed, at most.
 const CORNERS: usize = 24;
 
-fn write(
+/// Prints a route and leaves its files.
+fn show(
     planner: &Planner,
     route: &Route,
-    summary: &Summary,
+    vehicle: &Vehicle,
     arguments: &RouteArguments,
 ) -> anyhow::Result<()> {
-    arguments.results.write_json("route.json", summary)?;
+    let summary = Summary::of(route, vehicle, arguments);
+    print!("{}", summary.text());
+    arguments.results.write_json("route.json", &summary)?;
     arguments.results.write("route.csv", csv(route).as_bytes())?;
     let title = format!("{}: {:.0} m in {:.0} s", summary.vehicle, summary.length_m, summary.duration_s);
     let subtitle = format!(

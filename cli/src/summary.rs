@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::WorkFailed;
 use crate::arguments::{Goal, StartPose};
-pub use crate::drive::GuidedSummary;
+pub use crate::route::GuidedSummary;
 use bench::closed_loop::Method;
 pub use scenarios::Outcome;
 

@@ -17,7 +17,7 @@ pub struct Guide {
 impl Guide {
     /// Nobody has set out on it yet; a reach of at least two points [m].
     pub fn new(route: &Route, reach_m: f64) -> Self {
-        let points_m: Vec<[f64; 2]> = route.points.iter().map(|point| point.at_m).collect();
+        let points_m = route.line_m();
         let reach = (reach_m / route.spacing_m).round().clamp(2.0, points_m.len().max(2) as f64) as usize;
         Self { points_m, spacing_m: route.spacing_m, reach, abreast: 0, headed: None }
     }
@@ -48,11 +48,6 @@ impl Guide {
             libm::hypot(x_m - at_m[0], y_m - at_m[1])
         };
         window.min_by(|one, other| away_m(one).total_cmp(&away_m(other))).unwrap_or(self.abreast)
-    }
-
-    /// Between two points of the line [m].
-    pub fn spacing_m(&self) -> f64 {
-        self.spacing_m
     }
 
     /// Way made along the line [m].

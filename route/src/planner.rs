@@ -37,6 +37,11 @@ pub struct Route {
 }
 
 impl Route {
+    /// The places of the line [m].
+    pub fn line_m(&self) -> Vec<[f64; 2]> {
+        self.points.iter().map(|point| point.at_m).collect()
+    }
+
     /// Length of the line [m].
     pub fn length_m(&self) -> f64 {
         self.spacing_m * self.points.len().saturating_sub(1) as f64

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use bus::channel::RunName;
 use clap::{Args, ValueEnum};
 
 use super::values::{Goal, StartPose};
@@ -14,9 +15,9 @@ pub struct RouteArguments {
     #[arg(long, value_name = "FILE")]
     pub world: PathBuf,
 
-    /// Where the vehicle stands [m, m, rad]
-    #[arg(long, value_name = "X,Y,YAW", allow_hyphen_values = true)]
-    pub start: StartPose,
+    /// Where the vehicle stands [m, m, rad] [default with --lead: where it says to be]
+    #[arg(long, value_name = "X,Y,YAW", allow_hyphen_values = true, required_unless_present = "lead")]
+    pub start: Option<StartPose>,
 
     /// Where it shall go [m]
     #[arg(long, value_name = "X,Y", allow_hyphen_values = true)]
@@ -33,6 +34,13 @@ pub struct RouteArguments {
     /// Fastest [m/s] [default: the vehicle's]
     #[arg(long, value_name = "M/S", allow_hyphen_values = true)]
     pub speed: Option<f64>,
+
+    /// Lead the vehicle of a run (`surefoot up --standby`) along the route until it is at the goal; another route is searched
+    /// where this one is blocked by what the vehicle sees, or leads no farther
+    ///
+    /// It is told to head for a place of the route within what it sees; on which way it gets there, its own map decides.
+    #[arg(long, value_name = "RUN")]
+    pub lead: Option<RunName>,
 
     /// Where the results go.
     #[command(flatten)]
@@ -94,4 +102,6 @@ table, or from --friction for the grounds that are in it. Nothing is learned fro
 Examples:
   surefoot route --world hills.npz --start 20,20,0.8 --goal 250,240
   surefoot route --world hills.npz --start 20,20,0.8 --goal 250,240 --bare mud --speed 5 --vehicle mine.toml
-  surefoot route --world hills.npz --start 20,20,0.8 --goal 250,240 --friction friction.toml";
+  surefoot route --world hills.npz --start 20,20,0.8 --goal 250,240 --friction friction.toml
+  surefoot route --world hills.npz --goal 250,240 --lead field
+      The vehicle of the run `field`, from where it stands.";
