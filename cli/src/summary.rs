@@ -245,6 +245,7 @@ mod tests {
             walkers: 0,
             walked_into: 0,
             was_avoidable: None,
+            route: None,
             correction: None,
             seed: 1,
             vehicle: "pietra_full_size".to_owned(),
