@@ -39,8 +39,11 @@ pub(crate) fn run(arguments: &RouteArguments) -> anyhow::Result<()> {
     arguments.results.prepare()?;
     let start =
         arguments.start.ok_or_else(|| UsageError("--start: expected X,Y,YAW, found none".to_owned()))?;
-    let route = planner.route(([start.x_m, start.y_m], start.yaw_rad), goal_m, &limits).map_err(failed)?;
-    show(&planner, &route, &vehicle, arguments)
+    let from = ([start.x_m, start.y_m], start.yaw_rad);
+    let route = planner.route(from, goal_m, &limits).map_err(failed)?;
+    let n_others = usize::from(arguments.alternatives);
+    let others = planner.alternatives(from, goal_m, &limits, &route, n_others).map_err(failed)?;
+    show(&planner, &route, &others, &vehicle, arguments)
 }
 
 /// Leads the vehicle of a run to the goal, and shows the route that it drove in the end.
@@ -64,7 +67,7 @@ fn lead(
     led.lead(&mut guided)?;
     let GuidedSummary { n_again, n_kept, .. } = guided.told();
     println!("run {name}: goal reached; {n_again} routes again, {n_kept} times none other was found");
-    show(guided.planner(), guided.route(), vehicle, arguments)
+    show(guided.planner(), guided.route(), &[], vehicle, arguments)
 }
 
 /// A route to lead a vehicle along, over the ground of an elevation file.
@@ -172,6 +175,21 @@ struct Summary {
     cost_m: f64,
     n_expanded: usize,
     corners_m: Vec<[f64; 2]>,
+    alternatives: Vec<Alternative>,
+}
+
+/// Another way to the same goal.
+#[derive(Serialize)]
+struct Alternative {
+    length_m: f64,
+    duration_s: f64,
+    line_m: Vec<[f64; 2]>,
+}
+
+impl Alternative {
+    fn of(route: &Route) -> Self {
+        Self { length_m: route.length_m(), duration_s: route.duration_s, line_m: route.line_m() }
+    }
 }
 
 impl Summary {
@@ -199,6 +217,7 @@ impl Summary {
             cost_m: route.cost_m,
             n_expanded: route.n_expanded,
             corners_m: corners.map(|point| point.at_m).collect(),
+            alternatives: Vec::new(),
         }
     }
 
@@ -210,10 +229,14 @@ impl Summary {
         } else {
             String::new()
         };
+        let other = |Alternative { length_m, duration_s, .. }: &Alternative| {
+            format!("  another way        {length_m:.1} m in {duration_s:.1} s\n")
+        };
+        let others: String = self.alternatives.iter().map(other).collect();
         format!(
             "  {} over {}\n  length             {:.1} m\n  expected time      {:.1} s\n  climb              {:.1} m\n  \
              steepest           {:.1} deg\n  fastest            {:.1} m/s\n  tightest radius    {:.1} m{warning}\n  \
-             states expanded    {}\n  corners            {}\n",
+             states expanded    {}\n{others}  corners            {}\n",
             self.vehicle,
             self.world,
             self.length_m,
@@ -235,10 +258,12 @@ const CORNERS: usize = 24;
 fn show(
     planner: &Planner,
     route: &Route,
+    others: &[Route],
     vehicle: &Vehicle,
     arguments: &RouteArguments,
 ) -> anyhow::Result<()> {
-    let summary = Summary::of(route, vehicle, arguments);
+    let alternatives = others.iter().map(Alternative::of).collect();
+    let summary = Summary { alternatives, ..Summary::of(route, vehicle, arguments) };
     print!("{}", summary.text());
     arguments.results.write_json("route.json", &summary)?;
     arguments.results.write("route.csv", csv(route).as_bytes())?;
@@ -247,7 +272,8 @@ fn show(
         "{}, climb {:.0} m, steepest {:.0} deg, tightest radius {:.1} m",
         summary.world, summary.climb_m, summary.steepest_deg, summary.tightest_radius_m
     );
-    let picture = RoutePicture { title: &title, subtitle: &subtitle, ground: planner.ground(), route };
+    let picture =
+        RoutePicture { title: &title, subtitle: &subtitle, ground: planner.ground(), route, others };
     arguments.results.write("route.png", &report::route::picture(&picture)?)?;
     println!("\n  route.png, route.csv and route.json in {}", arguments.results.out.display());
     Ok(())

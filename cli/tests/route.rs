@@ -41,6 +41,10 @@ fn a_route_takes_the_ford_and_leaves_text_table_and_picture() {
     let length_m = summary["length_m"].as_f64().unwrap();
     assert!((146.5..175.0).contains(&length_m), "{length_m}");
     assert!(summary["duration_s"].as_f64().unwrap() > length_m / 3.0);
+    // Other ways, too, lead through the ford.
+    let others = summary["alternatives"].as_array().unwrap();
+    assert!(!others.is_empty() && told.contains("another way"), "{told}");
+    assert!(others.iter().all(|other| other["length_m"].as_f64().unwrap() > 146.5), "{others:?}");
     let table = std::fs::read_to_string(out.join("route.csv")).unwrap();
     let places = table.lines().skip(1).map(|line| {
         let numbers: Vec<f64> = line.split(',').map(|word| word.parse().unwrap()).collect();

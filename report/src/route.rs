@@ -32,6 +32,8 @@ pub struct RoutePicture<'a> {
     pub ground: &'a GridMap<GroundCell>,
     /// The route.
     pub route: &'a Route,
+    /// Other ways to the same goal.
+    pub others: &'a [Route],
 }
 
 /// Draws a route as a PNG of 1600 px width.
@@ -44,7 +46,7 @@ pub fn picture(picture: &RoutePicture<'_>) -> Result<Vec<u8>, EncodeError> {
 
 fn page(picture: &RoutePicture<'_>) -> Canvas {
     let slot = Slot { left: LEFT, top: TOP, width: MAP_WIDTH, height_min: 420.0, height_max: 980.0 };
-    let (world, interest) = (bounds(picture.ground), interest(picture.route));
+    let (world, interest) = (bounds(picture.ground), interest(picture));
     let margin_m =
         0.15 * (0..2).map(|k| interest.north_east_m[k] - interest.south_west_m[k]).fold(20.0, f64::max);
     let axes = map_axes(interest, margin_m, world, slot);
@@ -65,8 +67,9 @@ fn bounds(ground: &GridMap<GroundCell>) -> Bounds {
     Bounds { south_west_m, north_east_m }
 }
 
-fn interest(route: &Route) -> Bounds {
-    let along = |axis: usize| route.points.iter().map(move |point| point.at_m[axis]);
+fn interest(picture: &RoutePicture<'_>) -> Bounds {
+    let ways = std::iter::once(picture.route).chain(picture.others);
+    let along = |axis: usize| ways.clone().flat_map(|way| &way.points).map(move |point| point.at_m[axis]);
     Bounds {
         south_west_m: [0, 1].map(|axis| along(axis).fold(f64::INFINITY, f64::min)),
         north_east_m: [0, 1].map(|axis| along(axis).fold(f64::NEG_INFINITY, f64::max)),
@@ -82,10 +85,13 @@ fn draw_map(picture: &RoutePicture<'_>, axes: &Axes, canvas: &mut Canvas) {
         colour(picture.ground, x_m, y_m)
     });
     canvas.image(axes.frame.x, axes.frame.y, &Image { width, pixels: pixels.collect() });
-    let points: Vec<Point> =
-        picture.route.points.iter().map(|point| axes.place(point.at_m[0], point.at_m[1])).collect();
+    let placed = |way: &Route| -> Vec<Point> {
+        way.points.iter().map(|point| axes.place(point.at_m[0], point.at_m[1])).collect()
+    };
+    let points = placed(picture.route);
     let scale_mps = speed_scale_mps(picture.route);
     canvas.clipped(axes.frame, |canvas| {
+        picture.others.iter().for_each(|other| draw_other(&placed(other), canvas));
         canvas.polyline(&points, Stroke::solid(Rgb::INK, 9.0));
         for (ends, point) in points.windows(2).zip(&picture.route.points) {
             let colour = Ramp::SPEED.at((point.speed_mps / scale_mps) as f32);
@@ -99,6 +105,12 @@ fn draw_map(picture: &RoutePicture<'_>, axes: &Axes, canvas: &mut Canvas) {
         }
     });
     axes.draw_labelled(canvas, "east x [m]", "north y [m]");
+}
+
+/// The look of another way, here and in the legend.
+fn draw_other(points: &[Point], canvas: &mut Canvas) {
+    canvas.polyline(points, Stroke::solid(Rgb::WHITE, 5.0));
+    canvas.polyline(points, Stroke { colour: Rgb::INK, width: 2.5, dash: "9 6" });
 }
 
 /// How good the ground is, in the light of its slope.
@@ -142,6 +154,11 @@ fn draw_legend(picture: &RoutePicture<'_>, top: f64, canvas: &mut Canvas) {
         canvas.rect(swatch, colour, 1.0);
         canvas.frame(swatch, Stroke::solid(Rgb::INK_SOFT, 1.0));
         canvas.text((LEGEND_X + 44.0, y + 2.0), text, TextStyle::new(17, Anchor::Start));
+    }
+    if !picture.others.is_empty() {
+        let y = top + 358.0;
+        draw_other(&[(LEGEND_X, y - 4.0), (LEGEND_X + 32.0, y - 4.0)], canvas);
+        canvas.text((LEGEND_X + 44.0, y + 2.0), "another way", TextStyle::new(17, Anchor::Start));
     }
 }
 

@@ -123,6 +123,11 @@ impl Edges {
         }
     }
 
+    /// Multiplies the costs of the edges that are stored with a cell.
+    pub fn make_dearer(&mut self, index: usize, factor: f32) {
+        self.edges[index].iter_mut().for_each(|edge| edge.cost *= factor);
+    }
+
     /// The edge from the cell with an index in a direction; closed beyond the map.
     #[inline]
     pub fn at(&self, index: usize, direction: usize) -> Edge {

@@ -183,6 +183,16 @@ impl Planner {
         self.edges.update(&self.ground, &self.config, &CellRegion::of_cell(cell));
     }
 
+    /// Makes every way from or over a cell dearer; for this planner alone, until the ground there changes.
+    pub(crate) fn make_dearer(&mut self, index: usize, factor: f32) {
+        self.edges.make_dearer(index, factor);
+    }
+
+    /// Room that a route leaves to both sides together [m].
+    pub(crate) fn clear_width_m(&self) -> f64 {
+        self.config.clear_width_m
+    }
+
     /// What forbids standing on a cell, if anything does.
     pub(crate) fn barrier_at(&self, cell: Cell) -> Option<Barrier> {
         self.edges.barrier_at(&self.ground, &self.config, cell)

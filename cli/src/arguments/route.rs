@@ -35,6 +35,11 @@ pub struct RouteArguments {
     #[arg(long, value_name = "M/S", allow_hyphen_values = true)]
     pub speed: Option<f64>,
 
+    /// Other ways to show beside the best, at most: of ways of their own for two fifths of their length, and at most half as
+    /// long again in time
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(..=5), default_value_t = 2)]
+    pub alternatives: u8,
+
     /// Lead the vehicle of a run (`surefoot up --standby`) along the route until it is at the goal; another route is searched
     /// where this one is blocked by what the vehicle sees, or leads no farther
     ///
