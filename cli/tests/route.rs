@@ -8,6 +8,9 @@ use std::path::Path;
 use std::process::{Command, Output};
 
 use tempfile::TempDir;
+use tiff::encoder::TiffEncoder;
+use tiff::encoder::colortype::Gray32Float;
+use tiff::tags::Tag;
 
 /// A plain of 120 m with a pond from 40 to 60 m east that leaves a ford between 80 and 90 m north, and, east of 100 m,
 /// ground that nobody measured.
@@ -54,6 +57,39 @@ fn a_route_takes_the_ford_and_leaves_text_table_and_picture() {
     let is_in_the_pond = |[x, y]: &[f64; 2]| (40.0..60.0).contains(x) && !(80.0..90.0).contains(y);
     assert!(!places.into_iter().any(|place| is_in_the_pond(&place)));
     assert!(std::fs::read(out.join("route.png")).unwrap().starts_with(b"\x89PNG"));
+}
+
+/// A plain of 40 m whose south-west corner lies on the equator, where zone 33 of UTM has its middle.
+fn plain_on_the_globe(path: &Path) {
+    let mut encoder = TiffEncoder::new(std::fs::File::create(path).unwrap()).unwrap();
+    let mut image = encoder.new_image::<Gray32Float>(40, 40).unwrap();
+    let tags = image.encoder();
+    tags.write_tag(Tag::ModelPixelScaleTag, [1.0, 1.0, 0.0].as_slice()).unwrap();
+    tags.write_tag(Tag::ModelTiepointTag, [0.0, 0.0, 0.0, 500_000.0, 40.0, 0.0].as_slice()).unwrap();
+    tags.write_tag(Tag::GeoKeyDirectoryTag, [1_u16, 1, 0, 1, 3072, 0, 1, 32633].as_slice()).unwrap();
+    image.write_data(&[2.0; 40 * 40]).unwrap();
+}
+
+#[test]
+fn where_the_file_tells_its_reference_system_the_route_is_one_of_the_globe() {
+    let folder = tempfile::tempdir().unwrap();
+    let world = folder.path().join("plain.tif");
+    plain_on_the_globe(&world);
+    let out = folder.path().join("out");
+    let found = route(world.to_str().unwrap(), &out, &["--start", "10,20,0", "--goal", "30,20"]);
+    assert!(found.status.success(), "{}", String::from_utf8_lossy(&found.stderr));
+    assert!(String::from_utf8(found.stdout).unwrap().contains("route.geojson"));
+    let told: serde_json::Value =
+        serde_json::from_slice(&std::fs::read(out.join("route.geojson")).unwrap()).unwrap();
+    let way = &told["features"][0];
+    assert!((way["properties"]["length_m"].as_f64().unwrap() - 20.0).abs() < 0.5, "{way}");
+    let line = way["geometry"]["coordinates"].as_array().unwrap();
+    let end = line.last().unwrap();
+    // 30 m east of the middle, in a projection of scale 0.9996, on a circle of 6378137 m.
+    let longitude_deg = 15.0 + (30.0_f64 / 0.9996 / 6_378_137.0).to_degrees();
+    assert!((end[0].as_f64().unwrap() - longitude_deg).abs() < 1e-8, "{end}");
+    // 20 m north, where a degree of latitude is 110 574 m.
+    assert!((end[1].as_f64().unwrap() - 20.0 / 0.9996 / 110_574.0).abs() < 1e-7, "{end}");
 }
 
 #[test]

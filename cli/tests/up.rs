@@ -111,25 +111,16 @@ fn files_that_are_none_are_refused_with_what_was_expected() {
 #[test]
 fn a_run_tells_no_more_than_is_asked_for() {
     let folder = tempfile::tempdir().unwrap();
-    let tell = |level: &str| {
-        let words = [
-            "up",
-            "--method",
-            "physics",
-            "--time-limit",
-            "1",
-            "--log-level",
-            level,
-            "--run",
-            &run_name(level),
-        ];
-        let output = surefoot(&words).arg("--out").arg(folder.path().join(level)).output().unwrap();
+    let tell = |level: &str, limit_s: &str| {
+        let words = ["up", "--method", "physics", "--log-level", level, "--time-limit", limit_s, "--run"];
+        let mut up = surefoot(&words);
+        let output = up.arg(run_name(level)).arg("--out").arg(folder.path().join(level)).output().unwrap();
         [&output.stdout, &output.stderr].map(|told| text(told))
     };
-    let [shown, told] = tell("info");
+    let [shown, told] = tell("info", "5");
     assert!(shown.contains("  control "), "statuses are shown: {shown}");
-    assert!(told.lines().any(|line| line == "surefoot: driving"), "{told}");
-    let [shown, told] = tell("error");
+    assert!(told.lines().any(|line| line.starts_with("surefoot: mission: driving to")), "{told}");
+    let [shown, told] = tell("error", "1");
     assert!(!shown.contains("  control "), "{shown}");
     let [plant, supervisor] = told.lines().collect::<Vec<_>>()[..] else {
         panic!("expected two lines: {told}")

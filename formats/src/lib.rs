@@ -24,6 +24,7 @@ mod drive_log_csv;
 mod elevation;
 mod gap_case;
 mod gap_case_write;
+mod geojson;
 mod journal;
 mod model_text;
 mod numpy;
@@ -57,6 +58,7 @@ pub use gap_case_write::{
     GapSeal, GapSealError, read_sealed_labels, write_gap_case, write_gap_labels, write_gap_seal,
     write_gap_vehicle,
 };
+pub use geojson::{GeoJsonError, GeoLine, MapReference, geojson};
 pub use journal::{Journal, JournalContent, JournalError, read_journal};
 pub use model_text::{model_text, toml_text};
 pub use overlay::overlay;

@@ -1,7 +1,7 @@
 //! Other ways to the same goal: the penalty method (Bader et al. 2011, Alternative Route Graphs in Road Networks). What lies
 //! near a way that was found is made dearer, and the search repeated.
 
-use crate::{Planner, Route, RouteError, SpeedLimits};
+use crate::{Planner, Route, SpeedLimits};
 use terrain::CellRegion;
 
 /// How much dearer ground near a way becomes.
@@ -17,10 +17,8 @@ const TRIES: usize = 3;
 
 impl Planner {
     /// At most `n` ways beside the best, the one first that was found first: none shares more than 0.6 of its length with
-    /// those before it and the best, and none takes more than 1.5 times as long as that.
-    ///
-    /// # Errors
-    /// As of [`Planner::route`], which found the best.
+    /// those before it and the best, and none takes more than 1.5 times as long as that. Fewer where no other is found that
+    /// can be driven.
     pub fn alternatives(
         &self,
         start: ([f64; 2], f64),
@@ -28,7 +26,7 @@ impl Planner {
         limits: &SpeedLimits,
         best: &Route,
         n: usize,
-    ) -> Result<Vec<Route>, RouteError> {
+    ) -> Vec<Route> {
         let mut dearer = self.clone();
         let mut is_near = vec![false; self.ground().geometry().n_cells()];
         let near_m = (NEAR_SHARE * best.length_m()).max(self.clear_width_m());
@@ -38,14 +36,14 @@ impl Planner {
             if found.len() == n {
                 break;
             }
-            let next = dearer.route(start, goal_m, limits)?;
+            let Ok(next) = dearer.route(start, goal_m, limits) else { break };
             let is_another = self.shared(&next, &is_near) <= SHARED_MAX;
             dearer.burden(&next, near_m, &mut is_near);
             if is_another && next.duration_s <= TIME_RATIO_MAX * best.duration_s {
                 found.push(next);
             }
         }
-        Ok(found)
+        found
     }
 
     /// Makes the ground near a way dearer, and marks it.
@@ -99,7 +97,7 @@ mod tests {
     fn alternatives(planner: &Planner, n: usize) -> (Route, Vec<Route>) {
         let (start, goal_m, limits) = (([10.5, 40.5], 0.0), [90.5, 40.5], SpeedLimits::default());
         let best = planner.route(start, goal_m, &limits).unwrap();
-        let others = planner.alternatives(start, goal_m, &limits, &best, n).unwrap();
+        let others = planner.alternatives(start, goal_m, &limits, &best, n);
         (best, others)
     }
 

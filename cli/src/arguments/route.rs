@@ -97,7 +97,8 @@ than nine tenths of the vehicle's limits, or under water is not driven on. Where
 names what blocks it, and where.";
 
 const AFTER_HELP: &str = "\
-Writes route.png, route.csv and route.json.
+Writes route.png, route.csv and route.json; for a GeoTIFF that names its reference system (EPSG) also route.geojson, in
+longitude and latitude.
   route.csv   x_m, y_m, yaw_rad, height_m, speed_mps, curvature_per_m, grade, friction along the way
   path        `surefoot path` takes the corners that are printed
 

@@ -2,6 +2,7 @@
 
 use ::route::{Guide, Planner, Route, RouteError, SpeedLimits};
 use bicycle::Vehicle;
+use formats::MapReference;
 use navigator::Config;
 use serde::{Deserialize, Serialize};
 use terrain::{GridMap, SurfaceCell, TerrainClass};
@@ -24,9 +25,19 @@ pub(crate) struct Place {
     pub time_s: f64,
 }
 
+/// A map that routes are searched on.
+pub(super) struct SearchedMap {
+    pub planner: Planner,
+    /// Name of its file.
+    pub name: String,
+    /// Where it lies on the globe, if the file tells.
+    pub reference: Option<MapReference>,
+}
+
 /// Leads a vehicle along a route.
 pub(crate) struct Guided {
     planner: Planner,
+    reference: Option<MapReference>,
     limits: SpeedLimits,
     goal_m: [f64; 2],
     reach_m: f64,
@@ -59,15 +70,16 @@ impl Guided {
     ///
     /// # Errors
     /// There is none.
-    pub fn plan(
-        (planner, limits, map): (Planner, SpeedLimits, String),
+    pub(super) fn plan(
+        SearchedMap { planner, name, reference }: SearchedMap,
+        limits: SpeedLimits,
         (vehicle, config): (&Vehicle, &Config),
         start: Place,
         goal_m: [f64; 2],
     ) -> Result<Self, RouteError> {
         let route = planner.route((start.at_m, start.yaw_rad), goal_m, &limits)?;
         let told = GuidedSummary {
-            map,
+            map: name,
             length_m: route.length_m(),
             expected_s: route.duration_s,
             ..GuidedSummary::default()
@@ -77,6 +89,7 @@ impl Guided {
             guide: Guide::new(&route, reach_m),
             route,
             planner,
+            reference,
             limits,
             goal_m,
             reach_m,
@@ -139,6 +152,11 @@ impl Guided {
     /// The route that is driven now, or was last.
     pub fn route(&self) -> &Route {
         &self.route
+    }
+
+    /// Where the map lies on the globe, if its file tells.
+    pub fn reference(&self) -> Option<MapReference> {
+        self.reference
     }
 
     /// The map, with the obstacles that were seen.

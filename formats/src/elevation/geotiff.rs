@@ -17,6 +17,9 @@ mod key {
     pub(super) const MODEL_TYPE_GEOGRAPHIC: u64 = 2;
     pub(super) const RASTER_TYPE: u64 = 1025;
     pub(super) const RASTER_TYPE_POINT: u64 = 2;
+    pub(super) const PROJECTED_SYSTEM: u64 = 3072;
+    /// Codes from here on are nobody's.
+    pub(super) const PROJECTED_SYSTEM_OWN: u64 = 32767;
     pub(super) const LINEAR_UNITS: u64 = 3076;
     pub(super) const LINEAR_UNITS_METRE: u64 = 9001;
 }
@@ -54,7 +57,11 @@ pub(super) fn read(mut file: impl Read + Seek, n_bytes: u64) -> Result<Elevation
     let heights_m = heights_m.into_iter().map(|height| if hole(height) { f32::NAN } else { height as f32 });
     let heights_m: Vec<f32> = flip_rows(&heights_m.collect::<Vec<_>>(), n_cols).collect();
     let geometry = GridGeometry { resolution_m: cell_m, origin: [0, 0], n_rows, n_cols };
-    Ok(ElevationFile { file_south_west_m, ..assemble("pixels", geometry, heights_m)? })
+    Ok(ElevationFile {
+        file_south_west_m,
+        epsg: keys.projected_system(),
+        ..assemble("pixels", geometry, heights_m)?
+    })
 }
 
 /// The decoder takes memory for as many values as an entry of the directory claims before it looks at its limits.
@@ -203,6 +210,13 @@ impl GeoKeys {
                 Err(Refusal::new("tag 34735 (coordinates)", "metres (unit 9001)", found))
             }
         }
+    }
+
+    /// Code of EPSG of the projected coordinates.
+    fn projected_system(&self) -> Option<u16> {
+        let code =
+            self.get(key::PROJECTED_SYSTEM).filter(|code| (1..key::PROJECTED_SYSTEM_OWN).contains(code))?;
+        code.try_into().ok()
     }
 
     fn get(&self, key: u64) -> Option<u64> {

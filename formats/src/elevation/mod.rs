@@ -9,6 +9,7 @@ use std::path::Path;
 use terrain::{GridGeometry, GridMap};
 
 use crate::ConfigError;
+use crate::MapReference;
 use crate::cells::CellLimit;
 use crate::numpy::check_cell;
 use crate::refusal::{ArrayFileError, Refusal};
@@ -24,8 +25,17 @@ pub struct ElevationFile {
     pub n_holes: usize,
     /// The grid's south-west corner in the file's own coordinates (GeoTIFF), else (0, 0).
     pub file_south_west_m: [f64; 2],
+    /// Code of the reference system of these coordinates in the registry of EPSG, where the file tells one (GeoTIFF).
+    pub epsg: Option<u16>,
     /// What else the file says of each cell.
     pub layers: ElevationLayers,
+}
+
+impl ElevationFile {
+    /// Where the map frame lies on the globe, if the file tells.
+    pub fn reference(&self) -> Option<MapReference> {
+        Some(MapReference { epsg: self.epsg?, origin_m: self.file_south_west_m })
+    }
 }
 
 /// Optional layers, each of the elevation's geometry; NaN where the file knows nothing, never infinite.
@@ -127,7 +137,13 @@ fn assemble(field: &str, geometry: GridGeometry, heights_m: Vec<f32>) -> Result<
     let n_values = heights_m.len();
     let elevation = GridMap::from_values(geometry, heights_m)
         .ok_or_else(|| Refusal::new(field, format!("{} cells", geometry.n_cells()), n_values))?;
-    Ok(ElevationFile { elevation, n_holes, file_south_west_m: [0.0; 2], layers: ElevationLayers::default() })
+    Ok(ElevationFile {
+        elevation,
+        n_holes,
+        file_south_west_m: [0.0; 2],
+        epsg: None,
+        layers: ElevationLayers::default(),
+    })
 }
 
 /// Images start in the north, maps in the south.

@@ -59,6 +59,14 @@ fn a_geotiff_is_turned_over_and_placed() {
     let file = read_elevation(&geotiff(&folder, &hill_from_north(f32::NAN), &tags, Some("nan"))).unwrap();
     assert_is_hill(&file, 0.0);
     assert_eq!(file.file_south_west_m, [499_999.0, 4_000_001.0]);
+    assert_eq!(file.reference(), None, "it does not say in which system");
+    // Zone 33 of UTM on WGS 84; 32767 is one of the file's own.
+    for (code, found) in [(32633, Some(32633)), (32767, None)] {
+        let keys = (Tag::GeoKeyDirectoryTag, vec![1.0, 1.0, 0.0, 1.0, 3072.0, 0.0, 1.0, f64::from(code)]);
+        let file = read_elevation(&geotiff(&folder, &hill_from_north(0.0), &[scale_m(2.0, 2.0), keys], None))
+            .unwrap();
+        assert_eq!(file.epsg, found);
+    }
 }
 
 #[test]
