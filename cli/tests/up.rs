@@ -129,6 +129,24 @@ fn a_run_tells_no_more_than_is_asked_for() {
     assert!(supervisor.starts_with("surefoot: goal not reached"), "{told}");
 }
 
+#[test]
+fn the_journal_is_told_the_level_of_a_line_and_nobody_else_is() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("standard_error");
+    let told = |is_journal: bool| {
+        let file = std::fs::File::create(&path).unwrap();
+        let (device, inode) = (file.metadata().unwrap().dev(), file.metadata().unwrap().ino());
+        let stream = format!("{device}:{}", inode + u64::from(!is_journal));
+        let mut up = surefoot(&["up", "--world", "/nowhere.npz"]);
+        let status = up.env("JOURNAL_STREAM", stream).stderr(Stdio::from(file)).status().unwrap();
+        assert_eq!(status.code(), Some(2));
+        std::fs::read_to_string(&path).unwrap()
+    };
+    // RFC 5424: 3 is an error.
+    assert!(told(true).starts_with("<3>surefoot: /nowhere.npz"), "{}", told(true));
+    assert!(told(false).starts_with("surefoot: /nowhere.npz"), "{}", told(false));
+}
+
 /// A recording that holds nothing but its setup, after a change of that.
 fn record_setup(path: &Path, change: impl FnOnce(&mut serde_json::Map<String, Value>)) {
     let vehicle = formats::read_vehicle("rc_car").unwrap();
