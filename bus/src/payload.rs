@@ -82,7 +82,12 @@ impl RiskParts {
             let Some(ground) = known.ground.get(word / 3) else { return 0.0 };
             match word % 3 {
                 axis @ (0 | 1) => ground.gradient[axis],
-                _ => f32::from_bits(u32::from_le_bytes([ground.class, ground.flags.0, 0, 0])),
+                _ => f32::from_bits(u32::from_le_bytes([
+                    ground.class,
+                    ground.flags.0,
+                    ground.friction.hundredths(),
+                    0,
+                ])),
             }
         })
     }

@@ -12,6 +12,7 @@ mod navigation;
 mod plant;
 mod risk;
 mod scaling;
+mod slippery;
 mod sweep;
 
 use ::bench::{BenchError, control, prior_map};
@@ -31,6 +32,7 @@ pub(crate) use navigation::run_navigation;
 pub(crate) use plant::run_plant;
 pub(crate) use risk::run_risk;
 pub(crate) use scaling::run_scaling;
+pub(crate) use slippery::run_slippery;
 
 pub(crate) fn run_control(arguments: &BenchControlArguments) -> anyhow::Result<()> {
     arguments.copy.prepare()?;

@@ -11,7 +11,7 @@ use bicycle::Vehicle;
 use bus::channel::RunName;
 use formats::{ConfigText, ElevationFile, read_elevation, read_vehicle};
 use friction::FrictionTable;
-use navigator::Config;
+use navigator::{Config, FrictionConfig};
 
 use crate::arguments::{BareGround, RouteArguments, RouteGround, StartPose};
 use crate::{UsageError, WorkFailed};
@@ -107,7 +107,8 @@ fn planner(
 ) -> Result<Planner, UsageError> {
     let cell_m = asked.cell.unwrap_or_else(|| file.elevation.geometry().resolution_m.clamp(0.5, 2.0));
     let learned = learned(asked.friction.as_deref())?;
-    let curve = |(name, published): (&str, FrictionCurve)| {
+    let curve = |ground: BareGround| {
+        let (name, published) = ground.published();
         learned.as_ref().map_or(published, |table| table.curve_or(name, published))
     };
     let layers = GroundLayers {
@@ -115,8 +116,8 @@ fn planner(
         low_vegetation_fraction: file.layers.low_vegetation_fraction.as_ref(),
         water: file.layers.water.as_ref(),
         ground_gap_m: file.layers.ground_gap_m.as_ref(),
-        bare: curve(asked.bare.published()),
-        grass: curve(BareGround::Grass.published()),
+        bare: curve(asked.bare),
+        grass: curve(BareGround::Grass),
     };
     let ground = layers.ground(cell_m).map_err(UsageError::from_input)?;
     Planner::new(ground, config(vehicle, clear_width_m)).map_err(UsageError::from_input)
@@ -149,6 +150,25 @@ impl BareGround {
     fn published(self) -> (&'static str, FrictionCurve) {
         FrictionCurve::PUBLISHED[self as usize]
     }
+}
+
+/// Sliding speed at which the controller is told of friction [m/s].
+const TOLD_AT_MPS: f32 = 1.0;
+
+/// What the controller is told of friction, if a file was named.
+pub(crate) fn known_friction(asked: &RouteGround) -> Result<Option<FrictionConfig>, UsageError> {
+    let told = |table: FrictionTable| {
+        let at = |ground: BareGround| {
+            let (name, published) = ground.published();
+            Some(f64::from(table.curve_or(name, published).at(TOLD_AT_MPS)))
+        };
+        FrictionConfig {
+            open: at(asked.bare),
+            loose: at(BareGround::Sand),
+            vegetation: at(BareGround::Grass),
+        }
+    };
+    Ok(learned(asked.friction.as_deref())?.map(told))
 }
 
 /// The friction that drives showed, if a file was named.

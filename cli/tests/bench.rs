@@ -207,6 +207,34 @@ fn navigation_goes_on_where_it_was_broken_off_and_parts_make_the_same_table() {
 }
 
 #[test]
+fn slippery_courses_write_table_and_picture_and_refuse_what_cannot_be_driven() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let out = folder.path().join("out");
+    let mut words = vec!["bench", "slippery", "--courses", "1", "--seed", "1000", "--threads", "1"];
+    words.extend(["--time-limit", "1", "--isa", "portable", "--out", out.to_str().expect("UTF-8")]);
+    let output = surefoot(&words);
+    assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+    let told = String::from_utf8_lossy(&output.stdout);
+    assert!(told.contains("cells") && told.contains("time limit passed after 1.0 s"), "{told}");
+    let table: Value =
+        serde_json::from_slice(&std::fs::read(out.join("slippery.json")).expect("the table")).expect("JSON");
+    let rows: Vec<_> = ["nothing", "least", "cells"].iter().map(|told| serde_json::json!(told)).collect();
+    let found: Vec<_> = (0..3).map(|row| table["rows"][row]["told"].clone()).collect();
+    assert_eq!(found, rows);
+    assert!(std::fs::read(out.join("slippery.png")).expect("the picture").starts_with(b"\x89PNG"));
+    for (words, part) in [
+        (["--courses", "0"], "--courses: expected a number of courses from 1 to 1000, found \"0\""),
+        (["--speed", "fast"], "--speed: expected a speed from 0.5 to 15 m/s, found fast"),
+        (["--speed", "nan"], "--speed: expected a speed from 0.5 to 15 m/s, found nan"),
+    ] {
+        let output = surefoot(&[["bench", "slippery"].as_slice(), &words].concat());
+        let told = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{told}");
+        assert!(told.contains(part) && told.lines().count() == 1, "{told}");
+    }
+}
+
+#[test]
 fn crossings_write_table_and_picture_and_refuse_what_cannot_be_driven() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let out = folder.path().join("out");

@@ -121,6 +121,11 @@ pub struct Costs {
     pub attitude_s: f64,
     /// Of a step beyond the limit of lateral acceleration [s].
     pub lateral_s: f64,
+    /// Of a step that asks of the ground, to turn and to stay on a slope, twice as much as three quarters of the friction
+    /// that the map tells [s]; in proportion to what is too much, and nothing where nobody has told; 0 = the map is not
+    /// asked.
+    #[serde(default)]
+    pub grip_s: f64,
     /// Of a step in reverse [s].
     pub reverse_s: f64,
     /// Of a metre of distance across a reference path, squared, per step [s/m2].
@@ -166,6 +171,7 @@ impl Default for Config {
                 rest_speed_mps: 1.0,
                 attitude_s: 20.0,
                 lateral_s: 20.0,
+                grip_s: 0.0,
                 reverse_s: 0.1,
                 path_across_s_per_m2: 0.5,
                 path_along_s_per_m2: 0.1,
@@ -277,6 +283,7 @@ impl Config {
             ("costs.distance_s_per_m", costs.distance_s_per_m, &weight),
             ("costs.attitude_s", costs.attitude_s, &weight),
             ("costs.lateral_s", costs.lateral_s, &weight),
+            ("costs.grip_s", costs.grip_s, &weight),
             ("costs.reverse_s", costs.reverse_s, &weight),
             ("costs.path_across_s_per_m2", costs.path_across_s_per_m2, &weight),
             ("costs.path_along_s_per_m2", costs.path_along_s_per_m2, &weight),

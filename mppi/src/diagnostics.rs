@@ -12,7 +12,7 @@ pub enum CostTerm {
     Running,
     /// Steps beyond the limits of roll or pitch.
     Attitude,
-    /// Steps beyond the limit of lateral acceleration.
+    /// Steps beyond the limit of lateral acceleration, or beyond what the ground is known to hold.
     Lateral,
     /// Steps in reverse.
     Reverse,

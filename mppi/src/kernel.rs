@@ -96,11 +96,11 @@ pub(crate) trait Kernel: Lanes {
     /// Smallest of the lanes.
     fn smallest(self, value: Self::Value) -> f32;
 
-    /// Gradient east, gradient north and class at these indices; beyond the table, of its last entry.
+    /// Gradient east, gradient north, class and friction at these indices; beyond the table, of its last entry.
     #[inline(always)]
-    fn grounds(self, table: &[Ground], indices: Self::Bits) -> [Self::Value; 3] {
+    fn grounds(self, table: &[Ground], indices: Self::Bits) -> [Self::Value; 4] {
         let rows = lookup::grounds(table, self.words(indices));
-        [0, 1, 2].map(|column| self.load_lanes(&rows.map(|row| row[column])))
+        [0, 1, 2, 3].map(|column| self.load_lanes(&rows.map(|row| row[column])))
     }
 
     /// Exponent and mantissa less one: value = 2^exponent (1 + rest), for normal value > 0.

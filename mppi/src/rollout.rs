@@ -18,8 +18,8 @@ use crate::trace::TraceRows;
 use bicycle::lanes::{Constant, Instructions, Real};
 use bicycle::{Extent, GroundSample, LaneState, MotionStepper, Rates};
 use motion::{Bare, Leaving, Motion, Plain, Whole};
-use stage::{Lateral, PathTask, Reverse, Stage};
-use traversability::{Ground, Risk};
+use stage::{Grip, Lateral, PathTask, Reverse, Stage};
+use traversability::{FrictionLimit, Ground, Risk};
 
 /// Most numbers per rollout that the effects may carry from step to step.
 pub(crate) const MAX_SLOTS: usize = 64;
@@ -85,11 +85,17 @@ pub(crate) struct Prices {
     pub(crate) lateral_s: Constant,
     /// Of a step in reverse [s].
     pub(crate) reverse_s: Constant,
+    /// Of a step that asks twice as much of the ground as it is known to hold [s].
+    pub(crate) grip_s: Constant,
 }
 
 impl Prices {
     fn has_manoeuvres(&self) -> bool {
         self.lateral_s.value() > 0.0 || self.reverse_s.value() > 0.0
+    }
+
+    fn has_grip(&self) -> bool {
+        self.grip_s.value() > 0.0
     }
 }
 
@@ -169,7 +175,7 @@ fn roll_to<K: Kernel, P: MotionStepper, C: StepCost>(
     chunk: &mut Chunk,
 ) {
     let extent = scene.stepper.extent();
-    let is_plain = extent != Extent::Whole && scene.leaning_start_rad.is_none();
+    let is_plain = extent != Extent::Whole && scene.leaning_start_rad.is_none() && !scene.prices.has_grip();
     if is_plain && extent == Extent::Bare && !scene.prices.has_manoeuvres() {
         roll_chunk::<K, P, C, _, Bare>(kernel, scene, goal, chunk);
     } else if is_plain {
@@ -332,6 +338,14 @@ fn roll_packs<K: Kernel, P: MotionStepper, C: StepCost, S: Stage<K>, M: Motion, 
     }
 }
 
+/// What a pack meets where a step begins.
+struct Met<K: Kernel> {
+    risk: [Real<K>; 4],
+    ground: GroundSample<Real<K>>,
+    /// Friction that the ground is known to hold [-].
+    friction: Real<K>,
+}
+
 /// What the packs in flight share in one step.
 struct Fly<'a, K: Kernel, P, C, S: Stage<K>> {
     scene: &'a Scene<'a, P, C>,
@@ -352,9 +366,9 @@ impl<K: Kernel, P: MotionStepper, C: StepCost, S: Stage<K>> Fly<'_, K, P, C, S> 
     ) {
         let kernel = flight.state.x.0;
         let command = self.controls.each_ref().map(|row| Real(kernel, kernel.load(row, first)));
-        let (risk, ground) = look_up::<K, P, C, M>(self.scene, self.index, &flight.state);
-        let rates = M::step(self.scene.stepper, &mut flight.state, command, &ground, (memory, self.t));
-        self.arrive::<M>(flight, command, (rates, risk), first, trace);
+        let met = look_up::<K, P, C, M>(self.scene, self.index, &flight.state);
+        let rates = M::step(self.scene.stepper, &mut flight.state, command, &met.ground, (memory, self.t));
+        self.arrive::<M>(flight, command, (rates, &met), first, trace);
     }
 
     /// What the step comes to, whose end is where the flight is now.
@@ -363,17 +377,21 @@ impl<K: Kernel, P: MotionStepper, C: StepCost, S: Stage<K>> Fly<'_, K, P, C, S> 
         &self,
         flight: &mut Flight<K>,
         command: [Real<K>; 2],
-        (rates, risk): (Rates<K>, [Real<K>; 4]),
+        (rates, met): (Rates<K>, &Met<K>),
         first: usize,
         trace: Option<&mut TraceRows>,
     ) {
-        watch_attitude::<K, P, C, M>(self.scene, flight, [risk[2], risk[3]]);
+        watch_attitude::<K, P, C, M>(self.scene, flight, [met.risk[2], met.risk[3]]);
         let place = Place { state: flight.state, frame: &self.scene.frame };
-        let step = Step { t: self.t, place, rates, command, risk };
+        let step = Step { t: self.t, place, rates, command, risk: met.risk };
         if C::KEEPS_STEPS
             && let Some(rows) = trace
         {
             keep(&step, flight.under_way, rows, first);
+        }
+        if M::HAS_EFFECTS && self.scene.prices.has_grip() {
+            let grip = Grip { price_s: self.scene.prices.grip_s, met };
+            flight.lateral = flight.lateral.add_where(flight.under_way, grip.step(&step));
         }
         self.pay::<M>(flight, &step);
     }
@@ -429,7 +447,7 @@ fn look_up<K: Kernel, P: MotionStepper, C, M: Motion>(
     scene: &Scene<'_, P, C>,
     index: &Index<K>,
     state: &LaneState<K>,
-) -> ([Real<K>; 4], GroundSample<Real<K>>) {
+) -> Met<K> {
     let kernel = state.x.0;
     let cell = index.cell(state);
     let risk = kernel.risks(scene.grid.risks, index.risk(cell, state.turns)).map(|value| Real(kernel, value));
@@ -437,12 +455,15 @@ fn look_up<K: Kernel, P: MotionStepper, C, M: Motion>(
     // In this order NaN stays NaN.
     let (linear_traction, angular_traction) = (least.max(risk[0]), least.max(risk[1]));
     let zero = kernel.real(0.0);
-    let mut ground = GroundSample { linear_traction, angular_traction, gradient: [zero; 2], class: zero };
-    if M::HAS_EFFECTS && scene.stepper.uses_ground() {
-        let [east, north, class] = kernel.grounds(scene.grid.ground, cell).map(|value| Real(kernel, value));
-        (ground.gradient, ground.class) = ([east, north], class);
+    let ground = GroundSample { linear_traction, angular_traction, gradient: [zero; 2], class: zero };
+    let friction = kernel.real(f64::from(FrictionLimit::UNLIMITED));
+    let mut met = Met { risk, ground, friction };
+    if M::HAS_EFFECTS && (scene.stepper.uses_ground() || scene.prices.has_grip()) {
+        let grounds = kernel.grounds(scene.grid.ground, cell).map(|value| Real(kernel, value));
+        let [east, north, class, friction] = grounds;
+        (met.ground.gradient, met.ground.class, met.friction) = ([east, north], class, friction);
     }
-    (risk, ground)
+    met
 }
 
 /// Counts the poses beyond a limit. A vehicle that stands beyond one may leave: its first poses break a limit only where

@@ -9,7 +9,7 @@ use mppi::{
     Config, Controller, CostToGo, CostToGoConfig, Input, Objective, Recovery, ReferencePath, Rollout,
     Terminal,
 };
-use traversability::{GridGeometry, Risk, RiskMapView};
+use traversability::{FrictionLimit, GridGeometry, Risk, RiskMap, RiskMapView};
 
 fn smooth() -> Config {
     Config::default()
@@ -255,6 +255,35 @@ fn lateral_acceleration_is_kept_below_a_known_grip() {
     });
     let most_mps2 = lateral_mps2.fold(0.0, f64::max);
     assert!(most_mps2 < 2.2, "{most_mps2} m/s2 of 2.67");
+}
+
+/// Around the same corner, ground that is known to hold 0.2 is asked for less than half as much as ground of which nobody
+/// has said anything, and nobody asks for it where no price says so.
+#[test]
+fn ground_that_is_known_to_be_slippery_is_turned_on_slowly() {
+    let limits = Limits {
+        speed_max_mps: 6.0,
+        lateral_acceleration_max_mps2: 9.0,
+        acceleration_max_mps2: 4.0,
+        ..model().limits
+    };
+    let model = Model { limits, ..model() };
+    let mut slippery = level();
+    slippery.fill_friction(|_, _| FrictionLimit::new(0.2));
+    let most_mps2 = |grip_s: f64, map: &RiskMap| {
+        let config = Config { costs: mppi::Costs { grip_s, ..smooth().costs }, ..smooth() };
+        let start = State { speed_mps: 3.0, ..standing() };
+        let drive = drive(&config, &model, map, goal([6.0, 9.0]), (start, 200));
+        assert_eq!(drive.decisions.last(), Some(&Decision::Hold(HoldReason::AtGoal)));
+        let lateral_mps2 = drive
+            .states
+            .iter()
+            .map(|state| (state.speed_mps.powi(2) * state.steering_rad.tan() / model.wheelbase_m).abs());
+        lateral_mps2.fold(0.0, f64::max)
+    };
+    let [told, untold, unpriced] =
+        [(0.5, &slippery), (0.5, &level()), (0.0, &slippery)].map(|(grip_s, map)| most_mps2(grip_s, map));
+    assert!(told < 0.5 * untold && told < 0.5 * unpriced, "{told} {untold} {unpriced} m/s2");
 }
 
 #[test]

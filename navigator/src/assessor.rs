@@ -1,5 +1,7 @@
 //! The second part of the pipeline: the map of the ground becomes risk and time to the goal.
 
+use std::sync::Arc;
+
 use bicycle::lanes::Instructions;
 use bicycle::{Geometry, MotionLimits};
 use mppi::{CostToGo, CostToGoView};
@@ -8,6 +10,7 @@ use traversability::{CvarLevel, Risk, RiskMapView};
 
 use crate::areas::Barrier;
 use crate::frame::Frame;
+use crate::friction::KnownFriction;
 use crate::risk::{Belief, RiskLayer};
 use crate::{
     Config, Jump, MessageId, MissionMessage, NavigatorError, RiskHeader, StuckMessage, SurfaceHeader,
@@ -18,6 +21,7 @@ use crate::{
 pub struct Assessor {
     layer: RiskLayer,
     barrier: Barrier,
+    friction: KnownFriction,
     recipe: Recipe,
     cost_to_go: CostToGo,
     /// What the map of the ground that was judged last said of itself.
@@ -70,6 +74,7 @@ impl Assessor {
         Ok(Self {
             layer: recipe.layer()?,
             barrier: Barrier::new(config.areas.clone()),
+            friction: KnownFriction { by_class: config.friction.unwrap_or_default(), by_place: None },
             recipe,
             cost_to_go: CostToGo::new(
                 config.cost_to_go,
@@ -84,6 +89,12 @@ impl Assessor {
             stuck: MessageId::default(),
             goal_m: None,
         })
+    }
+
+    /// What is known of the ground's friction by place counts from now on before what is known by class: values in the map
+    /// frame, not finite where nobody knows [-].
+    pub fn know_friction(&mut self, map: Arc<GridMap<f32>>) {
+        self.friction.by_place = Some(map);
     }
 
     /// Share of the worst outcomes that is planned for.
@@ -109,7 +120,9 @@ impl Assessor {
     pub fn judge_like(&mut self, mut other: Self) -> Result<(), NavigatorError> {
         other.judge_at(self.level())?;
         self.layer.stuck().iter().for_each(|(at_ns, pose)| other.layer.note_stuck(*pose, *at_ns));
+        other.friction.by_place = self.friction.by_place.take();
         (self.layer, self.barrier, self.recipe) = (other.layer, other.barrier, other.recipe);
+        self.friction = other.friction;
         Ok(())
     }
 
@@ -167,6 +180,9 @@ impl Assessor {
         let [x_m, y_m, _] = header.odometry.position_m;
         DistantPosition::check([x_m, y_m], self.layer.resolution_m())?;
         self.layer.update([x_m, y_m], self.barrier.bar(surface))?;
+        if !self.friction.is_empty() {
+            self.layer.fill_friction(&self.friction);
+        }
         self.judged = Some(*header);
         Ok(())
     }

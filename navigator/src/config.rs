@@ -7,7 +7,10 @@ use physics_prior::{PriorConfig, SlopeLaw};
 use serde::{Deserialize, Serialize};
 use terrain::{BodyBox, ElevationConfig, Mount};
 
-use crate::{Areas, GuardConfig, MovingConfig, NavigatorError};
+use crate::{Areas, FrictionConfig, GuardConfig, MovingConfig, NavigatorError};
+
+/// Of a step that asks twice as much of the ground as it holds [s].
+const GRIP_S: f64 = 0.5;
 
 /// Vehicles below this length cannot look over what hides ground from them [m].
 const SMALL_LENGTH_M: f64 = 1.0;
@@ -51,6 +54,9 @@ pub struct Config {
     /// What moves: left out, nothing is taken to.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub moving: Option<MovingConfig>,
+    /// How much the ground is known to hold: left out, nobody knows.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub friction: Option<FrictionConfig>,
     /// How far whoever corrects commands for the ground may go.
     #[serde(default)]
     pub correction: CorrectionConfig,
@@ -129,8 +135,16 @@ impl Config {
             areas: Areas::default(),
             sensors: Vec::new(),
             moving: None,
+            friction: None,
             correction: CorrectionConfig::default(),
         }
+    }
+
+    /// Keeps plans to what the ground is known to hold, by its class, or by a map that the assessor is told of.
+    pub fn keep_to_friction(&mut self, known: FrictionConfig) {
+        self.friction = Some(known);
+        let price_s = &mut self.controller.costs.grip_s;
+        *price_s = if *price_s > 0.0 { *price_s } else { GRIP_S };
     }
 
     /// Edge of a risk cell [m].
@@ -183,6 +197,7 @@ impl Config {
                 .find_map(Mount::first_invalid)
                 .map(|(field, found)| (field, "a finite number", found)))
             .or(self.moving.as_ref().and_then(MovingConfig::first_invalid))
+            .or(self.friction.as_ref().and_then(FrictionConfig::first_invalid))
     }
 }
 

@@ -4,6 +4,7 @@ mod mail;
 mod risk_publisher;
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use bicycle::{Applied, AppliedBy, Decision, Geometry, ImuSample, Model, Odometry, StopReason};
 use kinodynamics::Corrector;
@@ -177,6 +178,14 @@ impl<M: Driven> Navigator<M> {
         let stand_in = StandIn::new(began_ns, silence_max_ns);
         let mail = Mail { physics: Some(ToAssessor::default()), ..self.mail };
         Self { physics: Some((RiskPublisher::new(physics), stand_in)), mail, ..self }
+    }
+
+    /// What is known of the ground's friction by place; see [`Assessor::know_friction`]. Whoever stands in is told, too.
+    pub fn know_friction(&mut self, map: &Arc<GridMap<f32>>) {
+        self.learned.know_friction(Arc::clone(map));
+        if let Some((physics, _)) = &mut self.physics {
+            physics.know_friction(Arc::clone(map));
+        }
     }
 
     /// The same for inputs that may be so old.

@@ -12,6 +12,7 @@ use terrain::{GridGeometry, GridMap, SurfaceCell};
 use traversability::{CvarLevel, Risk, RiskMapView};
 
 use crate::Jump;
+use crate::friction::KnownFriction;
 use crate::risk_estimator::RiskEstimator;
 
 /// Fills a window, shape [row, col, yaw], with the risk of the poses of the body frame that a [`RiskMap`] of this
@@ -176,6 +177,11 @@ impl RiskLayer {
         }
         self.is_filled = true;
         Ok(())
+    }
+
+    /// Says of every cell how much it is known to hold.
+    pub fn fill_friction(&mut self, known: &KnownFriction) {
+        self.estimator.fill_friction(|centre_m, ground| known.limit(centre_m, ground));
     }
 
     /// Returns whether the window moved.

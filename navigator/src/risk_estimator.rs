@@ -5,7 +5,7 @@ use bicycle::lanes::Instructions;
 use evidential::{BeliefMap, BeliefMapError, Learned};
 use physics_prior::{Assumption, PriorMap};
 use terrain::{GridGeometry, GridMap, SurfaceCell};
-use traversability::RiskMap;
+use traversability::{FrictionLimit, Ground, RiskMap};
 
 /// Makes a risk map of a surface and keeps it up to date, whoever judges the ground.
 pub enum RiskEstimator {
@@ -53,6 +53,14 @@ impl RiskEstimator {
         match self {
             Self::Prior(map) => map.risk_map(),
             Self::Networks(map) => map.risk_map(),
+        }
+    }
+
+    /// See [`RiskMap::fill_friction`]; the next update may forget what was said.
+    pub fn fill_friction(&mut self, friction: impl Fn([f64; 2], &Ground) -> FrictionLimit) {
+        match self {
+            Self::Prior(map) => map.fill_friction(friction),
+            Self::Networks(map) => map.fill_friction(friction),
         }
     }
 

@@ -4,7 +4,7 @@ use bicycle::Geometry;
 use bicycle::lanes::{BLOCK, Instructions};
 use rayon::prelude::*;
 use terrain::{GridGeometry, GridMap, SettingError, SurfaceCell};
-use traversability::{CvarLevel, Risk, RiskMap};
+use traversability::{CvarLevel, FrictionLimit, Ground, Risk, RiskMap};
 
 use crate::{BlockPrior, PoseLine, PriorBelief, PriorConfig, PriorField, stretches};
 
@@ -97,6 +97,11 @@ impl PriorMap {
     /// The map as of the last update.
     pub fn risk_map(&self) -> &RiskMap {
         &self.map
+    }
+
+    /// Says of every cell how much it holds, until the next update, which may forget it.
+    pub fn fill_friction(&mut self, friction: impl Fn([f64; 2], &Ground) -> FrictionLimit) {
+        self.map.fill_friction(friction);
     }
 
     /// Moves the window to another origin on the lattice of risk cells; the next update makes the map whole again.

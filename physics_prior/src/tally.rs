@@ -45,6 +45,6 @@ impl Tally {
             flags = flags.with(GroundFlags::UNKNOWN);
         }
         let gradient = self.gradient.map(|sum| sum / self.n_known.max(1) as f32);
-        Ground { gradient, class: class as u8, flags }
+        Ground { gradient, class: class as u8, flags, ..Ground::default() }
     }
 }

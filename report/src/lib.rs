@@ -15,7 +15,7 @@
 //! | a belief about the ground | `surefoot gap ground` | [text](ground::text()), [picture](ground::picture()), [page](ground::page()) |
 //! | the score of diagnoses | `surefoot gap score` | [text](gap_score::text()), [pictures](gap_score::pictures), [page](gap_score::page()) |
 //! | the catalogue of effects | `surefoot gap effects` | [text](effects::text()), [picture](effects::picture), [Markdown](effects::page()) |
-//! | benchmarks | `surefoot bench` | [`correction`], [`crossings`], [`mod@friction`], [`gap_closed_loop`], [`ground_score`], [`kinodynamics`], [`learning`], [`navigation`], [`plant`], [`risk`], [`scaling`], [`traction_map`] |
+//! | benchmarks | `surefoot bench` | [`correction`], [`crossings`], [`mod@friction`], [`gap_closed_loop`], [`ground_score`], [`kinodynamics`], [`learning`], [`navigation`], [`plant`], [`risk`], [`scaling`], [`slippery`], [`traction_map`] |
 
 mod axes;
 mod canvas;
@@ -40,6 +40,7 @@ pub mod plant;
 pub mod risk;
 pub mod route;
 pub mod scaling;
+pub mod slippery;
 mod table;
 pub mod traction_map;
 pub mod training;

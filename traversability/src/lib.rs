@@ -42,5 +42,7 @@ pub use parameters::{Attitude, Traction, Traversability};
 pub use partial_moments::PartialMoments;
 pub use pmf::{Pmf, PmfError};
 pub use quad::PmfQuad;
-pub use risk_map::{Ground, GroundFlags, Risk, RiskMap, RiskMapError, RiskMapParts, RiskMapView};
+pub use risk_map::{
+    FrictionLimit, Ground, GroundFlags, Risk, RiskMap, RiskMapError, RiskMapParts, RiskMapView,
+};
 pub use terrain::{Cell, GridGeometry, TerrainClass};

@@ -85,6 +85,41 @@ impl GroundFlags {
     }
 }
 
+/// Friction that tyres can count on, in hundredths of their load; zero where nobody has said.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(transparent)]
+pub struct FrictionLimit(u8);
+
+impl FrictionLimit {
+    /// Nobody has said.
+    pub const UNTOLD: Self = Self(0);
+    /// What counts where nobody has said: more than any tyre finds [-].
+    pub const UNLIMITED: f32 = 10.0;
+
+    /// The friction, rounded down to hundredths, from 0.01 to 2.55 [-]; a number that is none is untold.
+    pub fn new(friction: f32) -> Self {
+        // A hair more, so that 0.29 is 29 hundredths and not 28.
+        let hundredths = (100.0 * friction + 1e-3).floor();
+        if hundredths.is_nan() { Self::UNTOLD } else { Self(hundredths.clamp(1.0, 255.0) as u8) }
+    }
+
+    /// Whether somebody has said.
+    pub fn is_told(self) -> bool {
+        self != Self::UNTOLD
+    }
+
+    /// The friction, [`Self::UNLIMITED`] where nobody has said [-].
+    #[inline(always)]
+    pub fn friction(self) -> f32 {
+        if self.0 == 0 { Self::UNLIMITED } else { f32::from(self.0) * 0.01 }
+    }
+
+    /// As a byte of a message.
+    pub fn hundredths(self) -> u8 {
+        self.0
+    }
+}
+
 /// The ground of one cell, whatever the yaw.
 #[derive(Clone, Copy, Debug, PartialEq, bytemuck::AnyBitPattern)]
 #[repr(C)]
@@ -95,11 +130,18 @@ pub struct Ground {
     pub class: u8,
     /// Obstacle, unknown, out of distribution.
     pub flags: GroundFlags,
+    /// How much it holds.
+    pub friction: FrictionLimit,
 }
 
 impl Default for Ground {
     fn default() -> Self {
-        Self { gradient: [0.0; 2], class: TerrainClass::Open as u8, flags: GroundFlags::default() }
+        Self {
+            gradient: [0.0; 2],
+            class: TerrainClass::Open as u8,
+            flags: GroundFlags::default(),
+            friction: FrictionLimit::UNTOLD,
+        }
     }
 }
 
@@ -172,6 +214,13 @@ impl RiskMap {
         let result = write(&mut self.risks, &mut self.ground);
         self.close_border();
         result
+    }
+
+    /// Says of every cell how much it holds, from its centre [m] and what is known of it.
+    pub fn fill_friction(&mut self, friction: impl Fn([f64; 2], &Ground) -> FrictionLimit) {
+        for (index, ground) in self.ground.iter_mut().enumerate() {
+            ground.friction = friction(self.geometry.centre_m(self.geometry.cell(index)), ground);
+        }
     }
 
     fn close_border(&mut self) {
@@ -300,6 +349,38 @@ mod tests {
             }
         });
         map
+    }
+
+    #[test]
+    fn friction_is_kept_in_hundredths_and_never_as_more_than_it_is() {
+        for hundredths in 1..=255u8 {
+            let friction = f32::from(hundredths) / 100.0;
+            assert_eq!(FrictionLimit::new(friction).hundredths(), hundredths);
+            assert!((FrictionLimit::new(friction).friction() - friction).abs() < 1e-6);
+        }
+        // 0.399 is 39 hundredths; what is out of range is the nearest that can be said.
+        let said =
+            [0.399, 0.0, -1.0, 7.0, f32::INFINITY].map(|friction| FrictionLimit::new(friction).hundredths());
+        assert_eq!(said, [39, 1, 1, 255, 255]);
+        assert!(!FrictionLimit::new(f32::NAN).is_told() && !Ground::default().friction.is_told());
+        assert_eq!(FrictionLimit::UNTOLD.friction(), FrictionLimit::UNLIMITED);
+    }
+
+    #[test]
+    fn ground_takes_no_more_room_for_its_friction() {
+        assert_eq!(size_of::<Ground>(), 12);
+    }
+
+    #[test]
+    fn friction_is_told_by_place_and_class() {
+        let mut map = marked_map(1);
+        map.fill(|_, ground| ground[9].class = 2);
+        map.fill_friction(|[x_m, _], ground| {
+            if ground.class == 2 { FrictionLimit::new(0.4) } else { FrictionLimit::new((x_m + 3.0) as f32) }
+        });
+        let told = |index: usize| map.view().ground[index].friction.hundredths();
+        // Centres of columns 0 and 1 lie at -1.75 and -1.25 m.
+        assert_eq!([told(0), told(1), told(8), told(9)], [125, 175, 125, 40]);
     }
 
     #[test]

@@ -31,6 +31,9 @@ pub enum BenchCommand {
     /// Drives among people who cross the way
     #[command(long_about = super::crossings::LONG_ABOUT)]
     Crossings(super::BenchCrossingsArguments),
+    /// What friction that is known cell by cell brings the local planner
+    #[command(long_about = super::slippery::LONG_ABOUT)]
+    Slippery(super::BenchSlipperyArguments),
     /// Causes of wrong beliefs about the ground, withheld from who names them
     #[command(long_about = super::ground::BENCH_ABOUT)]
     Ground(super::BenchGroundArguments),

@@ -59,6 +59,10 @@ pub struct DriveArguments {
           help_heading = "World")]
     pub route: Option<Option<PathBuf>>,
 
+    /// What the ground is made of.
+    #[command(flatten, next_help_heading = "World")]
+    pub ground: super::RouteGround,
+
     /// The machine that is simulated: a name or a TOML file [default: pietra_full_size; rc_car in the arena]
     ///
     /// Names: pietra_full_size (3.4 x 1.8 m), rc_car (0.33 x 0.25 m), buggy_fifth (1/5 scale), sedan.

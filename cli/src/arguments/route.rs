@@ -52,10 +52,10 @@ pub struct RouteArguments {
     pub results: super::ResultArguments,
 }
 
-/// What a route is searched on, beside the heights.
+/// What is known of the ground, beside its heights.
 #[derive(Args, Clone, Debug, Default)]
 pub struct RouteGround {
-    /// Edge of the map's cells [m] [default: that of the file, between 0.5 and 2]
+    /// Edge of the cells that a route is searched on [m] [default: that of the file, between 0.5 and 2]
     #[arg(long, value_name = "M", allow_hyphen_values = true)]
     pub cell: Option<f64>,
 
@@ -64,6 +64,9 @@ pub struct RouteGround {
     pub bare: BareGround,
 
     /// Friction of the vehicle's own drives in place of the published, as `surefoot train friction` writes it (TOML)
+    ///
+    /// Of a drive, its controller keeps to it, too: turns, brakes and climbs ask no more of the ground than it holds at a
+    /// sliding speed of 1 m/s. Open ground is that of --bare, loose ground is sand, plants are grass.
     #[arg(long, value_name = "FILE")]
     pub friction: Option<PathBuf>,
 }

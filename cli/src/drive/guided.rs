@@ -6,7 +6,7 @@ use bench::closed_loop::ClosedLoop;
 
 use super::scene::Scene;
 use crate::UsageError;
-use crate::arguments::{DriveArguments, RouteGround, WorldSource};
+use crate::arguments::{DriveArguments, WorldSource};
 use crate::route::{self, Guided, Place};
 
 /// The route of a drive; `None` where nobody asked for one.
@@ -18,7 +18,7 @@ pub(super) fn plan(arguments: &DriveArguments, scene: &Scene) -> anyhow::Result<
     let start = scene.task.start;
     let place = Place { at_m: [start[0], start[1]], yaw_rad: start[2], time_s: 0.0 };
     let machine = (&scene.vehicle, &scene.config);
-    Ok(Some(route::guided(map, &RouteGround::default(), None, machine, place, scene.task.goal_m)?))
+    Ok(Some(route::guided(map, &arguments.ground, None, machine, place, scene.task.goal_m)?))
 }
 
 /// Has the drive head for what comes next, after a cycle that may have renewed the map.

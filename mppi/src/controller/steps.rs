@@ -240,6 +240,7 @@ impl<M: Driven, S: StepCost, R: RolloutCost> Controller<M, S, R> {
             lateral_max_mps2: Constant::new(limits.lateral_acceleration_max_mps2),
             lateral_s: Constant::new(costs.lateral_s),
             reverse_s: Constant::new(reverse_s),
+            grip_s: Constant::new(costs.grip_s),
         }
     }
 

@@ -26,14 +26,14 @@ pub(super) fn entries<const N: usize>(table: &[f32], indices: [u32; N]) -> [f32;
     })
 }
 
-/// Gradient east, gradient north and class at these indices; beyond the table, of its last entry.
+/// Gradient east, gradient north, class and friction at these indices; beyond the table, of its last entry.
 #[inline(always)]
-pub(super) fn grounds<const N: usize>(table: &[Ground], indices: [u32; N]) -> [[f32; 3]; N] {
+pub(super) fn grounds<const N: usize>(table: &[Ground], indices: [u32; N]) -> [[f32; 4]; N] {
     let last = last_index(table);
     indices.map(|index| {
         // SAFETY: `last_index` has checked that the table is not empty, and the index is at most its last one.
         let ground = unsafe { table.get_unchecked((index as usize).min(last)) };
-        [ground.gradient[0], ground.gradient[1], f32::from(ground.class)]
+        [ground.gradient[0], ground.gradient[1], f32::from(ground.class), ground.friction.friction()]
     })
 }
 

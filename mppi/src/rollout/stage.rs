@@ -1,7 +1,7 @@
 //! What the controller prices itself, beside the limits of attitude: the way to a goal or along a path, lateral
 //! acceleration, reverse.
 
-use super::{GoalTask, Rest};
+use super::{GoalTask, Met, Rest};
 use crate::cost::{Place, Step, StepCost};
 use crate::kernel::Kernel;
 use crate::objective::ReferenceStep;
@@ -113,6 +113,34 @@ impl StepCost for Lateral {
         let (lanes, rates) = (step.lanes(), step.rates());
         let sideways = (rates.speed * rates.yaw_rate).abs().exceeds(Real::constant(lanes, self.most_mps2));
         lanes.real(0.0).add_where(sideways, Real::constant(lanes, self.price_s))
+    }
+}
+
+/// Share of the friction that a plan may use: beyond it tyres slide, and what they then do no model foretells well.
+const GRIP_SHARE: f64 = 0.75;
+const GRAVITY_MPS2: f64 = 9.81;
+
+/// Steps that ask more of the ground than it is known to hold, to turn and to stay on a slope. What tyres do beyond that is
+/// nothing that a plan may rely on, so that it is priced and not foretold: plans that were told how little a slide turns
+/// steered harder for it.
+pub(super) struct Grip<'a, K: Kernel> {
+    /// Of a step that asks twice as much [s].
+    pub(super) price_s: Constant,
+    pub(super) met: &'a Met<K>,
+}
+
+impl<K: Kernel> Grip<'_, K> {
+    #[inline(always)]
+    pub(super) fn step(&self, step: &Step<'_, K>) -> Real<K> {
+        let (lanes, rates) = (step.lanes(), step.rates());
+        let ([east, north], gravity) = (self.met.ground.gradient, lanes.real(GRAVITY_MPS2));
+        let (sine, cosine) = step.state.turns.sin_cos_turns();
+        let ahead = gravity * east.mul_add(cosine, north * sine);
+        let left = north.mul_add(cosine, -(east * sine));
+        let across = gravity.mul_add(left, rates.speed * rates.yaw_rate);
+        let asked = ahead.mul_add(ahead, across * across).sqrt();
+        let most = self.met.friction * lanes.real(GRIP_SHARE * GRAVITY_MPS2);
+        (asked / most - lanes.real(1.0)).max(lanes.real(0.0)) * Real::constant(lanes, self.price_s)
     }
 }
 

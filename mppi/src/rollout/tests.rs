@@ -8,7 +8,7 @@ use crate::cost_to_go::CostToGoView;
 use crate::kernel;
 use bicycle::lanes::{Constant, Instructions};
 use bicycle::{Command, Effect, Limits, Model, State, Stepper};
-use traversability::{GridGeometry, Ground, RiskMap};
+use traversability::{FrictionLimit, GridGeometry, Ground, RiskMap};
 
 const N_STEPS: usize = 40;
 const STEP_S: f64 = 0.1;
@@ -69,6 +69,7 @@ const PRICES: Prices = Prices {
     lateral_max_mps2: Constant::new(1.0),
     lateral_s: Constant::new(3.0),
     reverse_s: Constant::new(0.2),
+    grip_s: Constant::new(0.0),
 };
 
 /// Controls that differ from lane to lane and over time.
@@ -239,6 +240,45 @@ fn the_cost_to_go_field_is_interpolated_between_cells() {
             let cosine = (-0.3 * yaw.cos() + 0.2 * yaw.sin()) / 0.3_f64.hypot(0.2);
             let expected = linear([x, y]) + TURNING_S_PER_RAD * (cosine.acos() - cosine.acos().sin());
             assert!((found - expected).abs() < 1.5e-3, "{found} {expected}");
+        }
+    }
+}
+
+/// On a slope of 0.06 east and -0.03 north that holds 0.2, of which plans may use 0.75 * 9.81 * 0.2 = 1.4715 m/s2, a step
+/// that asks for (1 + e) times as much costs e times the price; where nobody has said what the ground holds, nothing.
+#[test]
+fn what_is_asked_of_the_ground_beyond_what_it_holds_is_priced() {
+    let mut map = RiskMap::constant(GridGeometry::centred(0.5, 60, 50, 1.0, -2.0), 13, Risk::NONE);
+    map.fill(|_, grounds| grounds.iter_mut().for_each(|ground| ground.gradient = [0.06, -0.03]));
+    let mut told = map.clone();
+    told.fill_friction(|_, _| FrictionLimit::new(0.2));
+    let stepper = stepper(0.5);
+    let far = GoalTask { x_cells: Constant::new(1e6), ..goal(&map, 0.0, Rest::Straight) };
+    let asked = |v: f64, yaw_rate: f64, yaw: f64| {
+        let (ahead, left) = (0.06 * yaw.cos() - 0.03 * yaw.sin(), -0.03 * yaw.cos() - 0.06 * yaw.sin());
+        (9.81 * ahead).hypot(v * yaw_rate + 9.81 * left)
+    };
+    for (map, is_told) in [(&map, false), (&told, true)] {
+        let mut scene = scene(map, &stepper, Task::Goal(far));
+        scene.prices.grip_s = Constant::new(0.7);
+        scene.prices.lateral_s = Constant::new(0.0);
+        for machine in machines() {
+            let (mut chunk, mut n_priced) = (chunk(), 0);
+            kernel::run(machine, RollOut { scene: &scene, chunk: &mut chunk });
+            for lane in 0..CHUNK {
+                let (mut yaw, mut expected_s) = (START[2], 0.0);
+                for t in 0..N_STEPS {
+                    let [v, delta] = control(lane, t);
+                    let yaw_rate = v * delta.tan() / WHEELBASE_M;
+                    yaw += STEP_S * yaw_rate;
+                    expected_s += 0.7 * (asked(v, yaw_rate, yaw) / 1.4715 - 1.0).max(0.0);
+                }
+                let found_s = f64::from(chunk.terms[CostTerm::Lateral as usize].0[lane]);
+                let expected_s = if is_told { expected_s } else { 0.0 };
+                assert!((found_s - expected_s).abs() < 1e-3, "{machine:?} {lane}: {found_s} {expected_s}");
+                n_priced += usize::from(expected_s > 1.0);
+            }
+            assert_eq!(n_priced > CHUNK / 4, is_told, "{n_priced} of {CHUNK} ask for much too much");
         }
     }
 }

@@ -66,18 +66,18 @@ fn roll_packs<K: Kernel, P: MotionStepper, C: StepCost, S: Stage<K>, M: Motion>(
             let (chunk, first) = place(number);
             let command =
                 chunks[chunk].controls[t].each_ref().map(|row| Real(kernel, kernel.load(row, first)));
-            let (risk, ground) = look_up::<K, P, C, M>(scene, &index, &flight.state);
-            inputs.extend(spread(&flight.state, command, &ground, &scene.frame));
-            asked.push((command, risk));
+            let met = look_up::<K, P, C, M>(scene, &index, &flight.state);
+            inputs.extend(spread(&flight.state, command, &met.ground, &scene.frame));
+            asked.push((command, met));
         }
         scene.stepper.step_together(&inputs, &mut outcomes);
         let landed = outcomes.chunks_exact(K::WIDTH).zip(&asked);
-        for (number, (flight, (outcomes, (command, risk)))) in flights.iter_mut().zip(landed).enumerate() {
+        for (number, (flight, (outcomes, (command, met)))) in flights.iter_mut().zip(landed).enumerate() {
             let (chunk, first) = place(number);
             let Chunk { controls, trace, .. } = &mut chunks[chunk];
             let rates = land(flight, outcomes, &scene.frame);
             let fly = Fly { scene, index: &index, stage, controls: &controls[t], t };
-            fly.arrive::<M>(flight, *command, (rates, *risk), first, trace.get_mut(t));
+            fly.arrive::<M>(flight, *command, (rates, met), first, trace.get_mut(t));
         }
     }
     for (number, flight) in flights.into_iter().enumerate() {

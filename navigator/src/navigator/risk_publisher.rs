@@ -1,5 +1,7 @@
 //! An assessor and the memory that its risk map lies in.
 
+use std::sync::Arc;
+
 use terrain::{GridGeometry, GridMap, SurfaceCell};
 use traversability::{Risk, RiskMap, RiskMapView};
 
@@ -23,6 +25,10 @@ impl RiskPublisher {
         mail.stuck.drain(..).for_each(|stuck| self.assessor.hear_stuck(&stuck));
         mail.missions.drain(..).try_for_each(|mission| self.assessor.hear_mission(&mission))?;
         Ok(is_stuck)
+    }
+
+    pub fn know_friction(&mut self, map: Arc<GridMap<f32>>) {
+        self.assessor.know_friction(map);
     }
 
     pub fn hear_surface(&mut self, header: &SurfaceHeader) {

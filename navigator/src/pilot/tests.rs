@@ -50,6 +50,7 @@ fn config() -> Config {
         areas: crate::Areas::default(),
         sensors: Vec::new(),
         moving: None,
+        friction: None,
         correction: kinodynamics::CorrectionConfig::default(),
     }
 }
