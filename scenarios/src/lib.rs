@@ -3,8 +3,8 @@
 //!
 //! Of `bicycle` this crate uses descriptions and the drive log, never the dynamics: the model never grades itself.
 //!
-//! A [`World`] is ground with heights and materials, made by [`rock_field`], [`arena`], [`world_from_layers`] or
-//! [`World::from_fn`]; a [`Plant`] is a machine on it, a [`Deviation`] what is wrong with that machine; an [`Episode`]
+//! A [`World`] is ground with heights and materials, made by [`rock_field`], [`arena`], [`world_from_layers`],
+//! [`Landscape::new`] or [`World::from_fn`]; a [`Plant`] is a machine on it, a [`Deviation`] what is wrong with that machine; an [`Episode`]
 //! puts both together with sensors and rules and asks for a decision every cycle; [`Walker`]s are people who cross its
 //! way. `examples/own_world.rs` drives in a
 //! world of one's own.
@@ -13,6 +13,7 @@ mod arena;
 mod deviation;
 mod episode;
 mod friction;
+mod landscape;
 mod layers;
 mod motion;
 mod pair;
@@ -28,6 +29,7 @@ mod skyline;
 mod task;
 mod truth;
 mod walker;
+mod waves;
 mod world;
 
 pub use arena::{ARENA_GOAL_M, ARENA_START, ArenaConfig, ArenaError, arena};
@@ -37,6 +39,7 @@ pub use episode::{
     drive_log,
 };
 pub use friction::Stribeck;
+pub use landscape::{GroundKind, Landscape, LandscapeError, LandscapeKind, RouteTask};
 pub use layers::{LayerConfig, LayersError, WorldLayers, world_from_layers};
 pub use motion::Motion;
 pub use pair::{End, Pair, PairError, PairWish, check_pair, feasible_pair};
