@@ -9,7 +9,7 @@ mod score;
 
 use bicycle::{DriveLogError, Vehicle};
 use friction::{Chassis, Drive, FindError, Grip, find_friction};
-use scenarios::{CommandError, PlantError, WorldError};
+use scenarios::{CommandError, PlantError, Stribeck, WorldError};
 use serde::Serialize;
 use thiserror::Error;
 
@@ -111,6 +111,29 @@ fn sliding_mps(grip: &Grip) -> f64 {
         Grip::Measured { sliding_mps, .. } => sliding_mps,
         Grip::AtLeast { .. } => friction::SLIDING_MPS,
     }
+}
+
+/// A ground whose friction a drive showed.
+pub(crate) struct FoundGround {
+    pub name: &'static str,
+    /// What only the plant knows.
+    pub truth: Stribeck,
+    /// What was found [-].
+    pub friction: f64,
+}
+
+/// The grounds of a seed's drive that were driven at their limit.
+pub(crate) fn found_grounds(vehicle: &Vehicle, seed: u64) -> Result<Vec<FoundGround>, FrictionBenchError> {
+    let TestDrive { log, classes, grounds, described } = test_drive(vehicle, seed)?;
+    let named = grounds.map(|ground| (ground.name, ground.published));
+    let found = find_friction(&Chassis::of(&described), &named, &[Drive { log: &log, classes: &classes }])?;
+    let measured = grounds.iter().zip(&found.grounds).filter_map(|(ground, found)| match found.grip {
+        Grip::Measured { friction, .. } => {
+            Some(FoundGround { name: ground.name, truth: ground.stribeck, friction })
+        }
+        Grip::AtLeast { .. } => None,
+    });
+    Ok(measured.collect())
 }
 
 fn rows(vehicle: &Vehicle, seed: u64) -> Result<Vec<Row>, FrictionBenchError> {

@@ -1,6 +1,6 @@
 //! What things cost on this machine, and the tables that are published: one update of the controller ([`control`]), a
 //! risk map of the physics prior ([`prior_map`]) and of what was learned ([`learned_map`]), how both grow ([`scaling`]), learning ([`learning`],
-//! [`traction_map`]), navigation ([`navigation`]), risk tolerance ([`risk`]), inverse kinodynamics ([`mod@kinodynamics`]), diagnoses ([`gap_score`], [`gap_closed_loop`], [`ground_cases`]), friction ([`mod@friction`]) and what it brings the planner ([`slippery`]), and the plant itself
+//! [`traction_map`]), navigation ([`navigation`]), risk tolerance ([`risk`]), inverse kinodynamics ([`mod@kinodynamics`]), diagnoses ([`gap_score`], [`gap_closed_loop`], [`ground_cases`]), friction ([`mod@friction`]) and what it brings the planner ([`slippery`]), routes ([`mod@route`]) and the plant itself
 //! ([`plant`]). A part of [Surefoot](../cli/index.html).
 //!
 //! All of it goes through the interfaces that a drive uses. [`closed_loop`] puts plant and planner together;
@@ -24,6 +24,7 @@ pub mod navigation;
 pub mod plant;
 pub mod prior_map;
 pub mod risk;
+pub mod route;
 pub mod scaling;
 pub mod slippery;
 mod spread;

@@ -2,6 +2,7 @@
 
 mod bench;
 mod bench_gap;
+mod bench_route;
 mod collect;
 mod convert;
 mod correction;
@@ -38,6 +39,7 @@ pub use bench::{
     BenchPriorMapArguments, BenchWork,
 };
 pub use bench_gap::BenchGapArguments;
+pub use bench_route::BenchRouteArguments;
 pub use collect::{CollectArguments, CollectMap, CollectSplit, CollectWorld};
 pub use convert::ConvertArguments;
 pub use correction::{BenchCorrectionArguments, CorrectionMethod};

@@ -11,6 +11,7 @@ mod learning;
 mod navigation;
 mod plant;
 mod risk;
+mod route;
 mod scaling;
 mod slippery;
 mod sweep;
@@ -31,6 +32,7 @@ pub(crate) use learning::run_learning;
 pub(crate) use navigation::run_navigation;
 pub(crate) use plant::run_plant;
 pub(crate) use risk::run_risk;
+pub(crate) use route::run_route;
 pub(crate) use scaling::run_scaling;
 pub(crate) use slippery::run_slippery;
 

@@ -39,6 +39,7 @@ pub mod navigation;
 pub mod plant;
 pub mod risk;
 pub mod route;
+pub mod routes;
 pub mod scaling;
 pub mod slippery;
 mod table;

@@ -128,6 +128,19 @@ impl Edges {
         self.edges[index].iter_mut().for_each(|edge| edge.cost *= factor);
     }
 
+    /// Closes every edge from or to a cell of a region.
+    pub fn close(&mut self, region: &CellRegion) {
+        let geometry = self.geometry;
+        let is_inside = |cell: Cell| region.rows.contains(&cell.row) && region.cols.contains(&cell.col);
+        for cell in region.grown(1, &geometry).cells() {
+            for (direction, step) in STEPS.iter().enumerate().take(N_STORED) {
+                if is_inside(cell) || stepped(&geometry, cell, *step).is_some_and(is_inside) {
+                    self.edges[geometry.index(cell)][direction] = Edge::CLOSED;
+                }
+            }
+        }
+    }
+
     /// The edge from the cell with an index in a direction; closed beyond the map.
     #[inline]
     pub fn at(&self, index: usize, direction: usize) -> Edge {

@@ -48,6 +48,12 @@ impl Line {
         Ok(Self { samples, spacing_m })
     }
 
+    /// The place so far along it [m].
+    pub fn place_m(&self, along_m: f64) -> [f64; 2] {
+        let index = (along_m / self.spacing_m).round() as usize;
+        self.samples[index.min(self.samples.len() - 1)].at_m
+    }
+
     /// Its points with the fastest speeds over ground whose bend and height [m] each has, and the time it takes [s].
     pub fn driven(
         &self,

@@ -5,11 +5,15 @@ use crate::edges::{Barrier, Edges, STEPS, stepped};
 use crate::ground::{self, GroundCell, GroundError};
 use crate::line::{self, Gate, Line, heading_of};
 use crate::search::{self, CellPath, Unreachable};
+use crate::smooth::SplinePoint;
 use crate::speed::{Bend, SpeedError, SpeedLimits};
 use terrain::{Cell, CellRegion, GridMap, SettingError};
 
 /// Share of friction that makes ground as good as other ground to smooth a line over, and of roughness likewise.
 const AS_GOOD: f32 = 0.9;
+
+/// Places that a route is led around, at most, since no speed will do there.
+const DETOURS_MAX: usize = 16;
 
 /// Searches one map for routes.
 #[derive(Clone, Debug)]
@@ -136,6 +140,19 @@ pub enum RouteError {
     Speed(#[from] SpeedError),
 }
 
+/// Why an attempt at a route failed.
+struct Refusal {
+    error: RouteError,
+    /// Where no speed will do, if that is why [m].
+    at_m: Option<[f64; 2]>,
+}
+
+impl From<RouteError> for Refusal {
+    fn from(error: RouteError) -> Self {
+        Self { error, at_m: None }
+    }
+}
+
 impl Planner {
     /// A planner for a map.
     ///
@@ -198,7 +215,8 @@ impl Planner {
         self.edges.barrier_at(&self.ground, &self.config, cell)
     }
 
-    /// The cheapest route from a pose to a point, and the fastest speeds along it.
+    /// The cheapest route from a pose to a point, and the fastest speeds along it. The smooth line meets other slopes than
+    /// the cells that it was laid along: where no speed will do on it, it is searched again around that place.
     ///
     /// # Errors
     /// There is none, and why.
@@ -211,6 +229,29 @@ impl Planner {
         if !yaw_rad.is_finite() {
             return Err(RouteError::Yaw { found_rad: yaw_rad });
         }
+        let mut refused = None;
+        let mut planner = std::borrow::Cow::Borrowed(self);
+        for _ in 0..=DETOURS_MAX {
+            match planner.attempt((start_m, yaw_rad), goal_m, limits) {
+                Ok(route) => return Ok(route),
+                Err(Refusal { error, at_m }) => {
+                    let around = at_m.and_then(|at_m| planner.around(at_m, [start_m, goal_m]));
+                    let error = *refused.get_or_insert(error);
+                    let Some(around) = around else { return Err(error) };
+                    planner.to_mut().edges.close(&around);
+                }
+            }
+        }
+        Err(refused.unwrap_or(RouteError::Smooth { n_cells: 0 }))
+    }
+
+    /// The cheapest route as the edges are, or what is wrong with it, and where.
+    fn attempt(
+        &self,
+        (start_m, yaw_rad): ([f64; 2], f64),
+        goal_m: [f64; 2],
+        limits: &SpeedLimits,
+    ) -> Result<Route, Refusal> {
         let start = self.open_cell("start", start_m)?;
         let goal = self.open_cell("goal", goal_m)?;
         let path = self.search((start, heading_of(yaw_rad)), goal, goal_m)?;
@@ -220,7 +261,11 @@ impl Planner {
         let line = Line::through(&corridor, resolution_m)?;
         let sliding_mps = self.config.sliding_mps as f32;
         let grounded = line.samples.iter().map(|sample| line::grounded(&self.ground, sliding_mps, sample));
-        let (points, duration_s) = line.driven(grounded.collect(), limits)?;
+        let driven = line.driven(grounded.collect(), limits);
+        let (points, duration_s) = driven.map_err(|error| Refusal {
+            at_m: error.along_m().map(|along_m| line.place_m(along_m)),
+            error: error.into(),
+        })?;
         Ok(Route {
             cost_m: path.cost * resolution_m,
             cells: path.cells,
@@ -229,6 +274,28 @@ impl Planner {
             spacing_m: line.spacing_m,
             duration_s,
         })
+    }
+
+    /// The cells around a place that no line is to pass again; none where they hold an end of the way.
+    fn around(&self, at_m: [f64; 2], ends_m: [[f64; 2]; 2]) -> Option<CellRegion> {
+        let geometry = self.ground.geometry();
+        let around = CellRegion::of_cell(geometry.cell_at(at_m[0], at_m[1])?).grown(1, geometry);
+        let is_inside = |end_m: &[f64; 2]| {
+            let cell = geometry.cell_at(end_m[0], end_m[1]);
+            cell.is_some_and(|cell| around.rows.contains(&cell.row) && around.cols.contains(&cell.col))
+        };
+        (!ends_m.iter().any(is_inside)).then_some(around)
+    }
+
+    /// What a line that was found on another map is like on this one.
+    pub fn bends(&self, points: &[RoutePoint]) -> Vec<Bend> {
+        let sliding_mps = self.config.sliding_mps as f32;
+        let bend = |point: &RoutePoint| {
+            let curvature_per_m = point.bend.curvature_per_m;
+            let sample = SplinePoint { at_m: point.at_m, yaw_rad: point.yaw_rad, curvature_per_m };
+            line::grounded(&self.ground, sliding_mps, &sample).0
+        };
+        points.iter().map(bend).collect()
     }
 
     /// The cell of a point that a vehicle can stand on.

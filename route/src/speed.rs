@@ -120,6 +120,16 @@ pub enum SpeedError {
     },
 }
 
+impl SpeedError {
+    /// Where along the way no speed will do, if that is why [m].
+    pub(crate) fn along_m(&self) -> Option<f64> {
+        match *self {
+            Self::Slides { at_m, .. } | Self::TooWeak { at_m, .. } => Some(at_m),
+            Self::Setting(_) | Self::Unsolved { .. } => None,
+        }
+    }
+}
+
 /// The fastest speeds [m/s] at points `spacing_m` apart, from standing to standing.
 ///
 /// # Errors

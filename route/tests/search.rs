@@ -255,3 +255,33 @@ fn a_changed_part_gives_the_routes_of_a_map_that_was_always_so() {
     assert_eq!(of(&planner), of(&fresh));
     assert!(of(&planner).cost_m < 230.0);
 }
+
+/// A hump across the straight way that the search thinks nothing of: a weak vehicle, for which no speed will do on it, is
+/// led around, and where it fills the map, the refusal says where it was.
+#[test]
+fn a_line_that_no_speed_will_do_on_is_led_around() {
+    let hump = |rows: std::ops::Range<usize>| {
+        map(40, move |Cell { row, col }| {
+            let rise = if rows.contains(&row) { 4.0 - (col as f32 - 20.0).abs() } else { 0.0 };
+            GroundCell { height_m: 0.3 * rise.max(0.0), ..GroundCell::level(FrictionCurve::ASPHALT) }
+        })
+    };
+    let careless =
+        RouteConfig { slope_weight: 0.0, roll_max_rad: 1.2, pitch_max_rad: 1.2, ..RouteConfig::default() };
+    let careless = RouteConfig { friction_share: 1.0, ..careless };
+    let route = |rows: std::ops::Range<usize>, traction_max_mps2: f64| {
+        let limits = SpeedLimits { traction_max_mps2, ..LIMITS };
+        Planner::new(hump(rows), careless).unwrap().route(([5.5, 20.5], 0.0), [35.5, 20.5], &limits)
+    };
+    let highest_m = |route: route::Route| route.points.iter().map(|point| point.height_m).fold(0.0, f64::max);
+    // A climb of 0.3 takes 9.81 x 0.3 / sqrt(1.09) = 2.82 m/s2.
+    assert!(highest_m(route(18..23, 3.5).unwrap()) > 1.0);
+    let around = route(18..23, 2.5).unwrap();
+    assert!(around.points.iter().all(|point| point.bend.grade < 0.27), "{around:?}");
+    assert!(highest_m(around) < 0.5);
+    let error = route(0..40, 2.5).unwrap_err().to_string();
+    assert!(
+        error.starts_with("climb at") && error.contains("expected at most 2.50 m/s2, found 2.8"),
+        "{error}"
+    );
+}

@@ -33,7 +33,7 @@ const PATCHY: f64 = 0.05;
 #[serde(rename_all = "snake_case")]
 pub enum LandscapeKind {
     /// 400 x 400 m of seven grounds close together: mountains and craters of ice with ramps of rock, basins of mud, dunes,
-    /// ponds, trees and a road around the middle.
+    /// ponds, trees, a road around the middle and a hedge.
     Garden,
     /// 1,000 x 1,000 m: mountains, cliffs of rock, dirt and meadows with trees, beaches, the sea and few roads.
     Island,

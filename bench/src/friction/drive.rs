@@ -40,7 +40,7 @@ pub(super) struct Ground {
     /// Its class.
     pub name: &'static str,
     pub published: FrictionCurve,
-    stribeck: Stribeck,
+    pub stribeck: Stribeck,
     pub is_aggressive: bool,
     /// Friction at a sliding speed of 1 m/s on the plant's test bench [-].
     pub friction: f64,

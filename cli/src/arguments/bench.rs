@@ -43,6 +43,9 @@ pub enum BenchCommand {
     /// Friction found from drives without labels, beside the truth
     #[command(long_about = super::friction::BENCH_ABOUT)]
     Friction(super::BenchFrictionArguments),
+    /// Routes planned with and without knowledge of friction, driven
+    #[command(long_about = super::bench_route::ABOUT)]
+    Route(super::BenchRouteArguments),
     /// Drives of plants with a gap, with nominal, repaired and true models
     #[command(long_about = super::bench_gap::LONG_ABOUT)]
     Gap(super::BenchGapArguments),

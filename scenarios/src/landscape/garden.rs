@@ -28,7 +28,20 @@ pub(super) fn garden(geometry: GridGeometry, mut rng: Xoshiro256PlusPlus) -> Ske
         (0..3).for_each(|_| kind.place(&mut sketch, &mut rng));
     }
     scattered_trees(&mut sketch, 250.0, &mut rng);
+    fence(&mut sketch);
     sketch
+}
+
+/// A hedge along the border.
+fn fence(sketch: &mut Sketch) {
+    let geometry = *sketch.geometry();
+    let is_border = |place: usize, n: usize| place < 2 || place + 2 >= n;
+    let cells = CellRegion::whole(&geometry).cells();
+    for cell in
+        cells.filter(|cell| is_border(cell.row, geometry.n_rows) || is_border(cell.col, geometry.n_cols))
+    {
+        sketch.covers[cell] = Cover::Tree;
+    }
 }
 
 /// Dirt and rock in patches as large as a house.

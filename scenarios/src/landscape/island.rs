@@ -76,7 +76,7 @@ pub(super) fn island(geometry: GridGeometry, mut rng: Xoshiro256PlusPlus) -> Ske
     sketch.build_road(&coast.ring(45.0));
     (0..2).for_each(|_| sketch.build_road(&crossing(&coast, &mut rng)));
     cover(&mut sketch, &coast, &mut rng);
-    scattered_trees(&mut sketch, 160.0, &mut rng);
+    scattered_trees(&mut sketch, 220.0, &mut rng);
     sketch
 }
 

@@ -50,17 +50,18 @@ impl Landscape {
         };
         let geometry = *self.world.geometry();
         let mut rng = stream(self.seed, &[0x7A5C, self.kind as u64]);
+        let ends: Vec<Cell> = CellRegion::whole(&geometry).cells().filter(|cell| is_end(*cell)).collect();
         let mut tasks = Vec::with_capacity(n);
         let [shortest_m, longest_m] = self.kind.distance_m();
         for _ in 0..ATTEMPTS * n {
-            if tasks.len() == n {
+            if tasks.len() == n || ends.is_empty() {
                 break;
             }
-            let [start, goal] = [0, 1].map(|_| geometry.cell(rng.random_range(0..geometry.n_cells())));
+            let [start, goal] = [0, 1].map(|_| ends[rng.random_range(0..ends.len())]);
             let [start_m, goal_m] = [start, goal].map(|cell| geometry.centre_m(cell));
             let way_m = [goal_m[0] - start_m[0], goal_m[1] - start_m[1]];
             let is_near = (shortest_m..=longest_m).contains(&way_m[0].hypot(way_m[1]));
-            if is_near && parts[start] == parts[goal] && is_end(start) && is_end(goal) {
+            if is_near && parts[start] == parts[goal] {
                 let eighth = std::f64::consts::FRAC_PI_4;
                 let yaw_rad = (way_m[1].atan2(way_m[0]) / eighth).round() * eighth;
                 tasks.push(RouteTask { start_m, yaw_rad, goal_m });

@@ -1,0 +1,42 @@
+//! `surefoot bench route`: routes of every method driven by the plant, as text, JSON and pictures.
+
+use ::bench::route::{Method, Request, RouteBenchError, measure, n_drives};
+
+use crate::arguments::BenchRouteArguments;
+use crate::output::WithRevision;
+use crate::{UsageError, progress};
+
+pub(crate) fn run_route(arguments: &BenchRouteArguments) -> anyhow::Result<()> {
+    let vehicle = formats::read_vehicle(&arguments.vehicle).map_err(UsageError::from_input)?;
+    arguments.results.prepare()?;
+    let request = Request {
+        vehicle,
+        seed: arguments.seed,
+        n_tasks: arguments.tasks as usize,
+        n_mppi_tasks: arguments.mppi_tasks as usize,
+        methods: Method::ALL.to_vec(),
+        n_threads: arguments.threads.count(),
+    };
+    let bar = progress::bar(n_drives(&request) as u64, "{pos}/{len} drives");
+    let report = measure(&request, || bar.inc(1));
+    bar.finish_and_clear();
+    let report = report.map_err(told)?;
+    print!("{}", report::routes::text(&report));
+    let results = &arguments.results;
+    results.write_json("route_table.json", &WithRevision::of(&report))?;
+    results.write("route_table.png", &report::routes::picture(&report)?)?;
+    for shown in &report.shown {
+        let name = format!("route_{}.png", shown.landscape.kind.name());
+        results.write(&name, &report::routes::map(shown)?)?;
+    }
+    println!("\n  route_table.json and pictures in {}", results.out.display());
+    Ok(())
+}
+
+/// A vehicle that cannot be put there, or more tasks than a landscape has, is the user's choice.
+fn told(error: RouteBenchError) -> anyhow::Error {
+    match error {
+        RouteBenchError::Landscape(_) | RouteBenchError::Track(_) => UsageError::from_input(error).into(),
+        other => other.into(),
+    }
+}

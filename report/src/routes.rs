@@ -1,0 +1,9 @@
+//! The table of routes: text, bars, and maps with the routes of a task.
+
+mod bars;
+mod map;
+mod text;
+
+pub use bars::picture;
+pub use map::map;
+pub use text::text;
