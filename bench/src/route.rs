@@ -12,6 +12,7 @@ mod plan;
 mod published;
 mod row;
 mod rules;
+pub mod timing;
 mod track;
 
 use bicycle::Vehicle;

@@ -3,6 +3,7 @@
 mod bench;
 mod bench_gap;
 mod bench_route;
+mod bench_route_speed;
 mod collect;
 mod convert;
 mod correction;
@@ -40,6 +41,7 @@ pub use bench::{
 };
 pub use bench_gap::BenchGapArguments;
 pub use bench_route::BenchRouteArguments;
+pub use bench_route_speed::BenchRouteSpeedArguments;
 pub use collect::{CollectArguments, CollectMap, CollectSplit, CollectWorld};
 pub use convert::ConvertArguments;
 pub use correction::{BenchCorrectionArguments, CorrectionMethod};

@@ -12,6 +12,7 @@ mod navigation;
 mod plant;
 mod risk;
 mod route;
+mod route_speed;
 mod scaling;
 mod slippery;
 mod sweep;
@@ -33,6 +34,7 @@ pub(crate) use navigation::run_navigation;
 pub(crate) use plant::run_plant;
 pub(crate) use risk::run_risk;
 pub(crate) use route::run_route;
+pub(crate) use route_speed::run_route_speed;
 pub(crate) use scaling::run_scaling;
 pub(crate) use slippery::run_slippery;
 

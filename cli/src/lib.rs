@@ -190,6 +190,7 @@ fn dispatch(command: Command) -> anyhow::Result<()> {
         Command::Train { command: TrainCommand::Friction(friction) } => train::run_friction(&friction),
         Command::Bench { command: BenchCommand::Friction(friction) } => bench::run_friction(&friction),
         Command::Bench { command: BenchCommand::Route(route) } => bench::run_route(&route),
+        Command::Bench { command: BenchCommand::RouteSpeed(speed) } => bench::run_route_speed(&speed),
         Command::Bench { command: BenchCommand::Control(control) } => bench::run_control(&control),
         Command::Bench { command: BenchCommand::PriorMap(prior_map) } => bench::run_prior_map(&prior_map),
         Command::Bench { command: BenchCommand::LearnedMap(learned_map) } => {

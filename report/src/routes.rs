@@ -1,9 +1,11 @@
 //! The table of routes: text, bars, and maps with the routes of a task.
 
 mod bars;
+mod grip;
 mod map;
 mod text;
 
 pub use bars::picture;
+pub use grip::grip;
 pub use map::map;
 pub use text::text;

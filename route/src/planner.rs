@@ -287,6 +287,20 @@ impl Planner {
         (!ends_m.iter().any(is_inside)).then_some(around)
     }
 
+    /// What a route begins with: the cheapest way over the cells alone, and how many states were expanded for it.
+    ///
+    /// # Errors
+    /// There is none, and why.
+    pub fn cells(
+        &self,
+        (start_m, yaw_rad): ([f64; 2], f64),
+        goal_m: [f64; 2],
+    ) -> Result<(Vec<Cell>, usize), RouteError> {
+        let (start, goal) = (self.open_cell("start", start_m)?, self.open_cell("goal", goal_m)?);
+        let path = self.search((start, heading_of(yaw_rad)), goal, goal_m)?;
+        Ok((path.cells, path.n_expanded))
+    }
+
     /// What a line that was found on another map is like on this one.
     pub fn bends(&self, points: &[RoutePoint]) -> Vec<Bend> {
         let sliding_mps = self.config.sliding_mps as f32;

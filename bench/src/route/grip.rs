@@ -99,7 +99,8 @@ struct Case {
     friction: f64,
 }
 
-/// Turns and climbs on the seven grounds as published, and on those that drives of `n_drives` seeds from `seed` on found.
+/// Turns and climbs on the seven grounds as published, and on those that drives of `n_drives` seeds from `seed` on
+/// found.
 ///
 /// # Errors
 /// A vehicle that cannot be driven.

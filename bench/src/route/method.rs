@@ -125,7 +125,8 @@ const fn constant(friction: f32) -> FrictionCurve {
     }
 }
 
-/// The map that everybody could know: true heights, roughness, trees and water, and of each ground the published friction,
+/// The map that everybody could know: true heights, roughness, trees and water, and of each ground the published
+/// friction,
 /// from which the true one departs.
 pub(super) fn known(landscape: &Landscape) -> GridMap<GroundCell> {
     let world = &landscape.world;
@@ -166,7 +167,8 @@ const N_NETWORKS: usize = 5;
 /// Ground that is likelier not to be driven on than to be is closed.
 const CLOSED_BELOW: f32 = 0.5;
 
-/// A grid of the ensemble's mean probability, over which a metre costs the more the less likely it is (Moore et al. 2023;
+/// A grid of the ensemble's mean probability, over which a metre costs the more the less likely it is (Moore et al.
+/// 2023;
 /// a metre at probability p costs 3 + 1 / p).
 fn appearance(known: &GridMap<GroundCell>, landscape: &Landscape) -> Vec<GroundCell> {
     let mut rng = stream(0, &[0x0A57, landscape.kind as u64]);

@@ -100,7 +100,8 @@ impl MethodPlanner {
         }
     }
 
-    /// With the speeds that our planner would drive it at, and where it would not, as slowly as at the steepest slope that
+    /// With the speeds that our planner would drive it at, and where it would not, as slowly as at the steepest
+    /// slope that
     /// it would.
     fn sped(&self, route: Route, known: &Planner) -> Result<Plan, RouteError> {
         let drivable = |bend: Bend| self.drivable(bend);

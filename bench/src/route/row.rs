@@ -42,7 +42,8 @@ pub struct Drive {
     pub end: End,
     /// Until then [s].
     pub time_s: f64,
-    /// What the plan takes to the place that counts as the goal [s]; none without a route, and of whoever drives at one speed.
+    /// What the plan takes to the place that counts as the goal [s]; none without a route, and of whoever drives at
+    /// one speed.
     pub expected_s: Option<f64>,
     /// Length of the route [m].
     pub length_m: f64,

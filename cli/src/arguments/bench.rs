@@ -46,6 +46,9 @@ pub enum BenchCommand {
     /// Routes planned with and without knowledge of friction, driven
     #[command(long_about = super::bench_route::ABOUT)]
     Route(super::BenchRouteArguments),
+    /// What planning a route takes on this machine, and one over kilometres in tiles
+    #[command(long_about = super::bench_route_speed::ABOUT)]
+    RouteSpeed(super::BenchRouteSpeedArguments),
     /// Drives of plants with a gap, with nominal, repaired and true models
     #[command(long_about = super::bench_gap::LONG_ABOUT)]
     Gap(super::BenchGapArguments),

@@ -1,10 +1,20 @@
 //! `surefoot bench route`: routes of every method driven by the plant, as text, JSON and pictures.
 
-use ::bench::route::{Method, Request, RouteBenchError, measure, n_drives};
+use ::bench::route::grip::{GripError, GripRow, measure_grip};
+use ::bench::route::{Method, Report, Request, RouteBenchError, measure, n_drives};
+use serde::Serialize;
 
 use crate::arguments::BenchRouteArguments;
 use crate::output::WithRevision;
 use crate::{UsageError, progress};
+
+/// The table, and what friction foretells of turns and climbs.
+#[derive(Serialize)]
+struct Results<'a> {
+    #[serde(flatten)]
+    table: &'a Report,
+    grip: &'a [GripRow],
+}
 
 pub(crate) fn run_route(arguments: &BenchRouteArguments) -> anyhow::Result<()> {
     let vehicle = formats::read_vehicle(&arguments.vehicle).map_err(UsageError::from_input)?;
@@ -17,13 +27,16 @@ pub(crate) fn run_route(arguments: &BenchRouteArguments) -> anyhow::Result<()> {
         methods: Method::ALL.to_vec(),
         n_threads: arguments.threads.count(),
     };
+    let (n_grip_drives, n_threads) = (u64::from(arguments.grip_drives), request.n_threads);
+    let grip = measure_grip(&request.vehicle, request.seed, n_grip_drives, n_threads).map_err(refused)?;
+    print!("{}", report::routes::grip(&grip));
     let bar = progress::bar(n_drives(&request) as u64, "{pos}/{len} drives");
     let report = measure(&request, || bar.inc(1));
     bar.finish_and_clear();
     let report = report.map_err(told)?;
     print!("{}", report::routes::text(&report));
     let results = &arguments.results;
-    results.write_json("route_table.json", &WithRevision::of(&report))?;
+    results.write_json("route_table.json", &WithRevision::of(&Results { table: &report, grip: &grip }))?;
     results.write("route_table.png", &report::routes::picture(&report)?)?;
     for shown in &report.shown {
         let name = format!("route_{}.png", shown.landscape.kind.name());
@@ -37,6 +50,14 @@ pub(crate) fn run_route(arguments: &BenchRouteArguments) -> anyhow::Result<()> {
 fn told(error: RouteBenchError) -> anyhow::Error {
     match error {
         RouteBenchError::Landscape(_) | RouteBenchError::Track(_) => UsageError::from_input(error).into(),
+        other => other.into(),
+    }
+}
+
+/// A vehicle that does not stay on its wheels is the user's choice.
+fn refused(error: GripError) -> anyhow::Error {
+    match error {
+        GripError::Friction(_) | GripError::Track(_) => UsageError::from_input(error).into(),
         other => other.into(),
     }
 }

@@ -29,7 +29,8 @@ pub struct RouteTask {
 }
 
 impl Landscape {
-    /// `n` tasks of a seed. A goal can be reached from its start over ground that is not steep for its friction, 3 m away
+    /// `n` tasks of a seed. A goal can be reached from its start over ground that is not steep for its friction, 3 m
+    /// away
     /// from trees and water; that rule is all that chooses them, and no planner has a say.
     ///
     /// # Errors
