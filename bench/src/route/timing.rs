@@ -220,7 +220,7 @@ fn write_hills(map: &mut TileMap, side_m: f64, cell_m: f64) -> Result<(), Timing
             let friction = match patch {
                 value if value > 0.6 => FrictionCurve::MUD,
                 value if value > 0.2 => FrictionCurve::DIRT,
-                value if value < -0.7 => FrictionCurve::ICE,
+                value if value < -0.7 => FrictionCurve::ROCK,
                 value if value < -0.4 => FrictionCurve::SAND,
                 _ => FrictionCurve::GRASS,
             };
