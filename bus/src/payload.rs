@@ -162,7 +162,7 @@ mod tests {
         CheckpointHeader, CommandRecord, FutureRecord, Grid, ImuRecord, MissionRecord, OrderHeader,
         PlanRecord, PointRecord, ScanHeader, Stamp, StuckRecord, TRACKS_MAX, TrackRecord, TracksHeader,
     };
-    use traversability::{GroundFlags, RiskMap};
+    use traversability::{FrictionLimit, GroundFlags, RiskMap};
 
     /// A map of odd sizes, so that every part ends within an element, and its message.
     fn told() -> (RiskMap, RiskHeader, Vec<[f32; 4]>) {
@@ -173,8 +173,12 @@ mod tests {
                 risk.pitch_rad = k as f32;
             }
             for (k, ground) in ground.iter_mut().enumerate() {
-                *ground =
-                    Ground { gradient: [k as f32, -0.5], class: (k % 4) as u8, flags: GroundFlags(k as u8) };
+                *ground = Ground {
+                    gradient: [k as f32, -0.5],
+                    class: (k % 4) as u8,
+                    flags: GroundFlags(k as u8),
+                    friction: FrictionLimit::new(0.01 * (k % 90 + 1) as f32),
+                };
             }
         });
         let parts = RiskParts::new(&geometry, 3);

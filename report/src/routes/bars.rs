@@ -8,6 +8,9 @@ use crate::axes::{Axes, Range, round_step};
 use crate::canvas::{Anchor, Canvas, EncodeError, MARGIN, PAGE_WIDTH, Rect, Stroke, TextStyle};
 use crate::colour::Rgb;
 
+/// Something of a row.
+type OfRow<'a, T> = dyn Fn(&Row) -> T + 'a;
+
 const TOP: f64 = 175.0;
 const LINE: f64 = 34.0;
 const BETWEEN: f64 = 150.0;
@@ -93,7 +96,7 @@ impl Block<'_> {
         &self,
         axes: &Axes,
         label: &str,
-        (value, paper): (&dyn Fn(&Row) -> Option<Mean>, &dyn Fn(&Row) -> f64),
+        (value, paper): (&OfRow<'_, Option<Mean>>, &OfRow<'_, f64>),
         canvas: &mut Canvas,
     ) {
         for (index, row) in self.rows.iter().enumerate() {
