@@ -200,4 +200,40 @@ mod tests {
         std::fs::write(&file, "[controller]\nisa = \"portable\"\n").unwrap();
         assert_eq!(isa_of(&["--config", file.to_str().unwrap()]), Isa::Portable, "as the file says");
     }
+
+    fn config_of(words: &[&str]) -> Result<Config, UsageError> {
+        let words = ["surefoot", "drive", "--method", "physics"].iter().chain(words);
+        match Arguments::try_parse_from(words).unwrap().command {
+            Command::Drive(arguments) => machine(&arguments, GuardConfig::default()).map(|made| made.config),
+            _ => unreachable!("parsed from `drive`"),
+        }
+    }
+
+    /// Ice, of which a drive showed half of what is published, 0.20 at 1 m/s; of grass and sand nothing was shown.
+    #[test]
+    fn friction_that_drives_showed_is_told_to_the_controller() {
+        let untold = config_of(&[]).unwrap();
+        assert_eq!((untold.friction, untold.controller.costs.grip_s), (None, 0.0));
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("friction.toml");
+        let table = |ground: &str| {
+            format!(
+                "vehicle = 'sedan'\n[[ground]]\nground = '{ground}'\ndriven_s = 30.0\nat_limit_s = 4.0\n\
+                 grip = {{ kind = 'at_least', friction = 0.08 }}\n[ground.curve]\nstatic_friction = 0.2\n\
+                 dynamic_friction = 0.1\nviscous_friction = 0.0\nstribeck_speed_mps = 0.5\n"
+            )
+        };
+        std::fs::write(&file, table("ice")).unwrap();
+        let words = ["--friction", file.to_str().unwrap(), "--bare", "ice"];
+        let told = config_of(&words).unwrap();
+        let known = told.friction.unwrap();
+        let curve = |curve: ::route::FrictionCurve| f64::from(curve.at(1.0));
+        assert_eq!(known.open, Some(curve(::route::FrictionCurve::ICE.scaled(0.5))));
+        assert_eq!(known.vegetation, Some(curve(::route::FrictionCurve::GRASS)));
+        assert_eq!(known.loose, Some(curve(::route::FrictionCurve::SAND)));
+        assert!(known.open.unwrap() < 0.12 && told.controller.costs.grip_s > 0.0);
+        std::fs::write(&file, table("lava")).unwrap();
+        let refused = config_of(&words).unwrap_err().to_string();
+        assert!(refused.contains("friction.toml") && refused.contains("found lava"), "{refused}");
+    }
 }
