@@ -220,7 +220,7 @@ mod tests {
             format!(
                 "vehicle = 'sedan'\n[[ground]]\nground = '{ground}'\ndriven_s = 30.0\nat_limit_s = 4.0\n\
                  grip = {{ kind = 'at_least', friction = 0.08 }}\n[ground.curve]\nstatic_friction = 0.2\n\
-                 dynamic_friction = 0.1\nviscous_friction = 0.0\nstribeck_speed_mps = 0.5\n"
+                 sliding_friction = 0.1\nviscous_friction = 0.0\nstribeck_speed_mps = 0.5\n"
             )
         };
         std::fs::write(&file, table("ice")).unwrap();
