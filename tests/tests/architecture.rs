@@ -76,7 +76,8 @@ const MAY_USE: [(&str, &[&str]); 23] = [
     ("python", &ALL),
     ("tests", &[]),
 ];
-const LIBRARIES: [&str; 12] = [
+const LIBRARIES: [&str; 13] = [
+    "route",
     "friction",
     "terrain",
     "traversability",
