@@ -28,7 +28,7 @@ const P_MOST: f64 = 0.05;
 pub enum Told {
     /// Nothing: the limit of lateral acceleration is that of the vehicle's description.
     Nothing,
-    /// That all ground holds what the most slippery does.
+    /// That all ground holds what ice does as it is published.
     Least,
     /// The friction of every cell, at a sliding speed of 1 m/s.
     Cells,

@@ -65,8 +65,8 @@ pub struct RouteGround {
 
     /// Friction of the vehicle's own drives in place of the published, as `surefoot train friction` writes it (TOML)
     ///
-    /// Of a drive, its controller keeps to it, too: turns, brakes and climbs ask no more of the ground than it holds at a
-    /// sliding speed of 1 m/s. Open ground is that of --bare, loose ground is sand, plants are grass.
+    /// Of a drive, its controller pays for it, too: turns and slopes that ask for more than three quarters of what the ground
+    /// holds at a sliding speed of 1 m/s cost in proportion; brakes and motor do not. Open ground is that of --bare, loose ground is sand, plants are grass.
     #[arg(long, value_name = "FILE")]
     pub friction: Option<PathBuf>,
 }
