@@ -17,7 +17,7 @@ use scenarios::{
 };
 use serde::{Deserialize, Serialize};
 use terrain::{Cell, GridGeometry, GridMap, SurfaceCell};
-use traversability::{CvarLevel, Risk};
+use traversability::{CvarLevel, Ground, Risk, RiskMap};
 
 /// What the controller knows of the ground.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -305,6 +305,20 @@ pub fn true_surface(world: &World, resolution_m: f64) -> GridMap<SurfaceCell> {
         *cell = SurfaceCell::certain(world.height_m(x_m, y_m) as f32, patch.class, patch.vegetation_height_m);
     }
     surface
+}
+
+/// Slope and class under every cell of a world, and no risk anywhere.
+pub(crate) fn slopes(world: &World) -> RiskMap {
+    let geometry = *world.geometry();
+    let mut map = RiskMap::constant(geometry, 1, Risk::NONE);
+    map.fill(|_, grounds| {
+        for (index, ground) in grounds.iter_mut().enumerate() {
+            let [x_m, y_m] = geometry.centre_m(geometry.cell(index));
+            let gradient = world.gradient(x_m, y_m).map(|value| value as f32);
+            *ground = Ground { gradient, class: world.patch(x_m, y_m).class as u8, ..Ground::default() };
+        }
+    });
+    map
 }
 
 /// An elevation file's layers as a world takes them.

@@ -229,20 +229,19 @@ impl Planner {
         if !yaw_rad.is_finite() {
             return Err(RouteError::Yaw { found_rad: yaw_rad });
         }
-        let mut refused = None;
-        let mut planner = std::borrow::Cow::Borrowed(self);
-        for _ in 0..=DETOURS_MAX {
-            match planner.attempt((start_m, yaw_rad), goal_m, limits) {
+        let (mut planner, mut refused, mut n_detours) = (std::borrow::Cow::Borrowed(self), None, 0);
+        loop {
+            let Refusal { error, at_m } = match planner.attempt((start_m, yaw_rad), goal_m, limits) {
                 Ok(route) => return Ok(route),
-                Err(Refusal { error, at_m }) => {
-                    let around = at_m.and_then(|at_m| planner.around(at_m, [start_m, goal_m]));
-                    let error = *refused.get_or_insert(error);
-                    let Some(around) = around else { return Err(error) };
-                    planner.to_mut().edges.close(&around);
-                }
-            }
+                Err(refusal) => refusal,
+            };
+            let error = *refused.get_or_insert(error);
+            let place_m = at_m.filter(|_| n_detours < DETOURS_MAX);
+            let around = place_m.and_then(|at_m| planner.around(at_m, [start_m, goal_m]));
+            let Some(around) = around else { return Err(error) };
+            planner.to_mut().edges.close(&around);
+            n_detours += 1;
         }
-        Err(refused.unwrap_or(RouteError::Smooth { n_cells: 0 }))
     }
 
     /// The cheapest route as the edges are, or what is wrong with it, and where.

@@ -8,7 +8,8 @@ use friction::FrictionCurve;
 use rand::RngExt;
 use rand_xoshiro::Xoshiro256PlusPlus;
 use scenarios::{
-    Imu, ImuConfig, OdometryConfig, OdometrySensor, Patch, Plant, Stribeck, World, steady_friction, stream,
+    GroundKind, Imu, ImuConfig, OdometryConfig, OdometrySensor, Patch, Plant, Stribeck, World,
+    steady_friction, stream,
 };
 use terrain::{GridGeometry, Pose};
 
@@ -62,15 +63,7 @@ pub(super) struct TestDrive {
 
 /// Three grounds, each with a friction of its own, and how hard each is driven.
 fn grounds(vehicle: &Vehicle, rng: &mut Xoshiro256PlusPlus) -> [Ground; 3] {
-    let plant = [
-        Stribeck::ASPHALT,
-        Stribeck::ROCK,
-        Stribeck::DIRT,
-        Stribeck::GRASS,
-        Stribeck::MUD,
-        Stribeck::SAND,
-        Stribeck::ICE,
-    ];
+    let plant = GroundKind::ALL.map(GroundKind::friction);
     let mut left: Vec<usize> = (0..plant.len()).collect();
     std::array::from_fn(|_| {
         let kind = left.swap_remove(rng.random_range(0..left.len()));

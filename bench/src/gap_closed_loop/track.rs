@@ -5,11 +5,12 @@ use std::sync::Arc;
 use bicycle::{Command, Model, SensorModel};
 use mppi::{Config, Controller, Input, Objective, ReferencePath};
 use scenarios::{Deviation, OdometrySensor, Plant, TestMachine};
-use traversability::{GridGeometry, Ground, Risk, RiskMap};
+use traversability::RiskMap;
 
 use super::course::Course;
 use super::drive::{DriveResult, End, Errors, Job};
 use super::{ClosedLoopError, PLAN_AHEAD};
+use crate::closed_loop::slopes;
 
 /// Control cycles per second [Hz].
 const CONTROL_HZ: f64 = 10.0;
@@ -26,7 +27,7 @@ impl Track {
     /// The machine's hills as the controller sees them.
     pub fn new(machine: &TestMachine, isa: mppi::Isa) -> Self {
         let config = Config { n_threads: 1, isa, ..Config::default() };
-        Self { map: map_of(machine), config }
+        Self { map: slopes(&machine.world), config }
     }
 
     /// Drives to the end of the course, or off it.
@@ -91,20 +92,4 @@ impl Track {
         }
         Ok(errors.result(job, end, (plant.time_s(), path_length_m)))
     }
-}
-
-/// Gradient and class under every cell; nothing on these hills is steep or slippery enough to be a risk.
-fn map_of(machine: &TestMachine) -> RiskMap {
-    let world = &machine.world;
-    let GridGeometry { resolution_m, origin, n_rows, n_cols } = *world.geometry();
-    let geometry = GridGeometry { resolution_m, origin, n_rows, n_cols };
-    let mut map = RiskMap::constant(geometry, 1, Risk::NONE);
-    map.fill(|_, grounds| {
-        for (index, ground) in grounds.iter_mut().enumerate() {
-            let [x_m, y_m] = geometry.centre_m(geometry.cell(index));
-            let gradient = world.gradient(x_m, y_m).map(|value| value as f32);
-            *ground = Ground { gradient, class: world.patch(x_m, y_m).class as u8, ..Ground::default() };
-        }
-    });
-    map
 }

@@ -3,9 +3,10 @@
 use bicycle::{Command, Model, Vehicle};
 use mppi::{Config, ConfigError, Controller, Input, Isa, Objective, ReferencePath};
 use scenarios::{Landscape, Motion};
-use traversability::{GridGeometry, Ground, Risk, RiskMap};
+use traversability::RiskMap;
 
 use super::track::{CONTROL_HZ, Follower, Foot};
+use crate::closed_loop::slopes;
 
 /// Decides at every so many cycles of the tracking: ten times a second.
 const EVERY: u64 = 2;
@@ -28,7 +29,7 @@ impl MppiFollower {
     pub fn new(landscape: &Landscape, vehicle: &Vehicle, seed: u64) -> Result<Self, ConfigError> {
         let config = Config { n_threads: 1, isa: Isa::Auto, ..Config::default() };
         let controller = Controller::new(config, Model::of(vehicle), seed)?;
-        Ok(Self { controller, map: map_of(landscape), cycle: 0, command: Command::default() })
+        Ok(Self { controller, map: slopes(&landscape.world), cycle: 0, command: Command::default() })
     }
 }
 
@@ -69,20 +70,4 @@ fn state(motion: &Motion) -> bicycle::State {
         speed_mps: motion.velocity_mps[0],
         steering_rad: motion.steering_rad,
     }
-}
-
-/// Slopes under every cell; what forbids ground is the line's affair.
-fn map_of(landscape: &Landscape) -> RiskMap {
-    let world = &landscape.world;
-    let GridGeometry { resolution_m, origin, n_rows, n_cols } = *world.geometry();
-    let geometry = GridGeometry { resolution_m, origin, n_rows, n_cols };
-    let mut map = RiskMap::constant(geometry, 1, Risk::NONE);
-    map.fill(|_, grounds| {
-        for (index, ground) in grounds.iter_mut().enumerate() {
-            let [x_m, y_m] = geometry.centre_m(geometry.cell(index));
-            let gradient = world.gradient(x_m, y_m).map(|value| value as f32);
-            *ground = Ground { gradient, ..Ground::default() };
-        }
-    });
-    map
 }

@@ -1,7 +1,6 @@
 //! Courses of turns over ground of which some is slippery.
 
 use std::f64::consts::TAU;
-use std::sync::Arc;
 
 use rand::RngExt;
 use scenarios::{Patch, Stribeck, World, WorldError, seed_of, stream};
@@ -135,11 +134,6 @@ impl Course {
         };
         World::from_fn("slippery", geometry, height_m, patch)
     }
-
-    /// The same, to be shared.
-    pub(super) fn shared_world(&self) -> Result<Arc<World>, WorldError> {
-        self.world().map(Arc::new)
-    }
 }
 
 fn distance_to_leg_m(place_m: [f64; 2], from_m: [f64; 2], to_m: [f64; 2]) -> f64 {
@@ -188,8 +182,8 @@ mod tests {
         let [x_m, y_m] = slick.centre_m;
         let friction = world.patch(x_m, y_m).friction;
         assert!(friction.dynamic_friction < 0.5, "{friction:?}");
-        let [x_m, y_m] = [slick.centre_m[0] + slick.radius_m + 0.5, y_m];
-        let elsewhere = course.slicks.iter().all(|slick| !slick.holds(x_m, y_m));
-        assert!(!elsewhere || world.patch(x_m, y_m).friction == FIRM);
+        let lies_between = |[x_m, y_m]: &[f64; 2]| course.slicks.iter().all(|slick| !slick.holds(*x_m, *y_m));
+        let [x_m, y_m] = [[12.1, 12.1], [12.1, 138.1], [138.1, 12.1]].into_iter().find(lies_between).unwrap();
+        assert_eq!(world.patch(x_m, y_m).friction, FIRM);
     }
 }

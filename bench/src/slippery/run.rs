@@ -115,7 +115,7 @@ impl Job {
     fn begin(&self, settings: &Settings) -> Result<ClosedLoop, BrokenDrive> {
         let Settings { vehicle, config, episode, seed } = settings;
         let course = Course::draw(*seed, self.course);
-        let world = course.shared_world()?;
+        let world = Arc::new(course.world()?);
         let first_m = course.goals_m.first().copied().unwrap_or_default();
         let route = Route::goals(course.goals_m.clone(), TOLERANCE_M)
             .map_err(|error| DriveError::from(NavigatorError::from(error)))?;
