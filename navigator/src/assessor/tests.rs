@@ -1,9 +1,12 @@
-//! Where stuck poses lie when the localisation jumps around them.
+//! Where stuck poses lie when the localisation jumps around them, and what is told of friction.
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
 use super::*;
 use crate::StuckPose;
 use bicycle::Odometry;
+use terrain::{GridGeometry, TerrainClass};
+
+use crate::FrictionConfig;
 
 const JUMP: Jump = Jump { step_m: [10.0, 0.0, 0.0], yaw_rad: 0.0 };
 const JUMPED_AT_NS: u64 = 500;
@@ -68,4 +71,39 @@ fn a_surveyor_that_began_anew_counts_its_jumps_from_nothing() {
     assessor.hear_stuck(&stuck(200));
     assessor.hear_surface(&surface(9, 300, Jump::NONE));
     assert_eq!(places_m(&assessor), [1.0]);
+}
+
+/// Hundredths of friction that the cells of a map of open ground are said to hold.
+fn told(assessor: &mut Assessor) -> Vec<u8> {
+    let geometry = GridGeometry::centred(assessor.layer.resolution_m(), 60, 60, 0.0, 0.0);
+    let ground = GridMap::filled(geometry, SurfaceCell::certain(0.0, TerrainClass::Open, 0.0));
+    assessor.judge(&surface(1, 100, Jump::NONE), &ground).unwrap();
+    let known = assessor.known().unwrap();
+    // Just west of the origin, and just east of it.
+    let middle = known.geometry.cell_at(0.0, 0.0).map(|cell| known.geometry.index(cell)).unwrap();
+    [middle - 1, middle].map(|index| known.ground[index].friction.hundredths()).to_vec()
+}
+
+#[test]
+fn what_is_known_of_friction_is_told_cell_by_cell_and_outlives_another_judge() {
+    let vehicle = formats::read_vehicle("rc_car").unwrap();
+    let level = CvarLevel::new(0.5).unwrap();
+    let assessor = |belief: &Belief, open: Option<f64>| {
+        let mut config = Config::for_vehicle(&vehicle);
+        if open.is_some() {
+            config.keep_to_friction(FrictionConfig { open, ..FrictionConfig::default() });
+        }
+        Assessor::new(&vehicle, &vehicle.limits, &config, belief, level).unwrap()
+    };
+    for belief in [Belief::Nominal, Belief::Physics] {
+        assert_eq!(told(&mut assessor(&belief, None)), [0, 0], "nobody knows");
+        let mut knowing = assessor(&belief, Some(0.7));
+        assert_eq!(told(&mut knowing), [70, 70]);
+        // Known by place from the origin eastwards.
+        let east = GridGeometry { resolution_m: 10.0, origin: [0, -1], n_rows: 2, n_cols: 1 };
+        knowing.know_friction(Arc::new(GridMap::filled(east, 0.12)));
+        assert_eq!(told(&mut knowing), [70, 12]);
+        knowing.judge_like(assessor(&belief, Some(0.5))).unwrap();
+        assert_eq!(told(&mut knowing), [50, 12]);
+    }
 }
