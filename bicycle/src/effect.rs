@@ -23,6 +23,8 @@ mod sensors;
 mod speed_integral;
 mod speed_loop;
 mod steer_linkage;
+mod steer_servo;
+mod steer_swing;
 mod wind;
 mod yaw_gain;
 
@@ -147,6 +149,11 @@ macro_rules! catalogue {
             }
 
             #[inline(always)]
+            fn once_driven<L: Lanes>(self, constants: &Constants, state: &mut Driving<L>) {
+                match self { $(Self::$name => $name::once_driven(constants, state),)* }
+            }
+
+            #[inline(always)]
             fn on_motion<L: Lanes>(self, constants: &Constants, state: &mut Moving<L>) {
                 match self { $(Self::$name => $name::on_motion(constants, state),)* }
             }
@@ -164,6 +171,8 @@ catalogue! {
     actuator::Backlash,
     actuator::SteerRate,
     actuator::SteerLag,
+    steer_servo::SteerServo,
+    steer_swing::SteerSwing,
     actuator::SpeedLag,
     actuator::AccelLimit,
     speed_loop::SpeedLoop,
@@ -188,6 +197,7 @@ catalogue! {
     yaw_gain::Understeer,
     yaw_gain::SteerYield,
     rear_slip::RearSlip,
+    rear_slip::RearSteer,
     friction::Friction,
     sensors::PoseLatency,
     sensors::OdomScale,

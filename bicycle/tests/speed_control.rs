@@ -107,6 +107,22 @@ fn an_integral_takes_a_drag_back() {
     assert!((held[0] - 0.5).abs() < 1e-3, "{held:?}");
 }
 
+/// Asked for 20 m/s with a drive that gives 1 m/s2, the loop wants more than that throughout: the speed after 3 s is that of
+/// the limit, and nothing is built up. Wound up, the integral would hold 1.5 times the mean distance of 18.5 m/s times 3 s.
+#[test]
+fn an_integral_waits_while_the_drive_gives_less_than_it_asks_for() {
+    let limited = stepper(&[("speed_loop", 0.4), ("speed_integral", 1.5), ("drive_limit", 1.0)]);
+    let command = Command { speed_mps: 20.0, steering_rad: 0.0 };
+    let mut memory = vec![0.0; limited.n_slots()];
+    let mut state = State::default();
+    let mut reached = |n: usize, memory: &mut [f64]| {
+        (0..n).for_each(|t| state = limited.step_state(&state, command, &GroundSample::FIRM, memory, t));
+        state.speed_mps
+    };
+    assert!((reached(150, &mut memory) - 3.0).abs() < 1e-9);
+    assert_eq!(limited.held(&mut memory)[0], 0.0);
+}
+
 /// Behind a ramp of A a loop of time constant T lags by A T; the whole of the command's acceleration fed forward leaves
 /// nothing of that, half of it the half.
 #[test]
@@ -119,7 +135,7 @@ fn feed_forward_takes_the_lag_behind_a_ramp() {
     }
 }
 
-/// A speed that stays where it is although 1 m/s2 is held: what is held falls by the share dt / (0.5 s) every step.
+/// A speed that stays where it is although 1 m/s2 is held: what is held falls by the share dt / (1.5 s) every step.
 #[test]
 fn what_is_held_follows_what_was_measured() {
     let controlled = stepper(&[("speed_loop", 0.4), ("speed_integral", 1.5)]);
@@ -130,7 +146,7 @@ fn what_is_held_follows_what_was_measured() {
     for step in 1..=50 {
         let foretold = controlled.step_state(&state, command, &GroundSample::FIRM, &mut memory, step);
         controlled.correct_held(&mut memory, SPEED_MPS - foretold.speed_mps);
-        let expected_mps2 = (1.0 - STEP_S / 0.5).powi(step as i32);
+        let expected_mps2 = (1.0 - STEP_S / 1.5).powi(step as i32);
         assert!((controlled.held(&mut memory)[0] - expected_mps2).abs() < 1e-9);
     }
 }

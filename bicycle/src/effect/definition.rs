@@ -88,6 +88,8 @@ pub struct Driving<L: Lanes> {
     pub ground: GroundSample<Real<L>>,
     /// What an effect that holds an acceleration holds; it changes it [m/s2].
     pub held: Real<L>,
+    /// What was wanted of the drive beyond what its limits let it give [m/s2].
+    pub withheld: Real<L>,
 }
 
 impl<L: Lanes> Driving<L> {
@@ -103,6 +105,13 @@ impl<L: Lanes> Driving<L> {
     pub fn drive_by(&mut self, more: Real<L>) {
         let limit = self.acceleration_limit;
         self.acceleration = (self.acceleration + more).clamp(-limit, limit);
+    }
+
+    /// Lets the drive give so much of what is wanted of it [m/s2].
+    #[inline(always)]
+    pub fn give(&mut self, given: Real<L>) {
+        self.withheld = self.withheld + (self.acceleration - given);
+        self.acceleration = given;
     }
 
     /// Takes so much from the acceleration [m/s2].
@@ -209,6 +218,9 @@ pub(crate) trait Definition: Values {
     fn on_command<L: Lanes>(_constants: &Constants, _state: &mut Commanding<'_, L>) {}
     #[inline(always)]
     fn on_drive<L: Lanes>(_constants: &Constants, _state: &mut Driving<L>) {}
+    /// For an effect that holds an acceleration, once all effects on the drive have acted.
+    #[inline(always)]
+    fn once_driven<L: Lanes>(_constants: &Constants, _state: &mut Driving<L>) {}
     #[inline(always)]
     fn on_motion<L: Lanes>(_constants: &Constants, _state: &mut Moving<L>) {}
     /// Adds what it does to the sensors.

@@ -16,7 +16,7 @@ effects! {
         acceleration_mps2 in "m/s2": 0.05 to 50.0, neutral 50.0, tried [1.0, 1.5, 2.0, 2.7, 3.5, 4.5, 6.0];
         /// Largest deceleration B [m/s2].
         deceleration_mps2 in "m/s2": 0.05 to 50.0, neutral 50.0, tried [1.0, 1.5, 2.0, 2.7, 3.5, 4.5, 6.0];
-    } |most, least; state| state.acceleration = state.acceleration.clamp(-least, most);
+    } |most, least; state| state.give(state.acceleration.clamp(-least, most));
 
     /// A drive whose force falls as the speed grows.
     DrivePower "drive_power": "drive power: acceleration of the drive <= P / max(|v|, 0.3 m/s)"
@@ -26,7 +26,7 @@ effects! {
         power_m2_per_s3 in "m2/s3": 0.05 to 1e4, neutral 1e4, tried [0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0];
     } |power; state| {
         let slowest = state.speed.0.real(SLOWEST_MPS);
-        state.acceleration = state.acceleration.min(power / state.speed.abs().max(slowest));
+        state.give(state.acceleration.min(power / state.speed.abs().max(slowest)));
     };
 
     /// A drive and brakes weaker than the simulator's.
@@ -35,5 +35,5 @@ effects! {
     {
         /// Largest force over mass A [m/s2].
         acceleration_mps2 in "m/s2": 0.05 to 1e6, neutral 1e6, tried [0.5, 1.0, 1.8, 3.0];
-    } |limit; state| state.acceleration = state.acceleration.clamp(-limit, limit);
+    } |limit; state| state.give(state.acceleration.clamp(-limit, limit));
 }

@@ -158,6 +158,13 @@ impl PreparedEffects {
                 }
             }
         }
+        for prepared in &self.on_drive {
+            if let Some(slot) = prepared.held {
+                driving.held.1 = memory[slot];
+                prepared.kind.once_driven(&prepared.constants, driving);
+                memory[slot] = driving.held.1;
+            }
+        }
     }
 
     #[inline(always)]

@@ -12,12 +12,11 @@ parameters! {
 }
 
 /// Time in which what the integral holds follows a force that the model does not know [s].
-const OBSERVER_S: f64 = 0.5;
+const OBSERVER_S: f64 = 1.5;
 
 impl Definition for SpeedIntegral {
     const ID: &'static str = "speed_integral";
-    const MEANING: &'static str =
-        "integral of the speed: dv/dt = ... + I with dI/dt = J (command - v), so that no offset is left";
+    const MEANING: &'static str = "integral of the speed: dv/dt = ... + I with dI/dt = J (command - v), so that no offset is left; it waits while a limit of the drive withholds what it asks for";
     const ROLE: Role = Role::Calibration;
     const STAGES: &'static [Stage] = &[Stage::Drive];
 
@@ -30,9 +29,17 @@ impl Definition for SpeedIntegral {
     }
 
     #[inline(always)]
-    fn on_drive<L: Lanes>(constants: &Constants, state: &mut Driving<L>) {
+    fn on_drive<L: Lanes>(_constants: &Constants, state: &mut Driving<L>) {
         state.drive_by(state.held);
-        let gain = Real::constant(state.speed.0, constants[0]);
-        state.held = (state.asked_speed - state.speed).mul_add(gain, state.held);
+    }
+
+    /// Windup is what no controller is built with: beyond a limit of the drive nothing more is built up.
+    #[inline(always)]
+    fn once_driven<L: Lanes>(constants: &Constants, state: &mut Driving<L>) {
+        let lanes = state.speed.0;
+        let distance = state.asked_speed - state.speed;
+        let built_up = distance * Real::constant(lanes, constants[0]);
+        let is_in_vain = (distance * state.withheld).exceeds(lanes.real(0.0));
+        state.held = state.held + Real(lanes, lanes.select(is_in_vain, lanes.real(0.0).1, built_up.1));
     }
 }

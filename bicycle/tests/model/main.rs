@@ -3,6 +3,7 @@
 
 mod closed_forms;
 mod packs;
+mod steering;
 mod validity;
 
 use bicycle::effect::{CATALOGUE, Effect};

@@ -8,7 +8,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 
 /// Sets of effects that leave one another something to do; together they hold every effect that moves a vehicle.
 fn sets_of_effects() -> [Vec<Effect>; 2] {
-    let first: [(&str, &[f64]); 23] = [
+    let first: [(&str, &[f64]); 26] = [
         ("steer_delay", &[0.17]),
         ("speed_delay", &[0.25]),
         ("motor_deadband", &[0.8]),
@@ -17,6 +17,8 @@ fn sets_of_effects() -> [Vec<Effect>; 2] {
         ("steer_bias", &[0.02]),
         ("backlash", &[0.02]),
         ("steer_lag", &[0.15]),
+        ("steer_servo", &[0.12, 0.6]),
+        ("steer_swing", &[0.1]),
         ("speed_lag", &[0.3]),
         ("speed_loop", &[0.4]),
         ("feed_forward", &[0.4]),
@@ -32,6 +34,7 @@ fn sets_of_effects() -> [Vec<Effect>; 2] {
         ("steer_linkage", &[1.1]),
         ("understeer", &[0.02]),
         ("rear_slip", &[0.01]),
+        ("rear_steer", &[0.2]),
     ];
     let second: [(&str, &[f64]); 11] = [
         ("steer_rate", &[0.8]),
