@@ -7,25 +7,27 @@ use bicycle::Effect;
 use bicycle::effect::Parameter;
 
 /// What every machine has a little of, in order of action, with the values that the fit starts from.
-const ORDINARY: [(&str, [f64; 4]); 25] = [
+const ORDINARY: [(&str, [f64; 4]); 29] = [
     ("steer_delay", [0.02, 0.0, 0.0, 0.0]),
     ("speed_delay", [0.02, 0.0, 0.0, 0.0]),
     ("speed_scale", [1.0, 0.0, 0.0, 0.0]),
     ("steer_gain", [1.0, 0.0, 0.0, 0.0]),
     ("steer_bias", [0.0; 4]),
+    ("backlash", [0.004, 0.0, 0.0, 0.0]),
     ("steer_rate", [3.0, 0.0, 0.0, 0.0]),
-    ("steer_lag", [0.06, 0.0, 0.0, 0.0]),
-    ("steer_lag", [0.03, 0.0, 0.0, 0.0]),
-    ("accel_limit", [3.0, 0.0, 0.0, 0.0]),
-    ("speed_lag", [0.15, 0.0, 0.0, 0.0]),
+    ("steer_servo", [0.1, 1.0, 0.0, 0.0]),
+    (SWING, [0.0; 4]),
+    ("accel_limit", [15.0, 0.0, 0.0, 0.0]),
+    ("speed_lag", [0.03, 0.0, 0.0, 0.0]),
     ("speed_loop", [0.3, 0.0, 0.0, 0.0]),
-    ("feed_forward", [0.6, 0.0, 0.0, 0.0]),
-    ("speed_integral", [3.0, 0.0, 0.0, 0.0]),
+    ("feed_forward", [0.1, 0.0, 0.0, 0.0]),
+    ("speed_integral", [0.3, 0.0, 0.0, 0.0]),
     ("hill_compensation", [0.0; 4]),
     ("drive_limit", [8.0, 8.0, 0.0, 0.0]),
     ("drive_power", [1e4, 0.0, 0.0, 0.0]),
-    ("drive_lag", [0.05, 0.0, 0.0, 0.0]),
+    ("drive_lag", [0.03, 0.0, 0.0, 0.0]),
     ("rolling_drag", [0.0; 4]),
+    ("quad_drag", [0.0; 4]),
     ("veg_drag", [0.0; 4]),
     ("loose_drag", [0.0; 4]),
     ("cornering_drag", [0.0; 4]),
@@ -33,45 +35,55 @@ const ORDINARY: [(&str, [f64; 4]); 25] = [
     ("cross_slope", [0.0; 4]),
     ("understeer", [0.0; 4]),
     ("rear_slip", [0.0; 4]),
+    ("rear_steer", [0.0; 4]),
+    ("pose_latency", [0.01, 0.0, 0.0, 0.0]),
 ];
-/// Kinds of speed controllers, simple ones first, by what they have beside a proportional loop: none leads to the next by
-/// a slope that a fit could follow.
-const CONTROLLERS: [&[&str]; 3] = [
+/// Kinds of speed controllers, simple ones first, by what they have beside a proportional loop. Each is grown from the best
+/// fit of those that it contains: from elsewhere the fit ends in a worse place than theirs.
+const CONTROLLERS: [&[&str]; 5] = [
     &[],
+    &["drive_lag"],
+    &["speed_integral", "drive_lag"],
     &["accel_limit", "speed_lag", "feed_forward", "drive_lag"],
     &["accel_limit", "speed_lag", "feed_forward", "speed_integral", "drive_lag"],
 ];
-/// A controller is taken for a less simple one when that foretells the drives better by this, in the logarithm of the loss.
-const WORTH_A_CONTROLLER: f64 = 0.16;
+/// A controller is taken for a less simple one when that foretells the drives better by this for each of its parts, in the
+/// logarithm of the loss.
+const WORTH_A_CONTROLLER: f64 = 0.02;
 /// The same where no gravity acts: nothing then tells how the controller answers a force, and a less simple one that is
 /// not there would answer it wrongly.
-const WORTH_A_CONTROLLER_ON_A_PLANE: f64 = 0.5;
+const WORTH_A_CONTROLLER_ON_A_PLANE: f64 = 0.06;
 /// Pull towards no effect, so that what the drives leave open stays small.
 const PULL: f64 = 1.5;
 /// Shares of gravity, along and across.
 const GRAVITY: [&str; 2] = ["slope_gravity", "cross_slope"];
 /// What a controller does against the first of them.
 const COMPENSATION: &str = "hill_compensation";
+/// What makes the turning lead the steering.
+const SWING: &str = "steer_swing";
 /// Below this share of gravity along the slope the simulator is one of a plane.
 const PLANE: f64 = 0.25;
 
 /// Fits the ordinary effects to drives, and the yardstick to what is left.
 pub(crate) fn calibrated(wheelbase_m: f64, drives: &[&Drive]) -> (Vec<Effect>, Yardstick) {
-    let mut effects = Vec::new();
-    let mut yardstick = Yardstick::rough();
-    for round in 0..3 {
+    let rough = Yardstick::rough();
+    let comparison = Comparison::new(wheelbase_m, drives.to_vec(), &rough);
+    let simplest = fitted(&comparison, ordinary(CONTROLLERS[0]), &[COMPENSATION]);
+    let mut yardstick = Yardstick::of(&comparison.residuals(&simplest), &rough);
+    let mut effects = with_controller(&Comparison::new(wheelbase_m, drives.to_vec(), &yardstick), simplest);
+    for _ in 0..2 {
         let comparison = Comparison::new(wheelbase_m, drives.to_vec(), &yardstick);
-        let fitted = |start, held| refined(&comparison, &with_limits_tried(&comparison, start), held);
-        effects = if round == 0 {
-            with_controller(&comparison, CONTROLLERS.map(|own| fitted(ordinary(own), &[COMPENSATION][..])))
-        } else {
-            let whole = with_whole_gravity(effects);
-            let held = held_of(&whole);
-            fitted(whole, &held)
-        };
+        let whole = with_whole_gravity(effects);
+        let held = held_of(&whole);
+        effects = fitted(&comparison, whole, &held);
         yardstick = Yardstick::of(&comparison.residuals(&effects), &yardstick);
     }
     (effects, yardstick)
+}
+
+/// The best fit from a start, limits tried first.
+fn fitted(comparison: &Comparison<'_>, start: Vec<Effect>, held: &[&str]) -> Vec<Effect> {
+    refined(comparison, &with_limits_tried(comparison, start), held)
 }
 
 /// The same effects fitted to other drives, from where they are.
@@ -84,10 +96,13 @@ pub(crate) fn recalibrated(
     refined(&comparison, effects, &held_of(effects))
 }
 
-/// The ordinary effects with a proportional speed loop, fitted to drives in units of their yardstick.
+/// The ordinary effects with a proportional speed loop, fitted to drives in units of their yardstick, for a controller's
+/// model: without what answers a change of a command by more than that change, which sampled plans would exploit.
 pub(crate) fn proportional(wheelbase_m: f64, drives: &[&Drive], yardstick: &Yardstick) -> Vec<Effect> {
     let comparison = Comparison::new(wheelbase_m, drives.to_vec(), yardstick);
-    let effects = refined(&comparison, &with_limits_tried(&comparison, ordinary(&[])), &[COMPENSATION]);
+    let mut start = ordinary(CONTROLLERS[0]);
+    start.retain(|effect| effect.description().id != SWING);
+    let effects = fitted(&comparison, start, &[COMPENSATION]);
     let whole = with_whole_gravity(effects);
     refined(&comparison, &whole, &held_of(&whole))
 }
@@ -99,14 +114,45 @@ fn ordinary(controller: &[&str]) -> Vec<Effect> {
     own.filter_map(|&(id, values)| Effect::from_values(id, values)).collect()
 }
 
-/// The simplest of the fits that no less simple one beats by what it is worth.
-fn with_controller<const N: usize>(comparison: &Comparison<'_>, fits: [Vec<Effect>; N]) -> Vec<Effect> {
-    let energy = |(place, effects): &(usize, Vec<Effect>)| {
-        let worth = if is_heavy(effects) { WORTH_A_CONTROLLER } else { WORTH_A_CONTROLLER_ON_A_PLANE };
-        comparison.loss(effects).ln() + worth * *place as f64
+/// A fit with the speed controller that is worth its parts, grown from one with a proportional loop.
+fn with_controller(comparison: &Comparison<'_>, simplest: Vec<Effect>) -> Vec<Effect> {
+    let fit = |parts: &'static [&'static str], effects: Vec<Effect>| ControllerFit {
+        parts,
+        loss: comparison.loss(&effects),
+        effects,
     };
-    let best = fits.into_iter().enumerate().min_by(|a, b| energy(a).total_cmp(&energy(b)));
-    best.map_or_else(Vec::new, |(_, effects)| effects)
+    let mut fits = vec![fit(CONTROLLERS[0], simplest)];
+    for parts in &CONTROLLERS[1..] {
+        let contained = fits.iter().filter(|simpler| simpler.parts.iter().all(|part| parts.contains(part)));
+        let best = contained.min_by(|a, b| a.loss.total_cmp(&b.loss));
+        let start = best.map(|simpler| grown(&simpler.effects, parts));
+        fits.extend(start.map(|start| fit(parts, fitted(comparison, start, &[COMPENSATION]))));
+    }
+    let best = fits.into_iter().min_by(|a, b| a.energy().total_cmp(&b.energy()));
+    best.map_or_else(Vec::new, |best| best.effects)
+}
+
+/// A fit with a speed controller of some kind.
+struct ControllerFit {
+    parts: &'static [&'static str],
+    loss: f64,
+    effects: Vec<Effect>,
+}
+
+impl ControllerFit {
+    fn energy(&self) -> f64 {
+        let worth = if is_heavy(&self.effects) { WORTH_A_CONTROLLER } else { WORTH_A_CONTROLLER_ON_A_PLANE };
+        self.loss.ln() + worth * self.parts.len() as f64
+    }
+}
+
+/// Where a fit with a less simple controller starts: at the simpler fit, with next to nothing of what that lacks.
+fn grown(simpler: &[Effect], parts: &[&str]) -> Vec<Effect> {
+    let mut known = simpler.iter().peekable();
+    let start = |own: Effect| {
+        known.next_if(|known| known.description().id == own.description().id).copied().unwrap_or(own)
+    };
+    ordinary(parts).into_iter().map(start).collect()
 }
 
 /// Limits that nothing reached leave no slope to follow: each is tried at every value of the catalogue.

@@ -125,7 +125,7 @@ impl Evidence {
             "cross_slope" => self.slopes,
             "steer_rate" | "backlash" => is_commanded,
             "friction" => by_angle,
-            "rear_slip" | "yaw_misalign" => self.pose,
+            "rear_slip" | "rear_steer" | "yaw_misalign" => self.pose,
             "pose_latency" => self.pose && (self.measures_speed() || self.yaw_rate),
             "odom_scale" => self.pose && self.measures_speed(),
             "gyro_bias" => self.yaw_rate,
