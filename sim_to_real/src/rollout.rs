@@ -51,10 +51,11 @@ impl Simulator {
     fn rows(&self, drive: &Drive) -> Rows {
         let mut memory = vec![0.0; self.stepper.n_slots()];
         self.stepper.fill_steady_state(drive.commands[0], &mut memory);
-        let mut rows = Rows { asked: Vec::new(), held: vec![Vec::new(); self.stepper.n_held()] };
+        let mut rows = Rows { asked: Default::default(), held: vec![Vec::new(); self.stepper.n_held()] };
         for (row, command) in drive.commands.iter().enumerate() {
             let asked = self.asked(drive, (row, command), &mut memory);
-            rows.asked.push([asked.speed, asked.steering, asked.acceleration].map(|value| value.1 as f32));
+            let asked_of = [asked.speed, asked.steering, asked.acceleration];
+            rows.asked.iter_mut().zip(asked_of).for_each(|(all, value)| all.push(value.1 as f32));
             for (all, held) in rows.held.iter_mut().zip(self.stepper.held(&mut memory)) {
                 all.push(*held as f32);
             }
@@ -88,8 +89,9 @@ impl Simulator {
         let speed_mps = |row: usize| drive.smooth[VX][row] / self.sensors.velocity_ratio;
         let turns = real((drive.smooth[YAW][row] - self.sensors.yaw_offset_rad) / TAU).wrap_turns();
         let mut state = LaneState { x: zero, y: zero, turns, speed: real(speed_mps(row)), steering: zero };
-        let read = |values: &[f32]| real(f64::from(values[row]));
-        let ground = self.ground(Scalar, drive, read);
+        let [east, north, class] =
+            [&drive.gradient[0], &drive.gradient[1], &drive.class].map(|told| real(f64::from(told[row])));
+        let ground = ground(Scalar, [east, north], class);
         self.follow(drive.evidence, &mut state, asked, &ground, memory);
         self.stepper.correct_held(memory, speed_mps(row + 1) - state.speed.1);
     }
@@ -112,29 +114,19 @@ impl Simulator {
             self.stepper.follow(state, asked, ground, memory)
         }
     }
+}
 
-    #[inline(always)]
-    fn ground<L: Lanes>(
-        &self,
-        lanes: L,
-        drive: &Drive,
-        read: impl Fn(&[f32]) -> Real<L>,
-    ) -> GroundSample<Real<L>> {
-        let (firm, zero) = (lanes.real(1.0), lanes.real(0.0));
-        let level =
-            GroundSample { linear_traction: firm, angular_traction: firm, gradient: [zero; 2], class: zero };
-        if !self.stepper.uses_ground() {
-            return level;
-        }
-        let [east, north] = &drive.gradient;
-        GroundSample { gradient: [read(east), read(north)], class: read(&drive.class), ..level }
-    }
+/// Firm ground of a slope and a class.
+#[inline(always)]
+fn ground<L: Lanes>(lanes: L, gradient: [Real<L>; 2], class: Real<L>) -> GroundSample<Real<L>> {
+    let firm = lanes.real(1.0);
+    GroundSample { linear_traction: firm, angular_traction: firm, gradient, class }
 }
 
 /// What the commands ask of the actuators at every row of a drive, and what the effects then hold.
 struct Rows {
-    /// Speed and steering angle, or what stands for them, and acceleration.
-    asked: Vec<[f32; 3]>,
+    /// Speed and steering angle, or what stands for them, and acceleration, row by row.
+    asked: [Vec<f32>; 3],
     /// Row by row for each that is held [m/s2].
     held: Vec<Vec<f32>>,
 }
@@ -156,12 +148,29 @@ trait Pack: Lanes {
     fn unpack(value: Self::Value) -> [f32; WIDEST];
 }
 
+#[inline(always)]
 fn first_eight(values: &[f32; WIDEST]) -> [f32; 8] {
-    std::array::from_fn(|lane| values[lane])
+    let mut eight = [0.0; 8];
+    eight.copy_from_slice(&values[..8]);
+    eight
 }
 
+#[inline(always)]
 fn widened(values: [f32; 8]) -> [f32; WIDEST] {
-    std::array::from_fn(|lane| values[lane % 8])
+    let mut wide = [0.0; WIDEST];
+    wide[..8].copy_from_slice(&values);
+    wide
+}
+
+/// What is told `step` rows after each lane's own: in a loop, which is compiled in place, as `array::map` is not always.
+#[inline(always)]
+fn packed<L: Pack>(lanes: L, (rows, step): (&[usize; WIDEST], usize), told: &[f32]) -> Real<L> {
+    let told = &told[step..];
+    let mut values = [0.0; WIDEST];
+    for (value, row) in values.iter_mut().zip(rows).take(L::WIDTH) {
+        *value = told[*row];
+    }
+    Real(lanes, L::pack(&values))
 }
 
 impl Pack for Portable {
@@ -255,22 +264,30 @@ impl RollOut<'_> {
         let simulator = self.simulator;
         let mut memory = vec![zero.1; simulator.stepper.n_slots()];
         for (held, given) in simulator.stepper.held(&mut memory).iter_mut().zip(&self.given.held) {
-            *held = L::pack(&rows.map(|row| given[row]));
+            *held = packed(lanes, (&rows, 0), given).1;
         }
         let mut turned = zero;
         let mut way: Way = [[[0.0; WIDEST]; 3]; N_STEPS + 1];
         let mut next_horizon = 0;
         for step in 0..N_STEPS {
-            let now = rows.map(|row| row + step);
-            let [speed, steering, acceleration] =
-                [0, 1, 2].map(|channel| real(now.map(|row| self.given.asked[row][channel])));
-            let asked = Asked { speed, steering, acceleration };
-            let ground = simulator.ground(lanes, self.drive, |values| real(now.map(|row| values[row])));
+            let [speed, steering, acceleration] = &self.given.asked;
+            let asked = Asked {
+                speed: packed(lanes, (&rows, step), speed),
+                steering: packed(lanes, (&rows, step), steering),
+                acceleration: packed(lanes, (&rows, step), acceleration),
+            };
+            let ground = if simulator.stepper.uses_ground() {
+                let [east, north] = &self.drive.gradient;
+                let gradient = [packed(lanes, (&rows, step), east), packed(lanes, (&rows, step), north)];
+                ground(lanes, gradient, packed(lanes, (&rows, step), &self.drive.class))
+            } else {
+                ground(lanes, [zero; 2], zero)
+            };
             let rates = simulator.follow(self.drive.evidence, &mut state, asked, &ground, &mut memory);
             turned = rates.yaw_rate.mul_add(lanes.real(STEP_S), turned);
-            way[step + 1] = [state.x, state.y, turned].map(|value| L::unpack(value.1));
+            way[step + 1] = [L::unpack(state.x.1), L::unpack(state.y.1), L::unpack(turned.1)];
             if step + 1 == HORIZONS[next_horizon] {
-                let rates = [rates.speed, rates.yaw_rate].map(|value| L::unpack(value.1));
+                let rates = [L::unpack(rates.speed.1), L::unpack(rates.yaw_rate.1)];
                 self.sense(&way, next_horizon, (&origin, rates), outcomes);
                 next_horizon += 1;
             }
@@ -288,7 +305,7 @@ impl RollOut<'_> {
         let (sine, cosine) = (seen_yaw_rad + 0.5 * turn_rad).sin_cos();
         let turns = (seen_yaw_rad + turn_rad) / TAU;
         let speed_mps = match self.drive.evidence.speed_source {
-            SpeedSource::Command => self.given.asked[row][0],
+            SpeedSource::Command => self.given.asked[0][row],
             _ => (self.drive.smooth[VX][row] / sensors.velocity_ratio) as f32,
         };
         Origin {
