@@ -4,8 +4,8 @@
 //! The planner of AnyNav (Fu et al. 2025, section 4). A map of [`GroundCell`]s, each a height, a [`FrictionCurve`], a
 //! roughness and whether an obstacle stands there, makes a [`Planner`]. [`Planner::route`] searches the cheapest way by
 //! A* over cells, eight headings and the last motion (costs of equations 37 to 42), lays the least bent B-spline near it,
-//! and solves for the fastest speeds that friction, traction, brakes and roughness allow (equations 43 to 51, as a
-//! second-order cone programme); [`Planner::alternatives`] finds other ways. A [`RouteError`] says what blocks the way, and where.
+//! and finds the fastest speeds that friction, traction, brakes and roughness allow (equations 43 to 51, in two sweeps);
+//! [`Planner::alternatives`] finds other ways. A [`RouteError`] says what blocks the way, and where.
 //!
 //! Where the paper leaves something open: the costs per step are multiplied with its length, so that a diagonal metre
 //! costs what a straight one does; slopes count whether up or down; ground too slippery for its slope, steeper than the

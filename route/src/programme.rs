@@ -1,9 +1,10 @@
 //! Convex programmes as Clarabel takes them: minimise x'Px / 2 + q'x where A x + s = b and s lies in cones.
 
 use clarabel::algebra::CscMatrix;
+#[cfg(test)]
+use clarabel::solver::SecondOrderConeT;
 use clarabel::solver::{
-    DefaultSettings, DefaultSolver, IPSolver as _, NonnegativeConeT, SecondOrderConeT, SolverStatus,
-    SupportedConeT,
+    DefaultSettings, DefaultSolver, IPSolver as _, NonnegativeConeT, SolverStatus, SupportedConeT,
 };
 
 /// A row of `b - A x`: an affine function of the variables.
@@ -78,6 +79,7 @@ impl Programme {
         self.cones.push(NonnegativeConeT(rows.len()));
     }
 
+    #[cfg(test)]
     /// Asks that the first row be no less than the length of the vector of the others.
     pub fn no_shorter(&mut self, rows: &[Affine]) {
         self.push(rows);
