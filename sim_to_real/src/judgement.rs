@@ -21,9 +21,9 @@ const ACTUATORS: [&[&str]; 2] = [
 pub(crate) const TEMPERATURE: f64 = 0.035;
 /// An effect is announced only when it takes this share off the loss, or off the null's where that is larger, beyond what it
 /// takes off between nominal drives.
-pub(crate) const BEYOND_DOUBT: f64 = 0.085;
+const BEYOND_DOUBT: f64 = 0.13;
 /// Explanations this much less probable than the best are told apart from it.
-const TOLD_APART: f64 = 0.05;
+const TOLD_APART: f64 = 0.25;
 /// Where the data tell nothing apart, this many names are enough to say so.
 const MOST_NAMES: usize = 6;
 /// What is left is unknown when its loss exceeds this many losses of the null and
