@@ -32,8 +32,9 @@ pub(crate) const UNKNOWN_IN_NULLS: f64 = 1.7;
 pub(crate) const UNKNOWN_SHARE: f64 = 0.45;
 /// An unknown rest beside less than this part of the squared gap makes a name worthless.
 pub(crate) const WORTH_A_NAME: f64 = 0.45;
-/// The loss that a drive may have at best, in losses of the null.
-pub(crate) const LEAST_LOSS: f64 = 0.65;
+/// A second effect is sought where the best single leaves more than its price above so many losses of the null: what nominal
+/// drives leave, easier drives undercut without one.
+const PAIRS_ABOVE_NULLS: f64 = 0.9;
 
 /// All explanations that were tried, singles and pairs best first.
 pub(crate) struct Weighed {
@@ -76,9 +77,9 @@ fn chance_gain(explanation: &Explanation, null: &Null) -> f64 {
 }
 
 impl Weighed {
-    /// Whether what the best single leaves is more than a pair's price above what could be left at best.
+    /// Whether the best single leaves enough for a second effect.
     pub(crate) fn may_hold_pairs(&self, null: &Null) -> bool {
-        let least = LEAST_LOSS * null.loss;
+        let least = PAIRS_ABOVE_NULLS * null.loss;
         self.singles.first().is_some_and(|single| (single.loss / least).ln() > PRICE_OF_TWO)
     }
 
