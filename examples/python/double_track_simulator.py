@@ -2,24 +2,18 @@
 
     surefoot gap diagnose CASE --simulator "python3 examples/python/double_track_simulator.py"
 
-It speaks JSON lines on standard input and output (docs/simulator_protocol.md). To put a simulator of your own in its
-place, keep `serve` and replace `Car`. What is to be said to a person goes to standard error.
+It speaks JSON lines on standard input and output (docs/simulator_protocol.md), by `serve` of the file beside it. To put
+a simulator of your own in its place, replace `Car`. What is to be said to a person goes to standard error.
 
 The car: a rigid body on a plane that may slope, four tyres whose side force saturates (F = mu Fz sin(C atan(B alpha)))
 and shares the grip with the drive, loads that move with acceleration, rear-wheel drive through a slow motor under a
 proportional speed controller, a servo of first order with a rate limit. Body frame forward-left-up.
 """
 
-import json
 import math
-import sys
-from typing import Any
 
-Message = dict[str, Any]
-# x, y [m], yaw [rad], speed [m/s], yaw rate [rad/s].
-Row = tuple[float, float, float, float, float]
+from simulator_protocol import Message, Row, serve
 
-PROTOCOL = 1
 GRAVITY_MPS2 = 9.81
 LONGEST_STEP_S = 0.01
 AIR_DENSITY_KGPM3 = 1.2
@@ -158,27 +152,5 @@ def driven(vehicle: Message, run: Message) -> list[Row]:
     return rows
 
 
-def motion(vehicle: Message, run: Message) -> Message:
-    """The answer to a run."""
-    x_m, y_m, yaw_rad, speed_mps, yaw_rate_radps = (list(column) for column in zip(*driven(vehicle, run)))
-    return {"type": "motion", "id": run["id"], "x_m": x_m, "y_m": y_m, "yaw_rad": yaw_rad, "speed_mps": speed_mps,
-            "yaw_rate_radps": yaw_rate_radps}
-
-
-def serve() -> None:
-    """Answers line by line until nobody asks any more."""
-    vehicle: Message = {}
-    for line in sys.stdin:
-        message = json.loads(line)
-        if message["type"] == "hello":
-            vehicle = message["vehicle"]
-            answer = {"type": "hello", "protocol": PROTOCOL, "name": "double track", "stochastic": False, "knobs": KNOBS}
-        elif message["type"] == "run":
-            answer = motion(vehicle, message)
-        else:
-            answer = {"type": "error", "message": f"expected a hello or a run, found {message['type']}"}
-        print(json.dumps(answer), flush=True)
-
-
 if __name__ == "__main__":
-    serve()
+    serve("double track", KNOBS, driven)
