@@ -1,11 +1,11 @@
-"""A simulator on CommonRoad that `surefoot gap diagnose --simulator` can ask: its single-track drift model of a BMW 320i.
+"""A simulator on CommonRoad that `surefoot gap diagnose --simulator` can ask: its single-track drift model of a BMW.
 
     pip install commonroad-vehicle-models numba numpy
     surefoot gap diagnose CASE --simulator "python3 examples/python/commonroad_simulator.py"
 
 The right-hand side and its Pacejka tyres are the package's own, compiled by numba the first time, which takes a while;
-the compiled code is kept. Around it are a servo, a motor that lags behind a proportional speed controller, a slip control
-and gravity on slopes. The car is as long as the vehicle that is asked for.
+the compiled code is kept. Around it are a servo, a motor that lags behind a proportional speed controller, a slip
+control and gravity on slopes. The car is as long as the vehicle that is asked for.
 """
 
 import math
@@ -16,9 +16,9 @@ from typing import Any
 
 import numba
 import numpy as np
-import vehiclemodels.utils.tire_model as tire_model
 import vehiclemodels.utils.vehicle_dynamics_ks_cog as kinematic
 import vehiclemodels.vehicle_dynamics_std as single_track
+from vehiclemodels.utils import tire_model
 from vehiclemodels.init_std import init_std
 from vehiclemodels.vehicle_parameters import setup_vehicle_parameters
 
@@ -27,7 +27,7 @@ from simulator_protocol import Message, Row, serve
 BMW_320I = 2
 GRAVITY_MPS2 = 9.81
 LONGEST_STEP_S = 0.002
-# A wheel with the drive train that it turns. The package's bare wheel spins up so fast that steps had to be much shorter.
+# A wheel with the drive train that it turns. With the package's bare wheel steps had to be much shorter.
 WHEEL_INERTIA_KGM2 = 8.0
 SERVO_TIME_CONSTANT_S, SERVO_RATE_RADPS = 0.1, 1.0
 SPEED_GAIN_PER_S, DRIVE_MPS2 = 2.0, 4.0
@@ -42,16 +42,15 @@ KNOBS: list[Message] = [
 
 
 def compiled(function: Callable[..., Any]) -> Any:
-    """A function compiled by numba; what was compiled before is read from its cache."""
+    """A function that numba compiles where it is called first; later it is read from the cache."""
     return numba.njit(function, cache=True)
 
 
 def compiled_model() -> Any:
     """The package's right-hand side with everything that it calls, compiled."""
-    for names in (["sign", "formula_longitudinal", "formula_lateral"],
-                  ["formula_longitudinal_comb", "formula_lateral_comb"]):
-        for name in names:
-            setattr(tire_model, name, compiled(getattr(tire_model, name)))
+    formulas = ["longitudinal", "lateral", "longitudinal_comb", "lateral_comb"]
+    for name in ["sign", *(f"formula_{formula}" for formula in formulas)]:
+        setattr(tire_model, name, compiled(getattr(tire_model, name)))
     limits = {name: compiled(vars(single_track)[name]) for name in ["steering_constraints", "acceleration_constraints"]}
     for module in (kinematic, single_track):
         vars(module).update(limits)

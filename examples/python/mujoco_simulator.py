@@ -2,9 +2,9 @@
 
     surefoot gap diagnose CASE --simulator "python3 examples/python/mujoco_simulator.py"
 
-Four wheels roll and slide in MuJoCo's own contacts; motors of the rear wheels follow the speed command through a lag, and
-kingpins of the front wheels the steering command through a servo. The ground is a plane. A run tells slopes along the way
-of the robot, so that it is gravity that leans: the tyres carry and hold what they would on that slope.
+Four wheels roll and slide in MuJoCo's own contacts; motors of the rear wheels follow the speed command through a lag,
+and kingpins of the front wheels the steering command through a servo. The ground is a plane. A run tells slopes along
+the way of the robot, so that it is gravity that leans: the tyres carry and hold what they would on that slope.
 """
 
 import math

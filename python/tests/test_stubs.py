@@ -27,6 +27,7 @@ def test_signatures_are_those_of_the_module(tmp_path):
 
 def test_the_package_and_the_examples_are_typed():
     config = PYTHON / "pyproject.toml"
-    drivers = [PYTHON.parent / "examples/python" / name for name in ("drive_robot.py", "replay_log.py", "double_track_simulator.py")]
+    names = ["drive_robot", "replay_log", "double_track_simulator", "mujoco_simulator", "commonroad_simulator"]
+    drivers = [PYTHON.parent / "examples/python" / f"{name}.py" for name in names]
     succeeds("-m", "mypy", "--strict", "--config-file", config, "-p", "surefoot", cwd="/")
     succeeds("-m", "mypy", "--strict", "--config-file", config, PYTHON / "examples", *drivers, cwd="/")
