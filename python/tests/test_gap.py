@@ -65,7 +65,8 @@ def test_what_was_found_goes_into_a_model(report, tmp_path):
     vehicle = surefoot.Vehicle("rc_car")
     for diagnosis in (report, report.answer, tmp_path / "answer.json"):
         model = gap.apply(diagnosis, vehicle)
-        assert [effect["id"] for effect in model.to_dict()["effects"]] == report.names
+        forms = [effect["form"] or effect["id"] for effect in report.answer["effects"]]
+        assert [effect["id"] for effect in model.to_dict()["effects"]] == forms
     with pytest.raises(TypeError, match="model: expected a Model or a Vehicle"):
         gap.apply(report, "rc_car")
     with pytest.raises(TypeError, match="diagnosis: expected a GapReport"):
