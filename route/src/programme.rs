@@ -79,8 +79,8 @@ impl Programme {
         self.cones.push(NonnegativeConeT(rows.len()));
     }
 
-    #[cfg(test)]
     /// Asks that the first row be no less than the length of the vector of the others.
+    #[cfg(test)]
     pub fn no_shorter(&mut self, rows: &[Affine]) {
         self.push(rows);
         self.cones.push(SecondOrderConeT(rows.len()));
