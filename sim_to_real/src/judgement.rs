@@ -35,6 +35,9 @@ pub(crate) const WORTH_A_NAME: f64 = 0.45;
 /// A second effect is sought where the best single leaves more than its price above so many losses of the null: what nominal
 /// drives leave, easier drives undercut without one.
 const PAIRS_ABOVE_NULLS: f64 = 0.9;
+/// A second effect must take this share of the whole loss off what the best single leaves: the form of the first is true to
+/// some hundredths of what it explains, and another effect mends the rest of it.
+const SHARE_OF_A_SECOND: f64 = 0.02;
 
 /// All explanations that were tried, singles and pairs best first.
 pub(crate) struct Weighed {
@@ -80,11 +83,14 @@ impl Weighed {
     /// Whether the best single leaves enough for a second effect.
     pub(crate) fn may_hold_pairs(&self, null: &Null) -> bool {
         let least = PAIRS_ABOVE_NULLS * null.loss;
-        self.singles.first().is_some_and(|single| (single.loss / least).ln() > PRICE_OF_TWO)
+        self.singles.first().is_some_and(|single| {
+            (single.loss / least).ln() > PRICE_OF_TWO && single.loss > SHARE_OF_A_SECOND * self.none.loss
+        })
     }
 
     pub(crate) fn judge(&self, null: &Null) -> Judgement {
-        let explanations = std::iter::once(&self.none).chain(&self.singles).chain(&self.pairs);
+        let pairs = self.pairs.iter().filter(|pair| self.takes_its_share(pair));
+        let explanations = std::iter::once(&self.none).chain(&self.singles).chain(pairs);
         let mut all: Vec<(f64, &Explanation)> = explanations
             .map(|explanation| (explanation.energy() + price(explanation, null), explanation))
             .collect();
@@ -99,6 +105,11 @@ impl Weighed {
             ranking: ranking(&all),
             credible_set,
         }
+    }
+
+    fn takes_its_share(&self, pair: &Explanation) -> bool {
+        let single = self.singles.iter().map(Explanation::energy).fold(f64::INFINITY, f64::min);
+        single.exp() - pair.energy().exp() > SHARE_OF_A_SECOND * self.none.loss
     }
 
     fn is_beyond_doubt(&self, best: &Explanation, null: &Null) -> bool {

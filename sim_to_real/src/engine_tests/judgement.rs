@@ -96,6 +96,14 @@ fn a_second_effect_has_its_own_price() {
     assert_eq!(credible, ["steer_lag", "speed_scale"], "of a pair, its members");
 }
 
+/// What halves a rest of a hundredth is no second effect: of 73, 0.94 are left, and 0.47 are 0.6 per cent. The same pair
+/// counts where there was less to explain, 0.47 of 20 being 2.4.
+#[test]
+fn a_second_effect_that_mends_the_first_is_none() {
+    let announced_of = |none: f64| judged(none, &[0.94, 8.0, 68.0, 70.0, 72.0], Some(0.47)).announced.len();
+    assert_eq!((announced_of(73.0), announced_of(20.0)), (1, 2));
+}
+
 /// A second effect of the same actuator is dearer: 0.25 in the logarithm is enough for a gain and not for a delay.
 #[test]
 fn a_second_effect_in_the_same_actuator_is_dearer() {
