@@ -4,7 +4,8 @@
 //! Of `bicycle` this crate uses descriptions and the drive log, never the dynamics: the model never grades itself.
 //!
 //! A [`World`] is ground with heights and materials, made by [`rock_field`], [`arena`], [`world_from_layers`],
-//! [`Landscape::new`] or [`World::from_fn`]; a [`Plant`] is a machine on it, a [`Deviation`] what is wrong with that machine; an [`Episode`]
+//! [`Landscape::new`], [`painted_world`] (with its picture from above) or [`World::from_fn`]; a [`Plant`] is a machine
+//! on it, a [`Deviation`] what is wrong with that machine; an [`Episode`]
 //! puts both together with sensors and rules and asks for a decision every cycle; [`Walker`]s are people who cross its
 //! way. `examples/own_world.rs` drives in a
 //! world of one's own.
@@ -16,6 +17,7 @@ mod friction;
 mod landscape;
 mod layers;
 mod motion;
+mod painted;
 mod pair;
 mod plant;
 pub mod published_tyre;
@@ -42,6 +44,7 @@ pub use friction::Stribeck;
 pub use landscape::{GroundKind, Landscape, LandscapeError, LandscapeKind, RouteTask};
 pub use layers::{LayerConfig, LayersError, WorldLayers, world_from_layers};
 pub use motion::Motion;
+pub use painted::{Looks, PAINTED_GROUNDS, PaintedConfig, PaintedWorld, painted_world};
 pub use pair::{End, Pair, PairError, PairWish, check_pair, feasible_pair};
 pub use plant::{Collision, CommandError, Plant, PlantError, WheelState, steady_friction};
 pub use random::{seed_of, stream};
