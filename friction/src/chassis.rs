@@ -3,6 +3,8 @@
 use bicycle::{Differential, Vehicle};
 use nalgebra::{Matrix3, Vector3};
 
+use crate::dual::Dual;
+
 /// Acceleration of gravity [m/s2].
 pub const GRAVITY_MPS2: f64 = 9.81;
 /// A wheel under a large load keeps this share of its friction at least [-].
@@ -92,17 +94,24 @@ impl Chassis {
     /// equations 5 to 8 with the ratio of 7 turned over): acceleration and slope both move weight, to the rear when
     /// the specific force points ahead, to the right when it points left. The rear axle is split as the front one.
     pub fn loads_n(&self, specific_mps2: [f64; 2], across_mps2: f64) -> [f64; 4] {
-        let lever = |force_mps2: f64| self.cog_height_m * force_mps2 / across_mps2;
-        let front = ((self.cog_ahead_m - lever(specific_mps2[0])) / self.wheelbase_m).clamp(0.0, 1.0);
-        let left = (0.5 - lever(specific_mps2[1]) / self.track_m).clamp(0.0, 1.0);
+        self.loads(specific_mps2.map(Dual::<0>::from), across_mps2).map(|load_n| load_n.value)
+    }
+
+    /// The same with derivatives [N].
+    pub fn loads<const N: usize>(&self, specific_mps2: [Dual<N>; 2], across_mps2: f64) -> [Dual<N>; 4] {
+        let one = Dual::from(1.0);
+        let lever = self.cog_height_m / across_mps2;
+        let at_rest = Dual::from(self.cog_ahead_m / self.wheelbase_m);
+        let front = (at_rest - specific_mps2[0] * (lever / self.wheelbase_m)).clamp(0.0, 1.0);
+        let left = (Dual::from(0.5) - specific_mps2[1] * (lever / self.track_m)).clamp(0.0, 1.0);
         let all_n = self.mass_kg * across_mps2;
-        [front * left, front * (1.0 - left), (1.0 - front) * left, (1.0 - front) * (1.0 - left)]
+        [front * left, front * (one - left), (one - front) * left, (one - front) * (one - left)]
             .map(|share| share * all_n)
     }
 
     /// Friction under a load over that under the mean one [-].
-    pub fn load_factor(&self, load_n: f64) -> f64 {
-        let mean_n = 0.25 * self.mass_kg * GRAVITY_MPS2;
-        (1.0 - self.load_sensitivity * (load_n / mean_n - 1.0)).max(LOAD_FACTOR_MIN)
+    pub fn load_factor<const N: usize>(&self, load_n: Dual<N>) -> Dual<N> {
+        let over = load_n * (4.0 / (self.mass_kg * GRAVITY_MPS2)) - Dual::from(1.0);
+        (Dual::from(1.0) - over * self.load_sensitivity).clamp(LOAD_FACTOR_MIN, f64::INFINITY)
     }
 }

@@ -47,6 +47,12 @@ impl<const N: usize> Dual<N> {
         self.chain(value, 0.5 / value)
     }
 
+    /// Held within two ends; beyond them it depends on nothing.
+    pub fn clamp(self, low: f64, high: f64) -> Self {
+        let value = self.value.clamp(low, high);
+        if value == self.value { self } else { Self::constant(value) }
+    }
+
     /// Sine and cosine.
     pub fn sin_cos(self) -> (Self, Self) {
         let (sin, cos) = self.value.sin_cos();

@@ -16,9 +16,14 @@ mod find;
 mod judge;
 mod least_squares;
 mod model;
+mod network;
 mod reasoning;
+mod recording;
+mod roll_out;
 mod samples;
 mod table;
+mod training;
+mod view;
 
 pub use route::FrictionCurve;
 
@@ -26,8 +31,15 @@ pub use chassis::{Chassis, GRAVITY_MPS2, mass_properties};
 pub use dual::Dual;
 pub use find::{Drive, FindError, Found, find_friction};
 pub use judge::{Grip, GroundFriction, SLIDING_MPS};
+pub use network::{Network, NetworkError};
 pub use reasoning::{
-    Coefficients, Controls, Plane, Push, State, TyreUse, Velocity, WheelInput, push, wheel_force,
+    Coefficients, Controls, Plane, Push, State, Surface, TyreUse, Velocity, WheelInput, push, wheel_force,
 };
+pub use recording::{Moment, Recording, RecordingError, Window};
+pub use roll_out::{CoefficientGradient, Ground, PERIOD_S, STEPS, SUBSTEPS, loss_gradient, roll_out};
 pub use samples::DriveError;
 pub use table::{FrictionTable, TableError};
+pub use training::{
+    Lesson, Losses, Seen, Settings, TrainingError, coefficients_of, predict, train, wheels_m,
+};
+pub use view::{CHANNELS, Slopes, View, ViewError};

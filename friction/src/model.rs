@@ -159,8 +159,8 @@ fn wheels(
         edge_mps: edges[i],
         steering_rad: angle(i),
         slip_stiffness: stiffness[i / 2] * chassis.slip_stiffness[i / 2],
-        grip: chassis.load_factor(loads_n[i]),
-        load_n: loads_n[i],
+        grip: chassis.load_factor(loads_n[i].into()),
+        load_n: loads_n[i].into(),
     })
 }
 

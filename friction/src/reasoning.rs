@@ -47,9 +47,9 @@ pub struct WheelInput<const N: usize> {
     /// Force over load and slip for little slip; infinite for a tyre that follows the law alone [-].
     pub slip_stiffness: Dual<N>,
     /// Friction over that of the ground's law [-].
-    pub grip: f64,
+    pub grip: Dual<N>,
     /// Normal force [N].
-    pub load_n: f64,
+    pub load_n: Dual<N>,
 }
 
 /// Velocity of a wheel's contact along and across the wheel [m/s] (equation 10).
@@ -150,6 +150,40 @@ pub struct State {
     pub specific_mps2: [f64; 2],
 }
 
+impl State {
+    /// Numbers in a state.
+    pub const LEN: usize = 8;
+
+    /// East, north [m], heading [rad], ahead, left [m/s], turning [rad/s], friction over mass ahead and left [m/s2].
+    pub fn values<const N: usize>(&self) -> [Dual<N>; Self::LEN] {
+        let ([x_m, y_m], [ahead, left, yaw], [felt_x, felt_y]) =
+            (self.at_m, self.velocity, self.specific_mps2);
+        [x_m, y_m, self.heading_rad, ahead, left, yaw, felt_x, felt_y].map(Dual::from)
+    }
+
+    /// From the same numbers.
+    pub fn of_values<const N: usize>(values: &[Dual<N>; Self::LEN]) -> Self {
+        let [x_m, y_m, heading_rad, ahead, left, yaw, felt_x, felt_y] = values.map(|dual| dual.value);
+        Self {
+            at_m: [x_m, y_m],
+            heading_rad,
+            velocity: [ahead, left, yaw],
+            specific_mps2: [felt_x, felt_y],
+        }
+    }
+}
+
+/// Ground under a vehicle.
+#[derive(Clone, Copy, Debug)]
+pub struct Surface<const N: usize> {
+    /// Under each wheel.
+    pub friction: [Coefficients<N>; 4],
+    /// Pull of gravity along the map's axes [m/s2].
+    pub pull_mps2: [f64; 2],
+    /// Gravity across the ground [m/s2].
+    pub across_mps2: f64,
+}
+
 /// What the wheels do during a step.
 #[derive(Clone, Copy, Debug)]
 pub struct Controls {
@@ -173,35 +207,63 @@ impl Chassis {
     /// ones.
     pub fn step(&self, state: &State, controls: &Controls, plane: &Plane, step_s: f64) -> State {
         let (sin_slope, cos_slope) = plane.slope_rad.sin_cos();
-        let loads_n = self.loads_n(state.specific_mps2, GRAVITY_MPS2 * cos_slope);
-        let wheels: [WheelInput<0>; 4] = std::array::from_fn(|index| WheelInput {
+        let pull_mps2 = [-GRAVITY_MPS2 * sin_slope, 0.0];
+        let ground = Surface {
+            friction: [Coefficients::constant(&plane.friction); 4],
+            pull_mps2,
+            across_mps2: GRAVITY_MPS2 * cos_slope,
+        };
+        State::of_values(&self.advance::<0>(&state.values(), controls, &ground, step_s))
+    }
+
+    /// The same of a state with derivatives, in the order of [`State::values`], over ground that differs from wheel to wheel.
+    pub fn advance<const N: usize>(
+        &self,
+        state: &[Dual<N>; State::LEN],
+        controls: &Controls,
+        ground: &Surface<N>,
+        step_s: f64,
+    ) -> [Dual<N>; State::LEN] {
+        let [x_m, y_m, heading, ahead_mps, left_mps, yaw_radps, felt_x, felt_y] = *state;
+        let wheels = self.wheels([felt_x, felt_y], controls, ground.across_mps2);
+        let pushed = push(self, &[ahead_mps, left_mps, yaw_radps], &wheels, &ground.friction);
+        let (sin, cos) = heading.sin_cos();
+        let [east_mps2, north_mps2] = ground.pull_mps2;
+        // The body turns under its velocity; gravity pulls down the plane.
+        let specific = pushed.specific_mps2;
+        let change = [
+            specific[0] + cos * east_mps2 + sin * north_mps2 + left_mps * yaw_radps,
+            specific[1] + cos * north_mps2 - sin * east_mps2 - ahead_mps * yaw_radps,
+            pushed.moment_nm * (1.0 / self.yaw_inertia_kgm2),
+        ];
+        let ahead_mps = ahead_mps + change[0] * step_s;
+        let left_mps = left_mps + change[1] * step_s;
+        let yaw_radps = yaw_radps + change[2] * step_s;
+        [
+            x_m + (ahead_mps * cos - left_mps * sin) * step_s,
+            y_m + (ahead_mps * sin + left_mps * cos) * step_s,
+            heading + yaw_radps * step_s,
+            ahead_mps,
+            left_mps,
+            yaw_radps,
+            specific[0],
+            specific[1],
+        ]
+    }
+
+    fn wheels<const N: usize>(
+        &self,
+        specific_mps2: [Dual<N>; 2],
+        controls: &Controls,
+        across_mps2: f64,
+    ) -> [WheelInput<N>; 4] {
+        let loads_n = self.loads(specific_mps2, across_mps2);
+        std::array::from_fn(|index| WheelInput {
             edge_mps: controls.edge_mps[index].into(),
             steering_rad: if index < 2 { controls.steering_rad.into() } else { 0.0.into() },
             slip_stiffness: self.slip_stiffness[index / 2].into(),
             grip: self.load_factor(loads_n[index]),
             load_n: loads_n[index],
-        });
-        let velocity = state.velocity.map(Dual::from);
-        let pushed = push(self, &velocity, &wheels, &[Coefficients::constant(&plane.friction); 4]);
-        let specific_mps2 = pushed.specific_mps2.map(|force| force.value);
-        let (sin, cos) = state.heading_rad.sin_cos();
-        let [ahead_mps, left_mps, yaw_radps] = state.velocity;
-        // The body turns under its velocity; gravity pulls down the plane.
-        let pull_mps2 = -GRAVITY_MPS2 * sin_slope;
-        let change = [
-            specific_mps2[0] + pull_mps2 * cos + left_mps * yaw_radps,
-            specific_mps2[1] - pull_mps2 * sin - ahead_mps * yaw_radps,
-            pushed.moment_nm.value / self.yaw_inertia_kgm2,
-        ];
-        let after: [f64; 3] = std::array::from_fn(|i| state.velocity[i] + step_s * change[i]);
-        State {
-            at_m: [
-                state.at_m[0] + step_s * (after[0] * cos - after[1] * sin),
-                state.at_m[1] + step_s * (after[0] * sin + after[1] * cos),
-            ],
-            heading_rad: state.heading_rad + step_s * after[2],
-            velocity: after,
-            specific_mps2,
-        }
+        })
     }
 }

@@ -180,7 +180,7 @@ fn friction_never_gives_energy() {
 }
 
 fn wheel<const N: usize>(edge_mps: Dual<N>, slip_stiffness: Dual<N>) -> WheelInput<N> {
-    WheelInput { edge_mps, steering_rad: Dual::from(0.2), slip_stiffness, grip: 0.9, load_n: 3000.0 }
+    WheelInput { edge_mps, steering_rad: Dual::from(0.2), slip_stiffness, grip: 0.9.into(), load_n: 3000.0.into() }
 }
 
 #[test]
@@ -190,11 +190,11 @@ fn a_tyre_is_linear_for_little_slip_and_the_ground_s_for_much() {
         let rolling_mps = 10.0;
         let input = WheelInput {
             steering_rad: 0.0.into(),
-            grip: 1.0,
+            grip: 1.0.into(),
             ..wheel(Dual::from(rolling_mps), Dual::from(stiffness))
         };
         let velocity = [Dual::from(rolling_mps * (1.0 - slip)), 0.0.into(), 0.0.into()];
-        wheel_force(&velocity, [0.0; 2], &input, &ground).0[0].value / input.load_n
+        wheel_force(&velocity, [0.0; 2], &input, &ground).0[0].value / input.load_n.value
     };
     assert!((along(0.02, 5.0) - 0.1).abs() < 2e-3);
     assert!((along(0.5, 12.0) - 0.7).abs() < 1e-5);

@@ -1,0 +1,260 @@
+//! A UNet (Ronneberger and others 2015) that sees friction: four channels in, four Stribeck coefficients a pixel out (AnyNav,
+//! section 3.1.2), the same for every wheel.
+
+use std::collections::BTreeMap;
+
+use candle_core::{DType, Device, Result, Tensor, Var};
+use rand::{RngExt, SeedableRng};
+use rand_distr::StandardNormal;
+use rand_xoshiro::Xoshiro256PlusPlus;
+
+use crate::view::{CHANNELS, View, ViewError};
+
+/// Channels at full, half and quarter resolution.
+const WIDTHS: [usize; 3] = [12, 24, 32];
+/// Sides of a picture have to be multiples of this.
+pub(crate) const STRIDE: usize = 4;
+/// Slope of a unit below zero.
+const LEAK: f64 = 0.1;
+/// Least and largest coefficients: static, sliding, viscous [s/m], Stribeck speed [m/s].
+pub(crate) const COEFFICIENTS: [[f64; 2]; 4] = [[0.02, 1.3], [0.02, 1.1], [0.0, 0.04], [0.2, 10.0]];
+/// Height over which the height channel is divided [m].
+const HEIGHT_SCALE_M: f32 = 0.05;
+
+/// Three by three pixels to one, or one to one.
+struct Layer {
+    name: &'static str,
+    kernel: usize,
+    /// [kernel^2 inputs, outputs].
+    weights: Var,
+    biases: Var,
+}
+
+impl Layer {
+    /// Normal weights whose sums keep the size of their inputs behind a ReLU (He and others 2015); no biases.
+    fn new(
+        (name, kernel, n_inputs, n_outputs): (&'static str, usize, usize, usize),
+        rng: &mut Xoshiro256PlusPlus,
+    ) -> Result<Self> {
+        let n_inputs = kernel * kernel * n_inputs;
+        let deviation = (2.0 / n_inputs as f32).sqrt();
+        let weights = (0..n_outputs * n_inputs).map(|_| deviation * rng.sample::<f32, _>(StandardNormal));
+        Ok(Self {
+            name,
+            kernel,
+            weights: Var::from_vec(weights.collect(), (n_inputs, n_outputs), &Device::Cpu)?,
+            biases: Var::zeros(n_outputs, DType::F32, &Device::Cpu)?,
+        })
+    }
+
+    /// Shapes [batch, row, column, inputs] to the same with outputs. As one product of shifted copies: Candle's own
+    /// convolution is slow to differentiate on a processor.
+    fn sums(&self, input: &Tensor) -> Result<Tensor> {
+        let (n, n_rows, n_cols, _) = input.dims4()?;
+        let columns = if self.kernel == 1 {
+            input.clone()
+        } else {
+            let padded = input.pad_with_zeros(1, 1, 1)?.pad_with_zeros(2, 1, 1)?;
+            let shifted = |k: usize| padded.narrow(1, k / 3, n_rows)?.narrow(2, k % 3, n_cols);
+            Tensor::cat(&(0..9).map(shifted).collect::<Result<Vec<_>>>()?, 3)?
+        };
+        let flat = columns.reshape((n * n_rows * n_cols, ()))?;
+        let sums = flat.matmul(&self.weights)?.broadcast_add(&self.biases)?;
+        sums.reshape((n, n_rows, n_cols, ()))
+    }
+
+    fn forward(&self, input: &Tensor) -> Result<Tensor> {
+        candle_nn::ops::leaky_relu(&self.sums(input)?, LEAK)
+    }
+}
+
+/// Means of squares of two by two: Candle's own pooling scales gradients wrongly.
+fn halved(input: &Tensor) -> Result<Tensor> {
+    let (n, n_rows, n_cols, n_channels) = input.dims4()?;
+    input.reshape(&[n, n_rows / 2, 2, n_cols / 2, 2, n_channels][..])?.mean(4)?.mean(2)
+}
+
+fn doubled(input: &Tensor) -> Result<Tensor> {
+    let (n, n_rows, n_cols, n_channels) = input.dims4()?;
+    input
+        .reshape(&[n, n_rows, 1, n_cols, 1, n_channels][..])?
+        .broadcast_as(&[n, n_rows, 2, n_cols, 2, n_channels][..])?
+        .reshape((n, 2 * n_rows, 2 * n_cols, n_channels))
+}
+
+/// The network.
+pub struct Network {
+    layers: Vec<Layer>,
+    /// Edge of the pixels it knows [m].
+    pub resolution_m: f64,
+}
+
+/// Weights that make no network.
+#[derive(Debug, thiserror::Error)]
+pub enum NetworkError {
+    /// The file is none of safetensors.
+    #[error("weights: {0}")]
+    File(#[from] safetensors::SafeTensorError),
+    /// A part is missing or of another shape.
+    #[error("weights: {part}: expected {expected}, found {found}")]
+    Part {
+        /// Which.
+        part: String,
+        /// What would do.
+        expected: String,
+        /// What stands there.
+        found: String,
+    },
+    /// The picture is none.
+    #[error(transparent)]
+    View(#[from] ViewError),
+    /// Arithmetic was refused.
+    #[error(transparent)]
+    Candle(#[from] candle_core::Error),
+}
+
+/// Names, kernels, inputs and outputs of the layers in the order of their use.
+fn shapes() -> [(&'static str, usize, usize, usize); 11] {
+    let [a, b, c] = WIDTHS;
+    [
+        ("down.0.0", 3, CHANNELS, a),
+        ("down.0.1", 3, a, a),
+        ("down.1.0", 3, a, b),
+        ("down.1.1", 3, b, b),
+        ("down.2.0", 3, b, c),
+        ("down.2.1", 3, c, c),
+        ("up.1.0", 3, c + b, b),
+        ("up.1.1", 3, b, b),
+        ("up.0.0", 3, b + a, a),
+        ("up.0.1", 3, a, a),
+        ("out", 1, a, 4),
+    ]
+}
+
+impl Network {
+    /// One that has learned nothing.
+    ///
+    /// # Errors
+    /// Memory.
+    pub fn new(resolution_m: f64, seed: u64) -> Result<Self> {
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
+        let layers = shapes().into_iter().map(|shape| Layer::new(shape, &mut rng));
+        Ok(Self { layers: layers.collect::<Result<_>>()?, resolution_m })
+    }
+
+    /// Coefficients [batch, row, column, 4] of pictures [batch, row, column, 4] whose channels are [`Network::input`]'s.
+    pub(crate) fn forward(&self, input: &Tensor) -> Result<Tensor> {
+        let run = |range: std::ops::Range<usize>, from: &Tensor| {
+            self.layers[range].iter().try_fold(from.clone(), |values, layer| layer.forward(&values))
+        };
+        let full = run(0..2, input)?;
+        let half = run(2..4, &halved(&full)?)?;
+        let quarter = run(4..6, &halved(&half)?)?;
+        let half = run(6..8, &Tensor::cat(&[doubled(&quarter)?, half], 3)?)?;
+        let full = run(8..10, &Tensor::cat(&[doubled(&half)?, full], 3)?)?;
+        let shares = candle_nn::ops::sigmoid(&self.layers[10].sums(&full)?)?;
+        let row = |which: fn(&[f64; 2]) -> f64| {
+            Tensor::from_vec(COEFFICIENTS.iter().map(|ends| which(ends) as f32).collect(), 4, &Device::Cpu)
+        };
+        let (low, width) = (row(|ends| ends[0])?, row(|ends| ends[1] - ends[0])?);
+        shares.broadcast_mul(&width)?.broadcast_add(&low)
+    }
+
+    /// Pixels from a corner on as the network takes them, [row, column, channel]: colours about zero, heights less the mean of
+    /// the five by five pixels around, pixels beyond the edges repeated.
+    pub(crate) fn input(view: &View, [row, col]: [i64; 2], [n_rows, n_cols]: [usize; 2]) -> Vec<f32> {
+        let at = |channel: usize, row: i64, col: i64| {
+            let row = row.clamp(0, view.n_rows as i64 - 1) as usize;
+            let col = col.clamp(0, view.n_cols as i64 - 1) as usize;
+            view.values[(channel * view.n_rows + row) * view.n_cols + col]
+        };
+        let mut values = Vec::with_capacity(n_rows * n_cols * CHANNELS);
+        for i in row..row + n_rows as i64 {
+            for j in col..col + n_cols as i64 {
+                values.extend((0..3).map(|channel| 4.0 * (at(channel, i, j) - 0.5)));
+                let around = (0..25).map(|k| at(3, i + k / 5 - 2, j + k % 5 - 2)).sum::<f32>() / 25.0;
+                values.push((at(3, i, j) - around) / HEIGHT_SCALE_M);
+            }
+        }
+        values
+    }
+
+    /// Coefficients of every pixel of a view, shape [row, column].
+    ///
+    /// # Errors
+    /// A view that is none, or of another resolution.
+    pub fn see(&self, view: &View) -> std::result::Result<Vec<[f32; 4]>, NetworkError> {
+        view.validate()?;
+        let (expected_m, found_m) = (self.resolution_m, view.resolution_m);
+        if (found_m / expected_m - 1.0).abs() > 1e-6 {
+            return Err(ViewError::Resolution { expected_m, found_m }.into());
+        }
+        let [n_rows, n_cols] = [view.n_rows, view.n_cols].map(|n| n.next_multiple_of(STRIDE));
+        let input = Self::input(view, [0, 0], [n_rows, n_cols]);
+        let input = Tensor::from_vec(input, (1, n_rows, n_cols, CHANNELS), &Device::Cpu)?;
+        let seen = self.forward(&input)?.detach().squeeze(0)?.to_vec3::<f32>()?;
+        let rows = seen.into_iter().take(view.n_rows);
+        let pixels = rows.flat_map(|row| row.into_iter().take(view.n_cols));
+        Ok(pixels.map(|pixel| std::array::from_fn(|i| pixel[i])).collect())
+    }
+
+    pub(crate) fn variables(&self) -> Vec<Var> {
+        self.layers.iter().flat_map(|layer| [layer.weights.clone(), layer.biases.clone()]).collect()
+    }
+
+    /// A network of its own with the same weights.
+    ///
+    /// # Errors
+    /// Memory.
+    pub fn copied(&self) -> Result<Self> {
+        let copy = Self::new(self.resolution_m, 0)?;
+        for (to, from) in copy.variables().iter().zip(self.variables()) {
+            to.set(&from.copy()?)?;
+        }
+        Ok(copy)
+    }
+
+    /// As safetensors, the size of the pixels in its header.
+    ///
+    /// # Errors
+    /// None but of memory.
+    pub fn to_bytes(&self) -> std::result::Result<Vec<u8>, NetworkError> {
+        let mut tensors = BTreeMap::new();
+        for layer in &self.layers {
+            tensors.insert(format!("{}.weight", layer.name), layer.weights.as_tensor().clone());
+            tensors.insert(format!("{}.bias", layer.name), layer.biases.as_tensor().clone());
+        }
+        let header = [("resolution_m".to_owned(), self.resolution_m.to_string())];
+        Ok(safetensors::serialize(tensors, Some(header.into_iter().collect()))?)
+    }
+
+    /// From the same bytes.
+    ///
+    /// # Errors
+    /// No safetensors, or not these.
+    pub fn from_bytes(bytes: &[u8]) -> std::result::Result<Self, NetworkError> {
+        let (_, header) = safetensors::SafeTensors::read_metadata(bytes)?;
+        let told = header.metadata().as_ref().and_then(|all| all.get("resolution_m").cloned());
+        let part = |part: &str, expected: &str, found: String| NetworkError::Part {
+            part: part.to_owned(),
+            expected: expected.to_owned(),
+            found,
+        };
+        let resolution_m = told.as_ref().and_then(|word| word.parse().ok()).filter(|edge_m| *edge_m > 0.0);
+        let absent = || part("resolution_m", "a number of metres", format!("{told:?}"));
+        let network = Self::new(resolution_m.ok_or_else(absent)?, 0)?;
+        let tensors = candle_core::safetensors::load_buffer(bytes, &Device::Cpu)?;
+        for layer in &network.layers {
+            for (kind, variable) in [("weight", &layer.weights), ("bias", &layer.biases)] {
+                let name = format!("{}.{kind}", layer.name);
+                let expected = format!("{:?}", variable.dims());
+                let found = tensors.get(&name).ok_or_else(|| part(&name, &expected, "none".to_owned()))?;
+                if found.dims() != variable.dims() {
+                    return Err(part(&name, &expected, format!("{:?}", found.dims())));
+                }
+                variable.set(found)?;
+            }
+        }
+        Ok(network)
+    }
+}

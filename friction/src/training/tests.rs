@@ -1,0 +1,168 @@
+//! Gradients by finite differences from the motion to the weights, and that looks are learned from motion.
+
+use bicycle::Vehicle;
+
+use super::*;
+use crate::recording::Moment;
+use crate::roll_out::SUBSTEPS;
+
+fn chassis() -> Chassis {
+    let vehicle: Vehicle =
+        formats::read_vehicle("sedan").expect("shipped");
+    Chassis::of(&vehicle)
+}
+
+/// Two grounds side by side, told apart by their colour, and where a vehicle turned hard over them went under known curves.
+fn lesson(curves: [FrictionCurve; 2], steering_rad: f64) -> Lesson {
+    let chassis = chassis();
+    let (n_rows, n_cols) = (120, 120);
+    let is_right = |pixel: usize| usize::from(pixel % n_cols >= 50);
+    let channel = |value: [f32; 2]| (0..n_rows * n_cols).map(move |pixel| value[is_right(pixel)]);
+    let values = channel([0.2, 0.8]).chain(channel([0.3, 0.8])).chain(channel([0.2, 0.9])).chain(channel([0.0; 2]));
+    let view =
+        View { resolution_m: 0.5, south_west_m: [-30.0; 2], n_rows, n_cols, values: values.collect() };
+    let controls = vec![Controls { edge_mps: [9.0; 4], steering_rad }; STEPS * SUBSTEPS];
+    let mut start = State { at_m: [-14.0, -3.0], heading_rad: 0.2, velocity: [9.0, 0.0, 0.0], specific_mps2: [0.0; 2] };
+    let mut moments = Vec::new();
+    for begin in 0..2 {
+        let states = roll_out(&chassis, &start, &controls, |_, state| Ground {
+            coefficients: wheels_m(&chassis, state).map(|at_m| {
+                let [row, col] = view.pixel(at_m);
+                Coefficients::<0>::constant(&curves[is_right(row * n_cols + col)]).0.map(|c| c.value)
+            }),
+            gradient: [0.0; 2],
+        });
+        let all = if begin == 0 { vec![start] } else { Vec::new() };
+        for state in all.iter().chain(&states) {
+            moments.push(moment(&chassis, state, moments.len() as f64 * 0.1, steering_rad));
+        }
+        start = states[STEPS - 1];
+    }
+    Lesson::new(chassis, Recording { view, classes: None, moments }, 0)
+}
+
+use crate::reasoning::{Coefficients, Controls};
+
+fn moment(chassis: &Chassis, state: &State, time_s: f64, steering_rad: f64) -> Moment {
+    let (sin, cos) = state.heading_rad.sin_cos();
+    let ahead_m = chassis.cog_ahead_m;
+    let [ahead_mps, left_mps, yaw_radps] = state.velocity;
+    Moment {
+        time_s,
+        at_m: [state.at_m[0] - ahead_m * cos, state.at_m[1] - ahead_m * sin],
+        yaw_rad: state.heading_rad,
+        velocity_mps: [ahead_mps, left_mps - yaw_radps * ahead_m],
+        yaw_radps,
+        edge_mps: [9.0; 4],
+        steering_rad,
+        felt: [state.specific_mps2[0] + yaw_radps * yaw_radps * ahead_m, state.specific_mps2[1], yaw_radps],
+    }
+}
+
+#[test]
+fn windows_are_where_the_vehicle_went() {
+    let lesson = lesson([FrictionCurve::ASPHALT, FrictionCurve::ICE], 0.1);
+    lesson.recording.validate().unwrap();
+    let window = &lesson.windows[0];
+    let seen = Seen { coefficients: (0..120 * 120).map(|pixel| coefficients_of(if pixel % 120 >= 50 { 6 } else { 0 })).collect() };
+    let predicted = predict(&lesson, window, &seen);
+    let off_m = |states: &[State]| {
+        let [a, b] = [states[STEPS - 1].at_m, window.truth[STEPS - 1].at_m];
+        (a[0] - b[0]).hypot(a[1] - b[1])
+    };
+    assert!(off_m(&predicted) < 0.02, "{}", off_m(&predicted));
+    let all_ice = Seen { coefficients: vec![coefficients_of(6); 120 * 120] };
+    assert!(off_m(&predict(&lesson, window, &all_ice)) > 0.3);
+}
+
+#[test]
+fn the_gradient_by_coefficients_is_that_of_central_differences() {
+    let lesson = lesson([FrictionCurve::GRASS, FrictionCurve::ICE], 0.12);
+    let window = &lesson.windows[0];
+    let patch = Patch::of(&lesson, window);
+    let grounds: [Ground; STEPS] = std::array::from_fn(|step| Ground {
+        coefficients: std::array::from_fn(|wheel| {
+            std::array::from_fn(|i| [0.5, 0.4, 0.01, 2.0][i] * (1.0 + 0.02 * (step + 3 * wheel) as f64))
+        }),
+        gradient: [0.01, -0.02],
+    });
+    let loss = |grounds: &[Ground]| {
+        loss_gradient(&lesson.chassis, &window.start, &window.controls, grounds, &|step, state| {
+            motion_loss(&lesson.chassis, window, step, state)
+        })
+    };
+    let (_, gradient) = loss(&grounds);
+    for (step, wheel, which) in [(0, 0, 0), (3, 1, 1), (7, 2, 3), (12, 3, 0), (18, 0, 2)] {
+        let (mut up, mut down) = (grounds, grounds);
+        let by = 1e-5;
+        up[step].coefficients[wheel][which] += by;
+        down[step].coefficients[wheel][which] -= by;
+        let difference = (loss(&up).0 - loss(&down).0) / (2.0 * by);
+        let found = gradient[step][wheel][which];
+        assert!((found - difference).abs() < 1e-6 + 1e-4 * difference.abs(), "{step} {wheel} {which}: {found} {difference}");
+    }
+    assert_eq!(patch.pixels.len(), STEPS);
+}
+
+/// Single precision in the network: the difference is taken over a change of the loss that stands far above rounding.
+#[test]
+fn the_surrogate_s_gradient_by_the_weights_is_that_of_the_motion() {
+    let lessons = [lesson([FrictionCurve::GRASS, FrictionCurve::ICE], 0.12)];
+    let network = Network::new(0.5, 3).unwrap();
+    let windows = [&lessons[0].windows[0]];
+    let patches = [Patch::of(&lessons[0], windows[0])];
+    let input = Network::input(&lessons[0].recording.view, patches[0].corner, [PATCH; 2]);
+    let input = Tensor::from_vec(input, (1, PATCH, PATCH, CHANNELS), &Device::Cpu).unwrap();
+    let loss = || surrogate(&lessons, &windows, &patches, &network.forward(&input).unwrap()).unwrap();
+    let (surrogate, _) = loss();
+    let gradients = surrogate.backward().unwrap();
+    for variable in network.variables().iter().step_by(5) {
+        let gradient = gradients.get(variable).unwrap();
+        let size = gradient.sqr().unwrap().sum_all().unwrap().to_scalar::<f32>().unwrap().sqrt();
+        let by = 0.01;
+        let direction = (gradient * (f64::from(by) / f64::from(size))).unwrap();
+        let before = variable.copy().unwrap();
+        variable.set(&(&before + &direction).unwrap()).unwrap();
+        let up = loss().1;
+        variable.set(&(&before - &direction).unwrap()).unwrap();
+        let down = loss().1;
+        variable.set(&before).unwrap();
+        let difference = (up - down) / (2.0 * f64::from(by));
+        assert!((difference / f64::from(size) - 1.0).abs() < 0.03, "{difference} {size}");
+    }
+}
+
+/// Of two grounds that a vehicle slid over, the network learns from the motion alone which holds less.
+#[test]
+fn motion_alone_teaches_what_ice_looks_like() {
+    let curves = [FrictionCurve::ASPHALT, FrictionCurve::ICE];
+    let lessons = [0.12, -0.1].map(|steering_rad| lesson(curves, steering_rad));
+    let lessons: Vec<Lesson> = lessons
+        .into_iter()
+        .enumerate()
+        .map(|(index, lesson)| Lesson::new(lesson.chassis, lesson.recording, index))
+        .collect();
+    let network = Network::new(0.5, 1).unwrap();
+    let settings = Settings { losses: Losses::Motion, batches: 40, batch: 4, ..Settings::default() };
+    let mut losses = Vec::new();
+    train(&network, &lessons, settings, &mut |_, [motion, _]| losses.push(motion)).unwrap();
+    let mean = |losses: &[f64]| losses.iter().sum::<f64>() / losses.len() as f64;
+    assert!(mean(&losses[30..]) < 0.5 * mean(&losses[..10]), "{losses:?}");
+    let seen = network.see(&lessons[0].recording.view).unwrap();
+    let friction = |pixel: usize| {
+        let [statics, sliding, viscous, speed] = seen[pixel].map(f64::from);
+        Coefficients::<0>([statics, sliding, viscous, speed].map(Into::into)).at(1.0.into()).value
+    };
+    let [left, right] = [54 * 120 + 40, 54 * 120 + 60].map(friction);
+    assert!(left > 1.3 * right, "{left} {right}");
+}
+
+#[test]
+fn prior_knowledge_needs_classes() {
+    let lessons = [lesson([FrictionCurve::GRASS, FrictionCurve::ICE], 0.1)];
+    let network = Network::new(0.5, 3).unwrap();
+    let refused = train(&network, &lessons, Settings::default(), &mut |_, _| {}).unwrap_err();
+    assert!(refused.to_string().contains("expected a class for every pixel"), "{refused}");
+    let nothing = train(&network, &[], Settings::default(), &mut |_, _| {}).unwrap_err();
+    assert!(nothing.to_string().contains("two seconds of driving"), "{nothing}");
+}
