@@ -1,10 +1,13 @@
-//! Friction of grounds, found from a vehicle's own drives without labels or images (AnyNav, Fu et al. 2025, sections
-//! 3.2 and 3.3.2). A part of [Surefoot](../cli/index.html).
+//! Friction of grounds, found from a vehicle's own drives without labels, and seen in pictures from above (AnyNav, Fu et al.
+//! 2025, section 3). A part of [Surefoot](../cli/index.html).
 //!
 //! A [`Chassis`] reasons from friction to motion: weight on four wheels, combined slip under the Stribeck law, semi-implicit
 //! Euler steps; all of it differentiable ([`Dual`]). [`find_friction`] turns that round: of the coefficients of every
 //! class of ground it finds those under which the forces that were felt follow from the slip that was measured. How
 //! far that can be known depends on the driving: where tyres never came near their limit a [`Grip`] says "at least".
+//!
+//! A [`Network`] sees the coefficients of every pixel of a [`View`]. [`train`] teaches it from [`Recording`]s: [`roll_out`]
+//! says where the vehicle goes over what is seen, [`loss_gradient`] what each coefficient on the way does to the error.
 //!
 //! `examples/braking_distance.rs` lets locked wheels slide on three grounds.
 //!
@@ -16,6 +19,7 @@ mod find;
 mod judge;
 mod least_squares;
 mod model;
+mod neighbours;
 mod network;
 mod reasoning;
 mod recording;

@@ -3,83 +3,64 @@
 
 use std::collections::BTreeMap;
 
-use candle_core::{DType, Device, Result, Tensor, Var};
+use candle_core::{Device, Result, Tensor, Var};
 use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_xoshiro::Xoshiro256PlusPlus;
 
+use crate::neighbours::Neighbours;
 use crate::view::{CHANNELS, View, ViewError};
 
 /// Channels at full, half and quarter resolution.
-const WIDTHS: [usize; 3] = [12, 24, 32];
+const WIDTHS: [usize; 3] = [8, 16, 24];
 /// Sides of a picture have to be multiples of this.
 pub(crate) const STRIDE: usize = 4;
-/// Slope of a unit below zero.
-const LEAK: f64 = 0.1;
 /// Least and largest coefficients: static, sliding, viscous [s/m], Stribeck speed [m/s].
 pub(crate) const COEFFICIENTS: [[f64; 2]; 4] = [[0.02, 1.3], [0.02, 1.1], [0.0, 0.04], [0.2, 10.0]];
 /// Height over which the height channel is divided [m].
 const HEIGHT_SCALE_M: f32 = 0.05;
 
-/// Three by three pixels to one, or one to one.
+/// Three by three pixels to one.
 struct Layer {
     name: &'static str,
-    kernel: usize,
-    /// [kernel^2 inputs, outputs].
+    /// [9 inputs and a bias, outputs].
     weights: Var,
-    biases: Var,
 }
 
 impl Layer {
     /// Normal weights whose sums keep the size of their inputs behind a ReLU (He and others 2015); no biases.
     fn new(
-        (name, kernel, n_inputs, n_outputs): (&'static str, usize, usize, usize),
+        (name, n_inputs, n_outputs): (&'static str, usize, usize),
         rng: &mut Xoshiro256PlusPlus,
     ) -> Result<Self> {
-        let n_inputs = kernel * kernel * n_inputs;
+        let n_inputs = 9 * n_inputs;
         let deviation = (2.0 / n_inputs as f32).sqrt();
         let weights = (0..n_outputs * n_inputs).map(|_| deviation * rng.sample::<f32, _>(StandardNormal));
-        Ok(Self {
-            name,
-            kernel,
-            weights: Var::from_vec(weights.collect(), (n_inputs, n_outputs), &Device::Cpu)?,
-            biases: Var::zeros(n_outputs, DType::F32, &Device::Cpu)?,
-        })
+        let weights = weights.chain(std::iter::repeat_n(0.0, n_outputs)).collect();
+        Ok(Self { name, weights: Var::from_vec(weights, (n_inputs + 1, n_outputs), &Device::Cpu)? })
     }
+}
 
-    /// Shapes [batch, row, column, inputs] to the same with outputs. As one product of shifted copies: Candle's own
-    /// convolution is slow to differentiate on a processor.
-    fn sums(&self, input: &Tensor) -> Result<Tensor> {
-        let (n, n_rows, n_cols, _) = input.dims4()?;
-        let columns = if self.kernel == 1 {
-            input.clone()
-        } else {
-            let padded = input.pad_with_zeros(1, 1, 1)?.pad_with_zeros(2, 1, 1)?;
-            let shifted = |k: usize| padded.narrow(1, k / 3, n_rows)?.narrow(2, k % 3, n_cols);
-            Tensor::cat(&(0..9).map(shifted).collect::<Result<Vec<_>>>()?, 3)?
-        };
-        let flat = columns.reshape((n * n_rows * n_cols, ()))?;
-        let sums = flat.matmul(&self.weights)?.broadcast_add(&self.biases)?;
-        sums.reshape((n, n_rows, n_cols, ()))
-    }
-
-    fn forward(&self, input: &Tensor) -> Result<Tensor> {
-        candle_nn::ops::leaky_relu(&self.sums(input)?, LEAK)
-    }
+/// Shapes [batch, row, column, inputs] to the same with outputs.
+fn convolved(input: &Tensor, weights: &Tensor) -> Result<Tensor> {
+    let (n, n_rows, n_cols, _) = input.dims4()?;
+    input.apply_op1(Neighbours)?.matmul(weights)?.reshape((n, n_rows, n_cols, ()))
 }
 
 /// Means of squares of two by two: Candle's own pooling scales gradients wrongly.
 fn halved(input: &Tensor) -> Result<Tensor> {
     let (n, n_rows, n_cols, n_channels) = input.dims4()?;
-    input.reshape(&[n, n_rows / 2, 2, n_cols / 2, 2, n_channels][..])?.mean(4)?.mean(2)
+    let rows = input.reshape((n, n_rows / 2, 2, n_cols * n_channels))?;
+    let rows = (rows.narrow(2, 0, 1)? + rows.narrow(2, 1, 1)?)?;
+    let pairs = rows.reshape((n, n_rows / 2, n_cols / 2, 2 * n_channels))?;
+    (pairs.narrow(3, 0, n_channels)? + pairs.narrow(3, n_channels, n_channels)?)? * 0.25
 }
 
+/// Each pixel twice along and across: Candle's own overwrites gradients of what is used elsewhere, too.
 fn doubled(input: &Tensor) -> Result<Tensor> {
     let (n, n_rows, n_cols, n_channels) = input.dims4()?;
-    input
-        .reshape(&[n, n_rows, 1, n_cols, 1, n_channels][..])?
-        .broadcast_as(&[n, n_rows, 2, n_cols, 2, n_channels][..])?
-        .reshape((n, 2 * n_rows, 2 * n_cols, n_channels))
+    let along = Tensor::cat(&[input, input], 3)?.reshape((n, n_rows, 2 * n_cols, n_channels))?;
+    Tensor::cat(&[&along, &along], 2)?.reshape((n, 2 * n_rows, 2 * n_cols, n_channels))
 }
 
 /// The network.
@@ -113,21 +94,21 @@ pub enum NetworkError {
     Candle(#[from] candle_core::Error),
 }
 
-/// Names, kernels, inputs and outputs of the layers in the order of their use.
-fn shapes() -> [(&'static str, usize, usize, usize); 11] {
+/// Names, inputs and outputs of the layers in the order of their use.
+fn shapes() -> [(&'static str, usize, usize); 11] {
     let [a, b, c] = WIDTHS;
     [
-        ("down.0.0", 3, CHANNELS, a),
-        ("down.0.1", 3, a, a),
-        ("down.1.0", 3, a, b),
-        ("down.1.1", 3, b, b),
-        ("down.2.0", 3, b, c),
-        ("down.2.1", 3, c, c),
-        ("up.1.0", 3, c + b, b),
-        ("up.1.1", 3, b, b),
-        ("up.0.0", 3, b + a, a),
-        ("up.0.1", 3, a, a),
-        ("out", 1, a, 4),
+        ("down.0.0", CHANNELS, a),
+        ("down.0.1", a, a),
+        ("down.1.0", a, b),
+        ("down.1.1", b, b),
+        ("down.2.0", b, c),
+        ("down.2.1", c, c),
+        ("up.1.0", c + b, b),
+        ("up.1.1", b, b),
+        ("up.0.0", b + a, a),
+        ("up.0.1", a, a),
+        ("out", a, 4),
     ]
 }
 
@@ -144,15 +125,23 @@ impl Network {
 
     /// Coefficients [batch, row, column, 4] of pictures [batch, row, column, 4] whose channels are [`Network::input`]'s.
     pub(crate) fn forward(&self, input: &Tensor) -> Result<Tensor> {
+        let weights: Vec<Tensor> =
+            self.layers.iter().map(|layer| layer.weights.as_tensor().clone()).collect();
+        Self::apply(&weights, input)
+    }
+
+    fn apply(weights: &[Tensor], input: &Tensor) -> Result<Tensor> {
         let run = |range: std::ops::Range<usize>, from: &Tensor| {
-            self.layers[range].iter().try_fold(from.clone(), |values, layer| layer.forward(&values))
+            weights[range]
+                .iter()
+                .try_fold(from.clone(), |values, weights| convolved(&values, weights)?.relu())
         };
         let full = run(0..2, input)?;
         let half = run(2..4, &halved(&full)?)?;
         let quarter = run(4..6, &halved(&half)?)?;
         let half = run(6..8, &Tensor::cat(&[doubled(&quarter)?, half], 3)?)?;
         let full = run(8..10, &Tensor::cat(&[doubled(&half)?, full], 3)?)?;
-        let shares = candle_nn::ops::sigmoid(&self.layers[10].sums(&full)?)?;
+        let shares = candle_nn::ops::sigmoid(&convolved(&full, &weights[10])?)?;
         let row = |which: fn(&[f64; 2]) -> f64| {
             Tensor::from_vec(COEFFICIENTS.iter().map(|ends| which(ends) as f32).collect(), 4, &Device::Cpu)
         };
@@ -192,14 +181,17 @@ impl Network {
         let [n_rows, n_cols] = [view.n_rows, view.n_cols].map(|n| n.next_multiple_of(STRIDE));
         let input = Self::input(view, [0, 0], [n_rows, n_cols]);
         let input = Tensor::from_vec(input, (1, n_rows, n_cols, CHANNELS), &Device::Cpu)?;
-        let seen = self.forward(&input)?.detach().squeeze(0)?.to_vec3::<f32>()?;
+        // Detached: what nobody differentiates is not kept.
+        let weights: Vec<Tensor> =
+            self.layers.iter().map(|layer| layer.weights.as_detached_tensor()).collect();
+        let seen = Self::apply(&weights, &input)?.squeeze(0)?.to_vec3::<f32>()?;
         let rows = seen.into_iter().take(view.n_rows);
         let pixels = rows.flat_map(|row| row.into_iter().take(view.n_cols));
         Ok(pixels.map(|pixel| std::array::from_fn(|i| pixel[i])).collect())
     }
 
     pub(crate) fn variables(&self) -> Vec<Var> {
-        self.layers.iter().flat_map(|layer| [layer.weights.clone(), layer.biases.clone()]).collect()
+        self.layers.iter().map(|layer| layer.weights.clone()).collect()
     }
 
     /// A network of its own with the same weights.
@@ -222,7 +214,6 @@ impl Network {
         let mut tensors = BTreeMap::new();
         for layer in &self.layers {
             tensors.insert(format!("{}.weight", layer.name), layer.weights.as_tensor().clone());
-            tensors.insert(format!("{}.bias", layer.name), layer.biases.as_tensor().clone());
         }
         let header = [("resolution_m".to_owned(), self.resolution_m.to_string())];
         Ok(safetensors::serialize(tensors, Some(header.into_iter().collect()))?)
@@ -245,15 +236,13 @@ impl Network {
         let network = Self::new(resolution_m.ok_or_else(absent)?, 0)?;
         let tensors = candle_core::safetensors::load_buffer(bytes, &Device::Cpu)?;
         for layer in &network.layers {
-            for (kind, variable) in [("weight", &layer.weights), ("bias", &layer.biases)] {
-                let name = format!("{}.{kind}", layer.name);
-                let expected = format!("{:?}", variable.dims());
-                let found = tensors.get(&name).ok_or_else(|| part(&name, &expected, "none".to_owned()))?;
-                if found.dims() != variable.dims() {
-                    return Err(part(&name, &expected, format!("{:?}", found.dims())));
-                }
-                variable.set(found)?;
+            let (name, variable) = (format!("{}.weight", layer.name), &layer.weights);
+            let expected = format!("{:?}", variable.dims());
+            let found = tensors.get(&name).ok_or_else(|| part(&name, &expected, "none".to_owned()))?;
+            if found.dims() != variable.dims() {
+                return Err(part(&name, &expected, format!("{:?}", found.dims())));
             }
+            variable.set(found)?;
         }
         Ok(network)
     }

@@ -164,12 +164,7 @@ impl State {
     /// From the same numbers.
     pub fn of_values<const N: usize>(values: &[Dual<N>; Self::LEN]) -> Self {
         let [x_m, y_m, heading_rad, ahead, left, yaw, felt_x, felt_y] = values.map(|dual| dual.value);
-        Self {
-            at_m: [x_m, y_m],
-            heading_rad,
-            velocity: [ahead, left, yaw],
-            specific_mps2: [felt_x, felt_y],
-        }
+        Self { at_m: [x_m, y_m], heading_rad, velocity: [ahead, left, yaw], specific_mps2: [felt_x, felt_y] }
     }
 }
 

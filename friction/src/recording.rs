@@ -1,5 +1,7 @@
 //! A drive over ground that is seen from above, and its windows of two seconds.
 
+mod file;
+
 use crate::chassis::Chassis;
 use crate::reasoning::{Controls, State};
 use crate::roll_out::{PERIOD_S, STEPS, SUBSTEPS};
@@ -174,7 +176,8 @@ impl Recording {
             .collect()
     }
 
-    fn window(&self, chassis: &Chassis, recording: usize, first: usize) -> Window {
+    /// The window that begins with a moment.
+    pub fn window(&self, chassis: &Chassis, recording: usize, first: usize) -> Window {
         let begin_s = self.moments[first].time_s;
         let sub_s = PERIOD_S / SUBSTEPS as f64;
         let control = |k: usize| {

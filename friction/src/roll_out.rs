@@ -36,8 +36,7 @@ impl Ground {
     fn surface<const N: usize>(&self, coefficient: impl Fn(usize, usize) -> Dual<N>) -> Surface<N> {
         let [east, north] = self.gradient;
         let across_mps2 = GRAVITY_MPS2 / (1.0 + east * east + north * north).sqrt();
-        let friction =
-            |wheel: usize| Coefficients(std::array::from_fn(|which| coefficient(wheel, which)));
+        let friction = |wheel: usize| Coefficients(std::array::from_fn(|which| coefficient(wheel, which)));
         Surface {
             friction: std::array::from_fn(friction),
             pull_mps2: [-east * across_mps2, -north * across_mps2],

@@ -55,14 +55,7 @@ pub struct Settings {
 
 impl Default for Settings {
     fn default() -> Self {
-        Self {
-            losses: Losses::Both,
-            prior_weight: 1.0,
-            batches: 400,
-            batch: 8,
-            learning_rate: 3e-3,
-            seed: 1,
-        }
+        Self { losses: Losses::Both, prior_weight: 1.0, batches: 400, batch: 8, learning_rate: 3e-3, seed: 1 }
     }
 }
 
@@ -95,10 +88,7 @@ impl Lesson {
 pub fn wheels_m(chassis: &Chassis, state: &State) -> [[f64; 2]; 4] {
     let (sin, cos) = state.heading_rad.sin_cos();
     chassis.contacts_m().map(|[ahead_m, left_m]| {
-        [
-            state.at_m[0] + ahead_m * cos - left_m * sin,
-            state.at_m[1] + ahead_m * sin + left_m * cos,
-        ]
+        [state.at_m[0] + ahead_m * cos - left_m * sin, state.at_m[1] + ahead_m * sin + left_m * cos]
     })
 }
 
@@ -162,8 +152,8 @@ impl Patch {
         let pixels = std::array::from_fn(|step| {
             wheels_m(&lesson.chassis, window.before(step)).map(|at_m| {
                 let place = view.pixel(at_m);
-                let [row, col] = [0, 1]
-                    .map(|i| (place[i] as i64 - corner[i]).clamp(0, PATCH as i64 - 1) as usize);
+                let [row, col] =
+                    [0, 1].map(|i| (place[i] as i64 - corner[i]).clamp(0, PATCH as i64 - 1) as usize);
                 row * PATCH + col
             })
         });
@@ -302,7 +292,12 @@ impl Run<'_> {
     }
 
     /// Mean over patches of the absolute difference from the published coefficients of each pixel's class (equation 24).
-    fn prior_loss(&self, windows: &[&Window], patches: &[Patch], seen: &Tensor) -> candle_core::Result<Tensor> {
+    fn prior_loss(
+        &self,
+        windows: &[&Window],
+        patches: &[Patch],
+        seen: &Tensor,
+    ) -> candle_core::Result<Tensor> {
         let mut published = Vec::with_capacity(windows.len() * PATCH * PATCH * 4);
         for (window, patch) in windows.iter().zip(patches) {
             let recording = &self.lessons[window.recording].recording;

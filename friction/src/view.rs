@@ -25,7 +25,9 @@ pub struct View {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ViewError {
     /// No colour, or no height, or a shape that is none.
-    #[error("view: expected {CHANNELS} channels (red, green, blue, height) of {n_rows} x {n_cols} pixels, found {found} numbers")]
+    #[error(
+        "view: expected {CHANNELS} channels (red, green, blue, height) of {n_rows} x {n_cols} pixels, found {found} numbers"
+    )]
     Shape {
         /// Rows.
         n_rows: usize,

@@ -180,7 +180,13 @@ fn friction_never_gives_energy() {
 }
 
 fn wheel<const N: usize>(edge_mps: Dual<N>, slip_stiffness: Dual<N>) -> WheelInput<N> {
-    WheelInput { edge_mps, steering_rad: Dual::from(0.2), slip_stiffness, grip: 0.9.into(), load_n: 3000.0.into() }
+    WheelInput {
+        edge_mps,
+        steering_rad: Dual::from(0.2),
+        slip_stiffness,
+        grip: 0.9.into(),
+        load_n: 3000.0.into(),
+    }
 }
 
 #[test]

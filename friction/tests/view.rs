@@ -22,7 +22,10 @@ fn a_picture_without_colour_or_with_other_pixels_or_holes_is_refused() {
     let grey = refused(&|view| {
         view.values.drain(..3 * n);
     });
-    assert_eq!(grey, "view: expected 4 channels (red, green, blue, height) of 20 x 24 pixels, found 480 numbers");
+    assert_eq!(
+        grey,
+        "view: expected 4 channels (red, green, blue, height) of 20 x 24 pixels, found 480 numbers"
+    );
     let coarse = refused(&|view| view.resolution_m = 1.0);
     assert_eq!(coarse, "view: expected pixels of 0.5 m, found 1 m");
     let hole = refused(&|view| view.values[3 * n + 24 + 2] = f32::NAN);
@@ -61,7 +64,8 @@ fn weights_come_back_as_they_were_and_others_are_refused() {
     assert_eq!(network.see(&view()).unwrap(), again.see(&view()).unwrap());
     assert_ne!(network.see(&view()).unwrap(), Network::new(0.5, 8).unwrap().see(&view()).unwrap());
     assert!(Network::from_bytes(b"nothing").is_err());
-    let empty = safetensors::serialize(Vec::<(String, safetensors::tensor::TensorView<'_>)>::new(), None).unwrap();
+    let empty =
+        safetensors::serialize(Vec::<(String, safetensors::tensor::TensorView<'_>)>::new(), None).unwrap();
     let told = Network::from_bytes(&empty).err().unwrap().to_string();
     assert_eq!(told, "weights: resolution_m: expected a number of metres, found None");
 }

@@ -31,8 +31,12 @@ fn a_world_is_its_seed_and_holds_all_grounds_in_many_colours() {
     for ground in 0..7_u8 {
         let of_it = || first.grounds.values().iter().filter(|found| **found == ground);
         assert!(of_it().count() > 200, "{}", PAINTED_GROUNDS[usize::from(ground)].0);
-        let first_colour =
-            first.grounds.values().iter().position(|found| *found == ground).map(|i| first.colours.values()[i]);
+        let first_colour = first
+            .grounds
+            .values()
+            .iter()
+            .position(|found| *found == ground)
+            .map(|i| first.colours.values()[i]);
         let mut colours = first.grounds.values().iter().zip(first.colours.values());
         assert!(colours.any(|(found, colour)| *found == ground && Some(*colour) != first_colour));
     }

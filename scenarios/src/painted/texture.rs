@@ -33,18 +33,7 @@ type Pattern = (f32, f32, f64, f32, f32, f64, f32);
 
 const fn texture(colour: Colour, spot: Colour, pattern: Pattern) -> Texture {
     let (grain, blotch, blotch_m, spots, stripe, stripe_m, relief_m) = pattern;
-    Texture {
-        colour,
-        grain,
-        blotch,
-        blotch_m,
-        spots,
-        spot,
-        stripe,
-        stripe_m,
-        relief_m,
-        direction_rad: 0.0,
-    }
+    Texture { colour, grain, blotch, blotch_m, spots, spot, stripe, stripe_m, relief_m, direction_rad: 0.0 }
 }
 
 /// Families of each ground in the order of [`super::PAINTED_GROUNDS`]; the last of each is held out.
@@ -163,10 +152,7 @@ impl Light {
         let is_bright = usize::from(rng.random_bool(0.5));
         let gain: f32 = rng.random_range(gains[is_bright].clone());
         let tint: f32 = rng.random_range(tints);
-        Self {
-            tint: [gain * (1.0 + tint), gain, gain * (1.0 - tint)],
-            autumn: rng.random_range(seasons),
-        }
+        Self { tint: [gain * (1.0 + tint), gain, gain * (1.0 - tint)], autumn: rng.random_range(seasons) }
     }
 
     /// A pixel under this light.
