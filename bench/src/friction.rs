@@ -6,6 +6,7 @@
 
 mod drive;
 mod score;
+pub mod seen;
 
 use bicycle::{DriveLogError, Vehicle};
 use friction::{Chassis, Drive, FindError, Grip, find_friction};
@@ -74,6 +75,9 @@ pub enum FrictionBenchError {
     /// A drive says nothing.
     #[error(transparent)]
     Find(#[from] FindError),
+    /// A network learns nothing.
+    #[error(transparent)]
+    Training(#[from] friction::TrainingError),
     /// The system refused the threads.
     #[error("threads: {0}")]
     Threads(#[from] rayon::ThreadPoolBuildError),

@@ -38,6 +38,26 @@ impl Mean {
     }
 }
 
+impl Mean {
+    /// Of sums over numbers of cases, the groups drawn anew for the interval; no case is no mean.
+    pub(crate) fn of_ratios(groups: &[(f64, f64)]) -> Option<Self> {
+        let ratio = |groups: &mut dyn Iterator<Item = (f64, f64)>| {
+            let (sum, n) = groups.fold((0.0, 0.0), |all, group| (all.0 + group.0, all.1 + group.1));
+            sum / n
+        };
+        if groups.is_empty() {
+            return None;
+        }
+        let mut rng = Xoshiro256PlusPlus::seed_from_u64(SEED);
+        let mut means: Vec<f64> = (0..N_DRAWS)
+            .map(|_| ratio(&mut (0..groups.len()).map(|_| groups[rng.random_range(0..groups.len())])))
+            .collect();
+        means.sort_by(f64::total_cmp);
+        let at = |share: f64| means[(share * (N_DRAWS - 1) as f64).round() as usize];
+        Some(Self { value: ratio(&mut groups.iter().copied()), low: at(0.025), high: at(0.975) })
+    }
+}
+
 /// Where 95 % of such intervals hold the true probability of what came `n_hit` times in `n` > 0 trials
 /// (Wilson 1927): all probabilities that a score test at 5 % would not reject.
 pub fn wilson_interval(n_hit: usize, n: usize) -> [f64; 2] {

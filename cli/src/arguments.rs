@@ -49,7 +49,7 @@ pub use crossings::{BenchCrossingsArguments, CrossingHandling};
 pub use deviation::AskedDeviation;
 pub use doctor::DoctorArguments;
 pub use drive::{Correct, DriveArguments, MapSource, Method, Pace};
-pub use friction::{BenchFrictionArguments, TrainFrictionArguments};
+pub use friction::{BenchFrictionArguments, FrictionSource, TrainFrictionArguments};
 pub use gap::{
     GapApplyArguments, GapCommand, GapDiagnoseArguments, GapEffectsArguments, GapSimulatorArguments,
 };

@@ -27,6 +27,7 @@ pub mod crossings;
 pub mod drive;
 pub mod effects;
 pub mod friction;
+pub mod friction_seen;
 pub mod gap;
 pub mod gap_closed_loop;
 pub mod gap_score;

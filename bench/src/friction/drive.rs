@@ -19,8 +19,8 @@ use super::FrictionBenchError;
 const DRIVE_S: f64 = 120.0;
 const DRIVE_MIN_S: f64 = 40.0;
 /// Rows a second [Hz], and driving before the first.
-const LOG_HZ: f64 = 50.0;
-const RUN_UP_S: f64 = 2.0;
+pub(super) const LOG_HZ: f64 = 50.0;
+pub(super) const RUN_UP_S: f64 = 2.0;
 /// Starts of a drive, at most.
 const ATTEMPTS: u64 = 20;
 /// Width of a stripe of one ground and half of the side of the world, over the wheelbase.
@@ -100,12 +100,13 @@ fn world(grounds: &[Ground; 3], wheelbase_m: f64) -> Result<World, FrictionBench
 }
 
 /// Somebody who drives each ground hard or gently and knows the friction of none.
-struct Driver {
+pub(super) struct Driver {
     rng: Xoshiro256PlusPlus,
     fast_mps: f64,
     /// What the vehicle stands before it tips [m/s2].
     tipping_mps2: f64,
     wheelbase_m: f64,
+    half_side_m: f64,
     steering_max_rad: f64,
     speed_mps: f64,
     wanted_mps: f64,
@@ -116,13 +117,15 @@ struct Driver {
 }
 
 impl Driver {
-    fn new(vehicle: &Vehicle, fast_mps: f64, rng: Xoshiro256PlusPlus) -> Self {
+    /// On a square of ground of half a side around the origin.
+    pub(super) fn new(vehicle: &Vehicle, fast_mps: f64, half_side_m: f64, rng: Xoshiro256PlusPlus) -> Self {
         let height_m = vehicle.body.cog_height_m;
         Self {
             rng,
             fast_mps,
             tipping_mps2: 9.81 * vehicle.geometry.track_m / (2.0 * height_m),
             wheelbase_m: vehicle.geometry.wheelbase_m,
+            half_side_m,
             steering_max_rad: vehicle.limits.steering_max_rad,
             speed_mps: 0.0,
             wanted_mps: 0.5 * fast_mps,
@@ -150,7 +153,7 @@ impl Driver {
         self.until_s = time_s + rng.random_range(held_s);
     }
 
-    fn command(&mut self, time_s: f64, pose: &Pose, is_aggressive: bool) -> Command {
+    pub(super) fn command(&mut self, time_s: f64, pose: &Pose, is_aggressive: bool) -> Command {
         let most_mps2 = if is_aggressive { 0.8 } else { 0.12 } * self.tipping_mps2;
         if time_s >= self.until_s || self.lateral_mps2.abs() > most_mps2 {
             self.change(time_s, is_aggressive);
@@ -159,7 +162,7 @@ impl Driver {
         self.speed_mps += (self.wanted_mps - self.speed_mps).clamp(-step_mps, step_mps);
         let fast_mps = self.speed_mps.max(0.3 * self.fast_mps);
         let angle_rad = |lateral_mps2: f64| (lateral_mps2 * self.wheelbase_m / (fast_mps * fast_mps)).atan();
-        let distance_share = pose.x_m.hypot(pose.y_m) / (HALF_SIDE_WHEELBASES * self.wheelbase_m);
+        let distance_share = pose.x_m.hypot(pose.y_m) / self.half_side_m;
         self.is_returning = distance_share > if self.is_returning { 0.35 } else { 0.5 };
         let wanted_rad = if self.is_returning {
             let error_rad = (-pose.y_m).atan2(-pose.x_m) - pose.yaw_rad;
@@ -188,7 +191,12 @@ pub(super) fn test_drive(shipped: &Vehicle, seed: u64) -> Result<TestDrive, Fric
     described.body.inertia_kgm2[2] *= rng.random_range(0.7..1.3);
     let wheel_scale = rng.random_range(0.98..1.02);
     for attempt in 0..ATTEMPTS {
-        let driver = Driver::new(&vehicle, fast_mps, stream(seed, &[0xD21F, attempt]));
+        let driver = Driver::new(
+            &vehicle,
+            fast_mps,
+            HALF_SIDE_WHEELBASES * wheelbase_m,
+            stream(seed, &[0xD21F, attempt]),
+        );
         let mut run = Run::begin(&vehicle, &world, grounds, driver, seed ^ (attempt << 32))?;
         run.drive(wheel_scale)?;
         if run.log.n_rows() as f64 >= DRIVE_MIN_S * LOG_HZ {

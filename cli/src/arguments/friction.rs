@@ -1,6 +1,6 @@
 //! `surefoot train friction` and `surefoot bench friction`.
 
-use clap::Args;
+use clap::{Args, ValueEnum};
 
 use super::values;
 
@@ -8,7 +8,8 @@ use super::values;
 #[derive(Args, Clone, Debug)]
 #[command(after_long_help = TRAIN_AFTER_HELP)]
 pub struct TrainFrictionArguments {
-    /// Drive log (CSV) with a column `ground`, or FILE=GROUND for a drive on one ground; several follow each other
+    /// Drive log (CSV) with a column `ground`, or FILE=GROUND for a drive on one ground; or recordings over pictures from above
+    /// (.safetensors); several follow each other
     #[arg(long, value_name = "FILE[=GROUND]", num_args = 1.., required = true)]
     pub train: Vec<String>,
 
@@ -42,6 +43,12 @@ curve to plan with, found or published, and what is known of its friction.
 A drive log has the columns t, wheel_speed, wz, steer_meas or cmd_steer, and vx and vy or x, y and yaw; ax and ay of an
 inertial unit at the rear axle, roll and pitch make it better. Grounds: asphalt, rock, dirt, grass, mud, sand, ice.
 
+From recordings over pictures a network learns to see friction, and is written as friction.safetensors: from the motion, and
+where every recording tells the class of its pixels, from published coefficients as well. A recording is a file of
+safetensors with `image` (F32 [4, rows, columns]: red, green, blue from 0 to 1, height in metres; row 0 in the south), `moments`
+(F64 [instants, 15]: t, x, y, yaw, vx, vy, wz, four wheel speeds, steering, ax, ay and wz of the inertial unit; every 0.1 s or
+more often), if known `classes` (U8 [rows, columns], 0 asphalt to 6 ice) and resolution_m, west_m and south_m in its header.
+
 Examples:
   surefoot train friction --train meadow.csv=grass lake.csv=ice --vehicle sedan
   surefoot train friction --train mixed.csv --vehicle mine.toml
@@ -51,16 +58,16 @@ Examples:
 #[derive(Args, Clone, Debug)]
 #[command(after_long_help = BENCH_AFTER_HELP)]
 pub struct BenchFrictionArguments {
-    /// The machines, shipped names or paths, separated by commas
-    #[arg(
-        long,
-        value_name = "NAME|FILE,..",
-        value_delimiter = ',',
-        default_value = "sedan,pietra_full_size,buggy_fifth,ut_automata"
-    )]
+    /// What friction is found from
+    #[arg(long, value_enum, default_value = "drives")]
+    pub from: FrictionSource,
+
+    /// The machines, shipped names or paths, separated by commas [default: sedan,pietra_full_size, and from drives also
+    /// buggy_fifth,ut_automata]
+    #[arg(long, value_name = "NAME|FILE,..", value_delimiter = ',')]
     pub vehicles: Vec<String>,
 
-    /// Drives of each machine
+    /// Drives of each machine; from pictures those of the test
     #[arg(long, value_name = "N", value_parser = values::seed_count, default_value = "10",
           allow_hyphen_values = true)]
     pub seeds: u64,
@@ -79,6 +86,30 @@ pub struct BenchFrictionArguments {
     pub results: super::ResultArguments,
 }
 
+/// Where friction comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum FrictionSource {
+    /// Drives over grounds of known classes, without labels of friction
+    Drives,
+    /// Pictures of the ground from above: the paper's tables 1 and 4
+    Pictures,
+}
+
+impl BenchFrictionArguments {
+    /// The machines asked for, or those of the published tables.
+    pub fn vehicles(&self) -> Vec<String> {
+        let usual: &[&str] = match self.from {
+            FrictionSource::Drives => &["sedan", "pietra_full_size", "buggy_fifth", "ut_automata"],
+            FrictionSource::Pictures => &["sedan", "pietra_full_size"],
+        };
+        if self.vehicles.is_empty() {
+            usual.iter().map(|name| (*name).to_owned()).collect()
+        } else {
+            self.vehicles.clone()
+        }
+    }
+}
+
 /// Leaves room above for as many as may be driven.
 fn first_seed(word: &str) -> Result<u64, String> {
     let seed = values::seed(word)?;
@@ -94,7 +125,12 @@ pub(super) const BENCH_ABOUT: &str = "\
 Finds friction without labels on drives of the plant whose friction is known, and holds it against the truth.
 
 Every drive of 120 s crosses stripes of three grounds, each with its published friction times 0.6 to 1.4, some driven hard and \
-some gently. Sensors are noisy; the stated inertia is off by up to 30 %, the wheel speed by up to 2 %.";
+some gently. Sensors are noisy; the stated inertia is off by up to 30 %, the wheel speed by up to 2 %.
+
+With --from pictures a network sees friction in pictures from above (AnyNav, sections 3.1 to 3.3.1): it learns from drives \
+over worlds of seven textured grounds, from motion, from published coefficients and from both, and predicts two seconds of \
+motion over worlds of textures, light and season that it never saw, beside a kinematic bicycle, a particle filter, a residual \
+network and one friction for all ground.";
 
 const BENCH_AFTER_HELP: &str = "\
 Writes friction.png, and friction.json with
@@ -102,5 +138,11 @@ Writes friction.png, and friction.json with
   score     shares, with their cases
   verdict   whether each part of the rule holds
 
-Example:
-  surefoot bench friction --vehicles sedan --seeds 5 --first-seed 1";
+With --from pictures: friction.png, the network as friction.safetensors, and friction.json with
+  rows      of each method: errors over all windows, and by ground
+  grounds   friction as seen, by class
+  verdicts  whether each part of the rule holds
+
+Examples:
+  surefoot bench friction --vehicles sedan --seeds 5 --first-seed 1
+  surefoot bench friction --from pictures";

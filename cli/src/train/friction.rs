@@ -1,5 +1,7 @@
 //! `surefoot train friction`: drives read, friction found, the table written.
 
+mod pictures;
+
 use std::path::Path;
 
 use bicycle::DriveLog;
@@ -22,6 +24,9 @@ struct Named {
 
 pub(crate) fn run_friction(arguments: &TrainFrictionArguments) -> anyhow::Result<()> {
     let vehicle = read_vehicle(&arguments.vehicle).map_err(UsageError::from_input)?;
+    if arguments.train.iter().any(|word| pictures::is_recording(word)) {
+        return pictures::run(arguments, &Chassis::of(&vehicle));
+    }
     let names =
         ColumnNames::parse(arguments.columns.iter().map(String::as_str)).map_err(UsageError::from_input)?;
     let drives =
