@@ -83,6 +83,12 @@ impl Chassis {
         }
     }
 
+    /// Mean of the driven wheels' circumferential speeds [m/s].
+    pub fn driven_mps(&self, edge_mps: &[f64; 4]) -> f64 {
+        let driven: Vec<f64> = (0..4).filter(|i| self.driven[i / 2]).map(|i| edge_mps[i]).collect();
+        driven.iter().sum::<f64>() / driven.len().max(1) as f64
+    }
+
     /// Contacts from the centre of mass, ahead and left [m].
     pub fn contacts_m(&self) -> [[f64; 2]; 4] {
         let (ahead_m, behind_m, left_m) =

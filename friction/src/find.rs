@@ -97,8 +97,12 @@ pub fn find_friction(
     }
     let (samples, n_runs) = gather(chassis, classes.len(), drives)?;
     let layout = Layout { n_runs, n_classes: classes.len() };
-    let problem = Problem { chassis, classes, samples: &samples, layout };
-    let (fit, scale_mps2) = problem.solve();
+    let runs = (0..n_runs).flat_map(|_| run_beliefs());
+    let of_classes = classes.iter().flat_map(|(_, published)| class_beliefs(published));
+    let beliefs: Vec<Belief> = vehicle_beliefs().into_iter().chain(runs).chain(of_classes).collect();
+    let starts = STARTS.map(|level| start(&beliefs, layout, level));
+    let problem = Problem { chassis, classes, samples: &samples, layout, beliefs };
+    let (fit, scale_mps2) = problem.solve(&starts);
     let doubted: Vec<bool> =
         (0..classes.len()).map(|class| problem.may_hold_more(&fit, class, scale_mps2)).collect();
     let grounds = judge(&problem, &fit, &doubted);
@@ -135,36 +139,33 @@ pub(crate) struct Problem<'a> {
     pub classes: &'a [(&'a str, FrictionCurve)],
     pub samples: &'a [Sample],
     pub layout: Layout,
+    pub beliefs: Vec<Belief>,
+}
+
+/// All as believed, but for the level of friction.
+fn start(beliefs: &[Belief], layout: Layout, level: f64) -> Vec<f64> {
+    let mut start: Vec<f64> = beliefs.iter().map(|belief| belief.mean).collect();
+    for class in 0..layout.n_classes {
+        start[layout.class(class)] = level.ln();
+    }
+    start
 }
 
 impl Problem<'_> {
-    fn beliefs(&self) -> Vec<Belief> {
-        let runs = (0..self.layout.n_runs).flat_map(|_| run_beliefs());
-        let classes = self.classes.iter().flat_map(|(_, published)| class_beliefs(published));
-        vehicle_beliefs().into_iter().chain(runs).chain(classes).collect()
-    }
-
     /// The best of several starts with a guessed scatter, then from there with the scatter that is left.
-    fn solve(&self) -> (Fit, [f64; 3]) {
-        let beliefs = self.beliefs();
-        let from = |level: f64| {
-            let mut start: Vec<f64> = beliefs.iter().map(|belief| belief.mean).collect();
-            for class in 0..self.layout.n_classes {
-                start[self.layout.class(class)] = level.ln();
-            }
-            self.fit(&beliefs, &start, [MISFIT_MPS2; 3])
-        };
-        let fits = STARTS.map(from);
-        let best = fits.iter().min_by(|a, b| a.loss.total_cmp(&b.loss)).unwrap_or(&fits[0]);
-        let scale_mps2 = self.scatter_mps2(&best.values);
-        (self.fit(&beliefs, &best.values, scale_mps2), scale_mps2)
+    pub(crate) fn solve(&self, starts: &[Vec<f64>]) -> (Fit, [f64; 3]) {
+        let first = starts.iter().map(|start| self.fit(&self.beliefs, start, [MISFIT_MPS2; 3]));
+        let best = first.min_by(|a, b| a.loss.total_cmp(&b.loss));
+        let values = best.map_or_else(Vec::new, |fit| fit.values);
+        let scale_mps2 = self.scatter_mps2(&values);
+        (self.fit(&self.beliefs, &values, scale_mps2), scale_mps2)
     }
 
     /// Whether a class could as well hold much more than was found: forces that end where the driving ended look like
     /// forces at a limit to a fit whose tyres are as stiff as it likes. All else is sought anew.
     fn may_hold_more(&self, fit: &Fit, class: usize, scale_mps2: [f64; 3]) -> bool {
         let place = self.layout.class(class);
-        let mut beliefs = self.beliefs();
+        let mut beliefs = self.beliefs.clone();
         let more = fit.values[place] + MUCH_MORE.ln();
         let Belief { high, .. } = beliefs[place];
         beliefs[place].low = more.min(high);

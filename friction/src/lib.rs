@@ -23,6 +23,7 @@ mod neighbours;
 mod network;
 mod reasoning;
 mod recording;
+mod refine;
 mod roll_out;
 mod samples;
 mod table;
@@ -40,10 +41,11 @@ pub use reasoning::{
     Coefficients, Controls, Plane, Push, State, Surface, TyreUse, Velocity, WheelInput, push, wheel_force,
 };
 pub use recording::{Moment, Recording, RecordingError, Window};
+pub use refine::{Held, Refined, refine};
 pub use roll_out::{CoefficientGradient, Ground, PERIOD_S, STEPS, SUBSTEPS, loss_gradient, roll_out};
 pub use samples::DriveError;
 pub use table::{FrictionTable, TableError};
 pub use training::{
-    Lesson, Losses, Seen, Settings, TrainingError, coefficients_of, predict, train, wheels_m,
+    Labels, Lesson, Losses, Seen, Settings, TrainingError, coefficients_of, predict, train, wheels_m,
 };
 pub use view::{CHANNELS, Slopes, View, ViewError};

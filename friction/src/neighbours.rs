@@ -1,9 +1,9 @@
 //! Each pixel with the eight around it in one row, so that a convolution is a product of matrices: Candle's own is slow to
 //! differentiate on a processor.
 
-use candle_core::{CpuStorage, CustomOp1, Device, Layout, Result, Shape, Tensor};
+use candle_core::{CpuStorage, CustomOp1, DType, Device, Layout, Result, Shape, Tensor, WithDType};
 
-/// From [batch, row, column, channel] to [pixel, 9 channels and a one], zeros beyond the edges.
+/// From [batch, row, column, channel] to [pixel, 9 channels and a one], zeros beyond the edges; of either precision.
 pub(crate) struct Neighbours;
 
 /// Calls with the first number of each neighbour in the picture, and its place among the nine.
@@ -19,6 +19,32 @@ fn for_each([n, n_rows, n_cols]: [usize; 3], mut visit: impl FnMut(usize, usize,
     }
 }
 
+fn gathered<T: WithDType>(values: &[T], [n, n_rows, n_cols, n_channels]: [usize; 4]) -> Vec<T> {
+    let width = 9 * n_channels + 1;
+    let mut all = vec![T::zero(); n * n_rows * n_cols * width];
+    all.chunks_exact_mut(width).for_each(|row| row[width - 1] = T::one());
+    for_each([n, n_rows, n_cols], |index, k, other| {
+        let to = index * width + k * n_channels;
+        all[to..to + n_channels].copy_from_slice(&values[other * n_channels..(other + 1) * n_channels]);
+    });
+    all
+}
+
+/// The transpose: every pixel is sent the sum of what stands where it was copied to.
+fn scattered<T: WithDType>(gradient: &Tensor, shape: [usize; 4]) -> Result<Tensor> {
+    let [n, n_rows, n_cols, n_channels] = shape;
+    let width = 9 * n_channels + 1;
+    let gradient = gradient.flatten_all()?.to_vec1::<T>()?;
+    let mut sums = vec![T::zero(); n * n_rows * n_cols * n_channels];
+    for_each([n, n_rows, n_cols], |index, k, other| {
+        let from = &gradient[index * width + k * n_channels..][..n_channels];
+        for (sum, from) in sums[other * n_channels..].iter_mut().zip(from) {
+            *sum += *from;
+        }
+    });
+    Tensor::from_vec(sums, shape.as_slice(), &Device::Cpu)
+}
+
 impl CustomOp1 for Neighbours {
     fn name(&self) -> &'static str {
         "neighbours"
@@ -29,28 +55,22 @@ impl CustomOp1 for Neighbours {
         let Some((start, end)) = layout.contiguous_offsets() else {
             candle_core::bail!("neighbours: expected a contiguous tensor, found {layout:?}")
         };
-        let values = &storage.as_slice::<f32>()?[start..end];
-        let (n_pixels, width) = (n * n_rows * n_cols, 9 * n_channels + 1);
-        let mut all = vec![0.0_f32; n_pixels * width];
-        all.chunks_exact_mut(width).for_each(|row| row[width - 1] = 1.0);
-        for_each([n, n_rows, n_cols], |index, k, other| {
-            let to = index * width + k * n_channels;
-            all[to..to + n_channels].copy_from_slice(&values[other * n_channels..(other + 1) * n_channels]);
-        });
-        Ok((CpuStorage::F32(all), (n_pixels, width).into()))
+        let shape = [n, n_rows, n_cols, n_channels];
+        let all = match storage {
+            CpuStorage::F32(values) => CpuStorage::F32(gathered(&values[start..end], shape)),
+            CpuStorage::F64(values) => CpuStorage::F64(gathered(&values[start..end], shape)),
+            _ => candle_core::bail!("neighbours: expected numbers of 32 or 64 bit, found others"),
+        };
+        Ok((all, (n * n_rows * n_cols, 9 * n_channels + 1).into()))
     }
 
     fn bwd(&self, input: &Tensor, _output: &Tensor, gradient: &Tensor) -> Result<Option<Tensor>> {
         let (n, n_rows, n_cols, n_channels) = input.dims4()?;
-        let width = 9 * n_channels + 1;
-        let gradient = gradient.flatten_all()?.to_vec1::<f32>()?;
-        let mut sums = vec![0.0_f32; n * n_rows * n_cols * n_channels];
-        for_each([n, n_rows, n_cols], |index, k, other| {
-            let from = &gradient[index * width + k * n_channels..][..n_channels];
-            for (sum, from) in sums[other * n_channels..].iter_mut().zip(from) {
-                *sum += from;
-            }
-        });
-        Ok(Some(Tensor::from_vec(sums, input.dims(), &Device::Cpu)?))
+        let shape = [n, n_rows, n_cols, n_channels];
+        let sums = match gradient.dtype() {
+            DType::F64 => scattered::<f64>(gradient, shape),
+            _ => scattered::<f32>(gradient, shape),
+        };
+        sums.map(Some)
     }
 }

@@ -15,6 +15,11 @@ use crate::view::{CHANNELS, View, ViewError};
 const WIDTHS: [usize; 3] = [8, 16, 24];
 /// Sides of a picture have to be multiples of this.
 pub(crate) const STRIDE: usize = 4;
+/// So many pixels around one have a say in what is seen there: 2 convolutions and a halving down, 2 and a halving more, 2 at
+/// the bottom, and 2 and 2 and 1 on the way up reach 25; the next multiple of the stride.
+const REACH: usize = 28;
+/// Side of the parts in which large pictures are seen, so that memory does not grow with them.
+const TILE: usize = 200;
 /// Least and largest coefficients: static, sliding, viscous [s/m], Stribeck speed [m/s].
 pub(crate) const COEFFICIENTS: [[f64; 2]; 4] = [[0.02, 1.3], [0.02, 1.1], [0.0, 0.04], [0.2, 10.0]];
 /// Height over which the height channel is divided [m].
@@ -130,7 +135,7 @@ impl Network {
         Self::apply(&weights, input)
     }
 
-    fn apply(weights: &[Tensor], input: &Tensor) -> Result<Tensor> {
+    pub(crate) fn apply(weights: &[Tensor], input: &Tensor) -> Result<Tensor> {
         let run = |range: std::ops::Range<usize>, from: &Tensor| {
             weights[range]
                 .iter()
@@ -143,7 +148,8 @@ impl Network {
         let full = run(8..10, &Tensor::cat(&[doubled(&half)?, full], 3)?)?;
         let shares = candle_nn::ops::sigmoid(&convolved(&full, &weights[10])?)?;
         let row = |which: fn(&[f64; 2]) -> f64| {
-            Tensor::from_vec(COEFFICIENTS.iter().map(|ends| which(ends) as f32).collect(), 4, &Device::Cpu)
+            Tensor::from_vec(COEFFICIENTS.iter().map(which).collect(), 4, &Device::Cpu)?
+                .to_dtype(input.dtype())
         };
         let (low, width) = (row(|ends| ends[0])?, row(|ends| ends[1] - ends[0])?);
         shares.broadcast_mul(&width)?.broadcast_add(&low)
@@ -173,21 +179,52 @@ impl Network {
     /// # Errors
     /// A view that is none, or of another resolution.
     pub fn see(&self, view: &View) -> std::result::Result<Vec<[f32; 4]>, NetworkError> {
+        let [n_rows, n_cols] = [view.n_rows, view.n_cols];
+        let mut all = vec![[0.0; 4]; n_rows * n_cols];
+        for row in (0..n_rows).step_by(TILE) {
+            for col in (0..n_cols).step_by(TILE) {
+                let size = [TILE.min(n_rows - row), TILE.min(n_cols - col)];
+                let tile = self.see_part(view, [row, col], size)?;
+                for (i, pixels) in tile.chunks(size[1]).enumerate() {
+                    all[(row + i) * n_cols + col..][..size[1]].copy_from_slice(pixels);
+                }
+            }
+        }
+        Ok(all)
+    }
+
+    /// Coefficients of some rows and columns from a first one on: the same as of the whole view, pixels beyond whose edges are
+    /// those of the edges.
+    ///
+    /// # Errors
+    /// A view that is none, or of another resolution.
+    pub fn see_part(
+        &self,
+        view: &View,
+        [row, col]: [usize; 2],
+        size: [usize; 2],
+    ) -> std::result::Result<Vec<[f32; 4]>, NetworkError> {
         view.validate()?;
         let (expected_m, found_m) = (self.resolution_m, view.resolution_m);
         if (found_m / expected_m - 1.0).abs() > 1e-6 {
             return Err(ViewError::Resolution { expected_m, found_m }.into());
         }
-        let [n_rows, n_cols] = [view.n_rows, view.n_cols].map(|n| n.next_multiple_of(STRIDE));
-        let input = Self::input(view, [0, 0], [n_rows, n_cols]);
+        let [n_rows, n_cols] = size.map(|n| n.next_multiple_of(STRIDE) + 2 * REACH);
+        // Halves begin at the same pixels wherever the part begins.
+        let lead = [row % STRIDE, col % STRIDE];
+        let corner = [row, col].map(|place| (place / STRIDE * STRIDE) as i64 - REACH as i64);
+        let [n_rows, n_cols] = [n_rows + STRIDE, n_cols + STRIDE];
+        let input = Self::input(view, corner, [n_rows, n_cols]);
         let input = Tensor::from_vec(input, (1, n_rows, n_cols, CHANNELS), &Device::Cpu)?;
         // Detached: what nobody differentiates is not kept.
         let weights: Vec<Tensor> =
             self.layers.iter().map(|layer| layer.weights.as_detached_tensor()).collect();
-        let seen = Self::apply(&weights, &input)?.squeeze(0)?.to_vec3::<f32>()?;
-        let rows = seen.into_iter().take(view.n_rows);
-        let pixels = rows.flat_map(|row| row.into_iter().take(view.n_cols));
-        Ok(pixels.map(|pixel| std::array::from_fn(|i| pixel[i])).collect())
+        let seen = Self::apply(&weights, &input)?.flatten_all()?.to_vec1::<f32>()?;
+        let pixel = |i: usize, j: usize| {
+            let first = 4 * ((REACH + lead[0] + i) * n_cols + REACH + lead[1] + j);
+            std::array::from_fn(|k| seen[first + k])
+        };
+        Ok((0..size[0]).flat_map(|i| (0..size[1]).map(move |j| pixel(i, j))).collect())
     }
 
     pub(crate) fn variables(&self) -> Vec<Var> {
@@ -247,3 +284,6 @@ impl Network {
         Ok(network)
     }
 }
+
+#[cfg(test)]
+mod tests;

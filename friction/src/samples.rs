@@ -4,6 +4,7 @@ use bicycle::{Column, DriveLog, Run};
 use nalgebra::{Matrix3, Vector3};
 
 use crate::chassis::{Chassis, GRAVITY_MPS2};
+use crate::recording::{Moment, Recording};
 
 /// Time between instants that are used [s].
 pub(crate) const SPACING_S: f64 = 0.04;
@@ -169,6 +170,37 @@ pub(crate) fn samples(
         first_row += n_rows;
         all.extend(of_run(chassis, &signals, classes, first_run + index, slow_mps));
     }
+    if all.len() < SAMPLES_MIN {
+        return Err(DriveError::TooShort { slow_mps, found: all.len() });
+    }
+    Ok(all)
+}
+
+/// The same of a recording over a picture, as one run.
+pub(crate) fn of_recording(
+    chassis: &Chassis,
+    recording: &Recording,
+    classes: &[usize],
+    run: usize,
+) -> Result<Vec<Sample>, DriveError> {
+    let moments = &recording.moments;
+    let column = |of: fn(&Moment) -> f64| moments.iter().map(of).collect::<Vec<f64>>();
+    let wheel_mps: Vec<f64> = moments.iter().map(|moment| chassis.driven_mps(&moment.edge_mps)).collect();
+    let [ahead, left] = [column(|m| m.velocity_mps[0]), column(|m| m.velocity_mps[1])];
+    let felt = [column(|m| m.felt[0]), column(|m| m.felt[1])];
+    let signals = Signals {
+        time_s: &column(|m| m.time_s),
+        wheel_mps: &wheel_mps,
+        steering_rad: &column(|m| m.steering_rad),
+        yaw_radps: &column(|m| m.yaw_radps),
+        velocity_mps: Some([&ahead, &left]),
+        place_m: None,
+        yaw_rad: None,
+        specific_mps2: Some([&felt[0], &felt[1]]),
+        attitude_rad: None,
+    };
+    let slow_mps = SLOW_FROUDE * (GRAVITY_MPS2 * chassis.wheelbase_m).sqrt();
+    let all: Vec<Sample> = of_run(chassis, &signals, classes, run, slow_mps).collect();
     if all.len() < SAMPLES_MIN {
         return Err(DriveError::TooShort { slow_mps, found: all.len() });
     }

@@ -59,6 +59,9 @@ impl Default for Settings {
     }
 }
 
+/// By pixel, coefficients that prior knowledge or a drive tells.
+pub type Labels = Vec<Option<[f32; 4]>>;
+
 /// A recording with the vehicle that made it.
 #[derive(Clone, Debug)]
 pub struct Lesson {
@@ -69,13 +72,23 @@ pub struct Lesson {
     slopes: Slopes,
     /// Its windows.
     pub windows: Vec<Window>,
+    /// What the loss by prior knowledge is taken from, where somebody knows anything.
+    labels: Option<Labels>,
 }
 
 impl Lesson {
-    /// Of a validated recording.
+    /// Of a validated recording, labelled with the published coefficients of its classes.
     pub fn new(chassis: Chassis, recording: Recording, index: usize) -> Self {
         let windows = recording.windows(&chassis, index);
-        Self { slopes: recording.view.slopes(), windows, chassis, recording }
+        let published =
+            |classes: &Vec<u8>| classes.iter().map(|class| Some(coefficients_of(*class))).collect();
+        let labels = recording.classes.as_ref().map(published);
+        Self { slopes: recording.view.slopes(), windows, chassis, recording, labels }
+    }
+
+    /// The same with other labels, one for each pixel.
+    pub fn labelled(self, labels: Labels) -> Self {
+        Self { labels: Some(labels), ..self }
     }
 
     /// Rise of the ground at a place [-].
@@ -166,11 +179,10 @@ pub(crate) fn window_gradient(
     lesson: &Lesson,
     window: &Window,
     patch: &Patch,
-    coefficients: &[f32],
+    coefficients: &[f64],
 ) -> (f64, CoefficientGradient) {
     let grounds: [Ground; STEPS] = std::array::from_fn(|step| Ground {
-        coefficients: patch.pixels[step]
-            .map(|pixel| std::array::from_fn(|i| f64::from(coefficients[4 * pixel + i]))),
+        coefficients: patch.pixels[step].map(|pixel| std::array::from_fn(|i| coefficients[4 * pixel + i])),
         gradient: lesson.gradient(window.before(step).at_m),
     });
     loss_gradient(&lesson.chassis, &window.start, &window.controls, &grounds, &|step, state| {
@@ -202,7 +214,7 @@ pub fn train(
     if windows.is_empty() {
         return Err(TrainingError::NoWindow);
     }
-    if settings.losses != Losses::Motion && lessons.iter().any(|lesson| lesson.recording.classes.is_none()) {
+    if settings.losses != Losses::Motion && lessons.iter().any(|lesson| lesson.labels.is_none()) {
         return Err(TrainingError::NoClasses);
     }
     let mut run =
@@ -291,29 +303,33 @@ impl Run<'_> {
         Tensor::from_vec(all, (windows.len(), PATCH, PATCH, CHANNELS), &Device::Cpu)
     }
 
-    /// Mean over patches of the absolute difference from the published coefficients of each pixel's class (equation 24).
+    /// Mean over labelled pixels of the absolute difference from their labels (equation 24).
     fn prior_loss(
         &self,
         windows: &[&Window],
         patches: &[Patch],
         seen: &Tensor,
     ) -> candle_core::Result<Tensor> {
-        let mut published = Vec::with_capacity(windows.len() * PATCH * PATCH * 4);
+        let (mut told, mut weights) = (Vec::with_capacity(4 * windows.len() * PATCH * PATCH), Vec::new());
         for (window, patch) in windows.iter().zip(patches) {
-            let recording = &self.lessons[window.recording].recording;
-            let Some(classes) = &recording.classes else { continue };
+            let Lesson { recording, labels: Some(labels), .. } = &self.lessons[window.recording] else {
+                continue;
+            };
             for pixel in 0..PATCH * PATCH {
                 let place = |offset: usize, corner: i64, n: usize| {
                     (corner + offset as i64).clamp(0, n as i64 - 1) as usize
                 };
                 let row = place(pixel / PATCH, patch.corner[0], recording.view.n_rows);
                 let col = place(pixel % PATCH, patch.corner[1], recording.view.n_cols);
-                published.extend(coefficients_of(classes[row * recording.view.n_cols + col]));
+                let label = labels[row * recording.view.n_cols + col];
+                told.extend(label.unwrap_or_default());
+                weights.extend(COEFFICIENT_SCALES.map(|scale| label.map_or(0.0, |_| 1.0 / scale as f32)));
             }
         }
-        let published = Tensor::from_vec(published, seen.dims(), &Device::Cpu)?;
-        let scales: Vec<f32> = COEFFICIENT_SCALES.iter().map(|scale| (1.0 / scale) as f32).collect();
-        (seen - published)?.abs()?.broadcast_mul(&Tensor::from_vec(scales, 4, &Device::Cpu)?)?.mean_all()
+        let n_told = weights.iter().filter(|weight| **weight > 0.0).count().max(1);
+        let [told, weights] =
+            [told, weights].map(|values| Tensor::from_vec(values, seen.dims(), &Device::Cpu));
+        ((seen - told?)?.abs()? * weights?)?.sum_all()? / n_told as f64
     }
 }
 
@@ -331,9 +347,9 @@ pub(crate) fn surrogate(
     patches: &[Patch],
     seen: &Tensor,
 ) -> candle_core::Result<(Tensor, f64)> {
-    let values = seen.detach().flatten_all()?.to_vec1::<f32>()?;
+    let values = seen.detach().to_dtype(DType::F64)?.flatten_all()?.to_vec1::<f64>()?;
     let size = PATCH * PATCH * 4;
-    let mut slopes = vec![0.0_f32; values.len()];
+    let mut slopes = vec![0.0; values.len()];
     let mut sum = 0.0;
     for (index, (window, patch)) in windows.iter().zip(patches).enumerate() {
         let part = index * size..(index + 1) * size;
@@ -344,12 +360,12 @@ pub(crate) fn surrogate(
         for (pixels, gradient) in patch.pixels.iter().zip(&gradient) {
             for (pixel, gradient) in pixels.iter().zip(gradient) {
                 for (i, slope) in gradient.iter().enumerate() {
-                    slopes[4 * pixel + i] += (slope / windows.len() as f64) as f32;
+                    slopes[4 * pixel + i] += slope / windows.len() as f64;
                 }
             }
         }
     }
-    let slopes = Tensor::from_vec(slopes, seen.dims(), &Device::Cpu)?;
+    let slopes = Tensor::from_vec(slopes, seen.dims(), &Device::Cpu)?.to_dtype(seen.dtype())?;
     Ok(((seen * slopes)?.sum_all()?, sum))
 }
 

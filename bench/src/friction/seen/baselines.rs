@@ -37,7 +37,7 @@ pub(super) fn bicycle(lesson: &Lesson, window: &Window) -> Vec<State> {
     let step_s = PERIOD_S / SUBSTEPS as f64;
     for controls in window.controls.chunks(SUBSTEPS) {
         for controls in controls {
-            let speed_mps = driven_mps(chassis, &controls.edge_mps);
+            let speed_mps = chassis.driven_mps(&controls.edge_mps);
             let (sin, cos) = heading_rad.sin_cos();
             rear_m = [rear_m[0] + step_s * speed_mps * cos, rear_m[1] + step_s * speed_mps * sin];
             heading_rad += step_s * speed_mps * controls.steering_rad.tan() / chassis.wheelbase_m;
@@ -47,11 +47,6 @@ pub(super) fn bicycle(lesson: &Lesson, window: &Window) -> Vec<State> {
         states.push(State { at_m, heading_rad, ..window.start });
     }
     states
-}
-
-fn driven_mps(chassis: &Chassis, edge_mps: &[f64; 4]) -> f64 {
-    let driven: Vec<f64> = (0..4).filter(|i| chassis.driven[i / 2]).map(|i| edge_mps[i]).collect();
-    driven.iter().sum::<f64>() / driven.len().max(1) as f64
 }
 
 /// The reasoning with one level of the mean curve for all ground.
@@ -224,7 +219,7 @@ fn left_over(lesson: &Lesson, window: &Window) -> Vec<f32> {
 fn inputs(lesson: &Lesson, window: &Window) -> Vec<f32> {
     let mut inputs: Vec<f64> = window.start.velocity.map(|value| 0.2 * value).to_vec();
     for controls in window.controls.iter().skip(SUBSTEPS / 2).step_by(SUBSTEPS) {
-        inputs.push(0.2 * driven_mps(&lesson.chassis, &controls.edge_mps));
+        inputs.push(0.2 * lesson.chassis.driven_mps(&controls.edge_mps));
         inputs.push(4.0 * controls.steering_rad);
     }
     inputs.extend(picture_ahead(lesson, window));

@@ -27,12 +27,28 @@ const AGGRESSIVE_SPELLS: u64 = 7;
 const SPELL_S: f64 = 10.0;
 
 /// What sensors and descriptions err by.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Domain {
     /// By nothing, as in the paper's simulator.
     Exact,
-    /// Biased inertial unit, noisy wheel speeds and localisation, stated inertia off by up to 30 %.
-    Biased,
+    /// Biased inertial unit, noisy wheel speeds and localisation, and what is wrong with a machine in all of its drives.
+    Biased(Machine),
+}
+
+/// What descriptions and sensors of a machine say over what is [-].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Machine {
+    pub inertia_factor: f64,
+    pub wheel_scale: f64,
+}
+
+impl Machine {
+    /// Inertia off by 30 %, wheel speed by 3 %, either way.
+    pub(super) fn drawn(which: u64) -> Self {
+        let mut rng = stream(which, &[0x1E7]);
+        let mut either = |by: f64| if rng.random_bool(0.5) { 1.0 + by } else { 1.0 - by };
+        Self { inertia_factor: either(0.3), wheel_scale: either(0.03) }
+    }
 }
 
 /// Which drive.
@@ -98,8 +114,8 @@ fn put_together(
     let exact = Recording { view: view(painted), classes: None, moments: exact };
     let recording = Recording { view: exact.view.clone(), classes: told, moments: measured };
     let mut described = chassis.clone();
-    if job.domain == Domain::Biased {
-        described.yaw_inertia_kgm2 *= stream(job.seed, &[0x1E7]).random_range(0.7..1.3);
+    if let Domain::Biased(machine) = job.domain {
+        described.yaw_inertia_kgm2 *= machine.inertia_factor;
     }
     let lesson = Lesson::new(described, recording, index);
     let truth: Vec<Vec<State>> =
@@ -150,13 +166,11 @@ struct Sensors {
     domain: Domain,
     imu: Imu,
     odometry: OdometrySensor,
-    wheel_scale: f64,
     rng: Xoshiro256PlusPlus,
 }
 
 impl Sensors {
     fn new(domain: Domain, length_m: f64, seed: u64) -> Self {
-        let mut rng = stream(seed, &[0x5E45]);
         let (imu, odometry) = match domain {
             Domain::Exact => {
                 let none = ImuConfig {
@@ -169,7 +183,7 @@ impl Sensors {
                 };
                 (none, OdometryConfig::PERFECT)
             }
-            Domain::Biased => {
+            Domain::Biased(_) => {
                 let biased = ImuConfig {
                     acceleration_bias_mps2: 0.3,
                     rate_bias_radps: 0.01,
@@ -182,16 +196,15 @@ impl Sensors {
             domain,
             imu: Imu::new(imu, seed),
             odometry: OdometrySensor::new(odometry, seed),
-            wheel_scale: rng.random_range(0.97..1.03),
-            rng,
+            rng: stream(seed, &[0x5E45]),
         }
     }
 
     fn edges_mps(&mut self, edges_mps: [f64; 4]) -> [f64; 4] {
         match self.domain {
             Domain::Exact => edges_mps,
-            Domain::Biased => edges_mps.map(|edge_mps| {
-                self.wheel_scale * edge_mps + 0.15 * self.rng.sample::<f64, _>(StandardNormal)
+            Domain::Biased(machine) => edges_mps.map(|edge_mps| {
+                machine.wheel_scale * edge_mps + 0.15 * self.rng.sample::<f64, _>(StandardNormal)
             }),
         }
     }
