@@ -7,7 +7,8 @@
 //! far that can be known depends on the driving: where tyres never came near their limit a [`Grip`] says "at least".
 //!
 //! A [`Network`] sees the coefficients of every pixel of a [`View`]. [`train`] teaches it from [`Recording`]s: [`roll_out`]
-//! says where the vehicle goes over what is seen, [`loss_gradient`] what each coefficient on the way does to the error.
+//! says where the vehicle goes over what is seen, [`loss_gradient`] what each coefficient on the way does to the error. Where
+//! nobody tells classes, [`refine`] finds what drives say of places, for the network to learn.
 //!
 //! `examples/braking_distance.rs` lets locked wheels slide on three grounds.
 //!

@@ -22,6 +22,9 @@ const REACH: usize = 28;
 const TILE: usize = 200;
 /// Least and largest coefficients: static, sliding, viscous [s/m], Stribeck speed [m/s].
 pub(crate) const COEFFICIENTS: [[f64; 2]; 4] = [[0.02, 1.3], [0.02, 1.1], [0.0, 0.04], [0.2, 10.0]];
+/// What the mean of each colour is made to be: whatever the light and its tint, a large view holds much the same mixture
+/// (the grey-world assumption, Buchsbaum 1980).
+const MEAN_COLOUR: f32 = 0.45;
 /// Height over which the height channel is divided [m].
 const HEIGHT_SCALE_M: f32 = 0.05;
 
@@ -78,9 +81,9 @@ pub struct Network {
 /// Weights that make no network.
 #[derive(Debug, thiserror::Error)]
 pub enum NetworkError {
-    /// The file is none of safetensors.
+    /// The bytes are none of safetensors.
     #[error("weights: {0}")]
-    File(#[from] safetensors::SafeTensorError),
+    Bytes(#[from] safetensors::SafeTensorError),
     /// A part is missing or of another shape.
     #[error("weights: {part}: expected {expected}, found {found}")]
     Part {
@@ -155,18 +158,19 @@ impl Network {
         shares.broadcast_mul(&width)?.broadcast_add(&low)
     }
 
-    /// Pixels from a corner on as the network takes them, [row, column, channel]: colours about zero, heights less the mean of
-    /// the five by five pixels around, pixels beyond the edges repeated.
+    /// Pixels from a corner on as the network takes them, [row, column, channel]: colours over the view's mean, about zero,
+    /// heights less the mean of the five by five pixels around, pixels beyond the edges repeated.
     pub(crate) fn input(view: &View, [row, col]: [i64; 2], [n_rows, n_cols]: [usize; 2]) -> Vec<f32> {
         let at = |channel: usize, row: i64, col: i64| {
             let row = row.clamp(0, view.n_rows as i64 - 1) as usize;
             let col = col.clamp(0, view.n_cols as i64 - 1) as usize;
             view.values[(channel * view.n_rows + row) * view.n_cols + col]
         };
+        let scales = view.mean_colour().map(|mean| MEAN_COLOUR / mean.max(1e-3));
         let mut values = Vec::with_capacity(n_rows * n_cols * CHANNELS);
         for i in row..row + n_rows as i64 {
             for j in col..col + n_cols as i64 {
-                values.extend((0..3).map(|channel| 4.0 * (at(channel, i, j) - 0.5)));
+                values.extend((0..3).map(|channel| 4.0 * (scales[channel] * at(channel, i, j) - 0.5)));
                 let around = (0..25).map(|k| at(3, i + k / 5 - 2, j + k % 5 - 2)).sum::<f32>() / 25.0;
                 values.push((at(3, i, j) - around) / HEIGHT_SCALE_M);
             }

@@ -92,9 +92,9 @@ pub enum RecordingError {
     /// The picture is none.
     #[error(transparent)]
     View(#[from] ViewError),
-    /// The file is none of safetensors.
+    /// The bytes are none of safetensors.
     #[error("recording: {0}")]
-    File(#[from] safetensors::SafeTensorError),
+    Bytes(#[from] safetensors::SafeTensorError),
     /// A part is missing or not what it should be.
     #[error("recording: {part}: expected {expected}, found {found}")]
     Part {

@@ -19,7 +19,7 @@ use crate::training::{COEFFICIENT_SCALES, Labels, Lesson, Seen, coefficients_of,
 /// Looks are taken over this time to both sides [s].
 const LOOK_S: f64 = 0.3;
 /// How far a network's friction may be off, in the logarithm.
-const SEEN_DEVIATION: f64 = 0.3;
+const SEEN_DEVIATION: f64 = 0.6;
 
 /// What stays as it is described or measured: the rows of the paper's Table 5.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -55,7 +55,14 @@ pub struct Settings {
 
 impl Default for Settings {
     fn default() -> Self {
-        Self { losses: Losses::Both, prior_weight: 1.0, batches: 400, batch: 8, learning_rate: 3e-3, seed: 1 }
+        Self {
+            losses: Losses::Both,
+            prior_weight: 0.2,
+            batches: 1000,
+            batch: 8,
+            learning_rate: 3e-3,
+            seed: 1,
+        }
     }
 }
 
@@ -291,7 +298,7 @@ impl Run<'_> {
         for (window, patch) in windows.iter().zip(patches) {
             let view = &self.lessons[window.recording].recording.view;
             let mut input = Network::input(view, patch.corner, [PATCH; 2]);
-            let light: f32 = self.rng.random_range(0.75..1.25);
+            let light: f32 = self.rng.random_range(0.85..1.15);
             let tint: [f32; 3] = std::array::from_fn(|_| light * self.rng.random_range(0.94..1.06));
             for pixel in input.chunks_exact_mut(CHANNELS) {
                 for (value, tint) in pixel.iter_mut().zip(tint) {

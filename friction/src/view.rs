@@ -102,6 +102,15 @@ impl View {
         [place(1, self.n_rows), place(0, self.n_cols)]
     }
 
+    /// Mean red, green and blue.
+    pub fn mean_colour(&self) -> [f32; 3] {
+        let n = self.n_rows * self.n_cols;
+        [0, 1, 2].map(|channel| {
+            let values = &self.values[channel * n..(channel + 1) * n];
+            (values.iter().map(|value| f64::from(*value)).sum::<f64>() / n as f64) as f32
+        })
+    }
+
     /// Rises of the ground as far as whole vehicles feel them.
     pub fn slopes(&self) -> Slopes {
         let heights_m = &self.values[3 * self.n_rows * self.n_cols..];

@@ -3,6 +3,7 @@
 mod baselines;
 mod drives;
 mod errors;
+mod speed;
 mod tuned;
 
 use bicycle::Vehicle;
@@ -19,6 +20,7 @@ use baselines::{Residual, best_level, bicycle, constant, particle_levels};
 use drives::{Domain, Job, PIXEL_M, SeenDrive, seen_drive};
 pub use errors::{Errors, Row, SeenGround, Verdict};
 use errors::{Located, WindowError};
+pub use speed::SeeingTimes;
 pub use tuned::FoundVehicle;
 
 /// Of worlds to learn from; tests' seeds are of 32 bits.
@@ -73,6 +75,8 @@ pub struct Report {
     pub vehicles: Vec<FoundVehicle>,
     /// The pass rules of Tables 1, 4 and 5.
     pub verdicts: Vec<Verdict>,
+    /// How long seeing takes.
+    pub seeing: SeeingTimes,
     /// The first test world.
     #[serde(skip)]
     pub picture: Picture,
@@ -126,6 +130,7 @@ pub fn measure(request: &Request, after: impl Fn(&str) + Sync) -> Result<Report,
         rows,
         tuned_rows,
         vehicles,
+        seeing: speed::measure()?,
         picture: picture(&tests[0], &seen[0][0]),
         weights: networks[0].to_bytes().map_err(friction::TrainingError::from)?,
     })

@@ -18,16 +18,16 @@ pub(crate) fn run_friction(arguments: &BenchFrictionArguments) -> anyhow::Result
 }
 
 /// Drives to learn from.
-const LEARNED_DRIVES: u64 = 12;
+const LEARNED_DRIVES: u64 = 24;
 /// Length of each, and of each test [s], and batches of each training.
-const DRIVE_S: f64 = 60.0;
-const BATCHES: usize = 400;
-/// Trainings of a run.
-const TRAININGS: u64 = 3;
+const DRIVE_S: f64 = 40.0;
+const BATCHES: usize = 500;
+/// Trainings of a run, from scratch and without labels.
+const TRAININGS: u64 = 6;
 
 fn from_pictures(arguments: &BenchFrictionArguments, vehicles: Vec<Vehicle>) -> anyhow::Result<()> {
     let n_tests = arguments.seeds * vehicles.len() as u64;
-    let bar = progress::bar(LEARNED_DRIVES + n_tests + TRAININGS, "{pos}/{len} drives and trainings");
+    let bar = progress::bar(LEARNED_DRIVES + 3 * n_tests + TRAININGS, "{pos}/{len} drives and trainings");
     let request = seen::Request {
         vehicles,
         n_drives: [LEARNED_DRIVES, n_tests],

@@ -135,7 +135,7 @@ fn put_together(
 }
 
 /// The picture of a world.
-fn view(painted: &PaintedWorld) -> View {
+pub(super) fn view(painted: &PaintedWorld) -> View {
     let geometry = painted.world.geometry();
     let colours = painted.colours.values();
     let channel = |which: usize| colours.iter().map(move |colour| colour[which]);
