@@ -51,7 +51,7 @@ pub fn text(report: &Report) -> String {
     };
     let verdicts = report.verdicts.iter().map(|verdict| {
         let holds = if verdict.holds { "holds" } else { "FAILS" };
-        format!("  {:<68}{:<44}{holds}\n", verdict.rule, verdict.found)
+        format!("  {:<68}{:<70} {holds}\n", verdict.rule, verdict.found)
     });
     overall(report).text()
         + "\n"
