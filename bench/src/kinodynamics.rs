@@ -74,6 +74,8 @@ pub struct Request {
     pub epochs: usize,
     /// Laps at every speed.
     pub laps: u32,
+    /// How examples are made; the latency is the drive's.
+    pub labels: LabelConfig,
     /// Which models.
     pub rows: Vec<Row>,
     /// From the middle line to the walls [m].
@@ -91,6 +93,8 @@ pub struct Report {
     pub laps: u32,
     /// From the path to the walls [m].
     pub half_width_m: f64,
+    /// How the examples were made.
+    pub labels: LabelConfig,
     /// Latency that the drives showed.
     pub latency: Latency,
     /// What can be told of the ground.
@@ -204,6 +208,7 @@ pub fn measure(request: &Request, revision: &str, watch: &dyn Watch) -> Result<R
         minutes,
         laps,
         half_width_m,
+        labels: request.labels.after(&lessons.latency),
         latency: lessons.latency,
         probe,
         grounds,

@@ -58,8 +58,9 @@ pub use ground::{BenchGroundArguments, GapGroundArguments};
 pub use inspect::InspectArguments;
 pub use kernels::{InstructionSet, KernelArguments, ThreadArguments};
 pub use kinodynamics::{
-    BenchKinodynamicsArguments, KinodynamicsAnswer, KinodynamicsFilter, KinodynamicsRows,
-    KinodynamicsSensing, KinodynamicsSpeed, TrainKinodynamicsArguments,
+    BenchKinodynamicsArguments, KinodynamicsAnswer, KinodynamicsEffect, KinodynamicsFilter,
+    KinodynamicsLabelArguments, KinodynamicsRows, KinodynamicsSensing, KinodynamicsSpeed,
+    TrainKinodynamicsArguments,
 };
 pub use learned_map::{BenchLearnedMapArguments, NetworkSizes};
 pub use orders::{AlphaArguments, AskedRun, GoalArguments, PathArguments};

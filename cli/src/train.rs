@@ -20,7 +20,7 @@ use crate::arguments::TrainArguments;
 use crate::{UsageError, WorkFailed, interrupt, progress, summary};
 use data::Data;
 pub(crate) use friction::run_friction;
-pub(crate) use kinodynamics::run_kinodynamics;
+pub(crate) use kinodynamics::{labels, run_kinodynamics};
 
 /// The content of `training.json`.
 #[derive(Serialize)]

@@ -13,7 +13,7 @@ use crate::recording::VehicleSummary;
 use crate::{LabelConfig, Latency};
 
 /// The version that this program writes and reads.
-const FORMAT: u32 = 1;
+const FORMAT: u32 = 2;
 
 /// What the unit's components are standardised by: angular rate x, y, z, then specific force x, y, z.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]

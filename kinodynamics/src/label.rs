@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::architecture::{AXES, CURVATURE_MAX_PER_M, WINDOW};
 use crate::history::{PERIOD_NS, numbers};
+use crate::latency::Latency;
 use crate::recording::{RecordedRun, Recording};
 
 /// Speeds below this have no curvature [m/s].
@@ -25,10 +26,25 @@ pub enum SpeedSource {
     Wheels,
 }
 
+/// Which part of a command's effect is the motion of its example.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum EffectPart {
+    /// Its middle, where commands and yaw rates correlate most: a command is the answer to where it has led half-way, and
+    /// the vehicle's own lag stays as it is.
+    #[default]
+    Middle,
+    /// Its beginning, from the dead time on: a command is the answer to what it changes at once in a vehicle that already
+    /// turns, which leads the vehicle's lag. Who does not feel how the vehicle turns cannot learn it.
+    Beginning,
+}
+
 /// How examples are made and which are kept.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct LabelConfig {
+    /// Which part of a command's effect counts.
+    pub effect: EffectPart,
     /// From a command to the interval in which it is driven [s].
     pub latency_s: f64,
     /// What the curvature is taken over.
@@ -47,6 +63,7 @@ impl LabelConfig {
     /// The filters of the paper's code.
     pub fn paper(latency_s: f64) -> Self {
         Self {
+            effect: EffectPart::Middle,
             latency_s,
             speed_source: SpeedSource::Commanded,
             speed_min_mps: 0.1,
@@ -64,6 +81,16 @@ impl LabelConfig {
             difference_max_per_m: None,
             ..Self::paper(latency_s)
         }
+    }
+
+    /// The same with what a drive shows of its latency.
+    #[must_use]
+    pub fn after(self, latency: &Latency) -> Self {
+        let latency_s = match self.effect {
+            EffectPart::Middle => latency.seconds,
+            EffectPart::Beginning => latency.dead_time_s,
+        };
+        Self { latency_s, ..self }
     }
 }
 

@@ -34,7 +34,7 @@ pub use correction::{Corrected, CorrectionConfig, CorrectionCounts, Corrector, E
 pub use evidential::{CheckpointError, Tensor};
 pub use familiarity::Fade;
 pub use history::{ImuCounts, ImuFault, ImuHistory, ImuRange, PERIOD_NS};
-pub use label::{Example, LabelConfig, LabelCounts, SpeedSource, label};
+pub use label::{EffectPart, Example, LabelConfig, LabelCounts, SpeedSource, label};
 pub use latency::{Latency, LatencyError, estimate_latency};
 pub use model::{Commanded, Desired, InverseModel};
 pub use recording::{

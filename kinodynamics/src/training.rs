@@ -204,8 +204,7 @@ pub fn train(
         return Err(TrainError::OneGround { found: (*only).to_owned() });
     }
     let latency = estimate_latency(recording)?;
-    // The correlation finds the middle of the effect; a command is held for a tick, whose mean rate is the label.
-    let labels = LabelConfig { latency_s: latency.seconds, ..settings.labels };
+    let labels = settings.labels.after(&latency);
     let (examples, counts) = label(recording, &labels);
     let split = split(&examples, settings, counts.ticks)?;
     let sidecar = Sidecar {
@@ -251,7 +250,11 @@ pub fn train_without_history(
         architecture,
         standardisation: Standardisation { mean: [0.0; AXES], deviation: [1.0; AXES] },
         fade: Fade { none: 0.0, whole: 1.0 },
-        latency: Latency { seconds: settings.labels.latency_s, correlation: 1.0 },
+        latency: Latency {
+            seconds: settings.labels.latency_s,
+            dead_time_s: settings.labels.latency_s,
+            correlation: 1.0,
+        },
         labels: settings.labels,
         grounds: Vec::new(),
         weights_sha256: String::new(),

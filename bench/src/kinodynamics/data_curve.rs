@@ -49,7 +49,7 @@ pub fn data_curve(
     for &minutes in minutes {
         let part = Recording { runs: recording.runs[..minutes as usize].to_vec(), ..recording.clone() };
         for row in [Row::Ablation, Row::Learned] {
-            let Some(settings) = row.settings(request.seed) else { continue };
+            let Some(settings) = row.settings(request.seed, request.labels) else { continue };
             let settings = Settings { epochs: request.epochs, ..settings };
             watch.stage(Stage::Training(row, settings.epochs as u64));
             let outcome = train(&part, &settings, revision, &mut |_| {
@@ -57,7 +57,7 @@ pub fn data_curve(
                 if watch.interrupted() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
             })?;
             let mut model = InverseModel::new(&outcome.checkpoint, Instructions::widest())?;
-            points.push(judge(&mut model, &test, outcome.latency.seconds, (minutes, row)));
+            points.push(judge(&mut model, &test, &request.labels.after(&outcome.latency), (minutes, row)));
         }
     }
     Ok(points)
@@ -66,10 +66,10 @@ pub fn data_curve(
 fn judge(
     model: &mut InverseModel,
     test: &Recording,
-    latency_s: f64,
+    labels: &LabelConfig,
     (minutes, row): (u32, Row),
 ) -> DataPoint {
-    let (examples, _) = label(test, &LabelConfig::paper(latency_s));
+    let (examples, _) = label(test, labels);
     let (mut off, mut identity) = (0.0, 0.0);
     for example in &examples {
         model.sense_columns(&example.window);

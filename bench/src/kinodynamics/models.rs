@@ -4,8 +4,8 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use kinodynamics::{
-    Checkpoint, Epoch, Example, LabelConfig, LabelCounts, Latency, Outcome, Recording, Settings, label,
-    train, train_without_history,
+    Checkpoint, Epoch, Example, LabelCounts, Latency, Outcome, Recording, Settings, label, train,
+    train_without_history,
 };
 use scenarios::stream;
 use serde::Serialize;
@@ -52,7 +52,9 @@ pub(super) fn prepare(
     lessons: &Lessons,
     (revision, watch): (&str, &dyn Watch),
 ) -> Result<(Driver, Option<TrainingReport>), KinodynamicsError> {
-    let Some(settings) = row.settings(request.seed) else { return Ok((Driver::Baseline, None)) };
+    let Some(settings) = row.settings(request.seed, request.labels) else {
+        return Ok((Driver::Baseline, None));
+    };
     let settings = Settings { epochs: request.epochs, ..settings };
     watch.stage(Stage::Training(row, settings.n_passes() as u64));
     let mut on_epoch = |_: &Epoch| {
@@ -78,8 +80,7 @@ pub(super) fn prepare(
 
 /// The examples that other models learn from, with the ground's coefficients instead of histories.
 fn known_examples(lessons: &Lessons, settings: &Settings) -> (Vec<Example>, LabelCounts) {
-    let labels = LabelConfig { latency_s: lessons.latency.seconds, ..settings.labels };
-    let (mut examples, counts) = label(&lessons.recording, &labels);
+    let (mut examples, counts) = label(&lessons.recording, &settings.labels.after(&lessons.latency));
     for example in &mut examples {
         let tick = (example.time_s / TICK_S).round() as usize;
         example.window = lessons.coefficients[example.run][tick].to_vec();
@@ -100,7 +101,7 @@ fn told(row: Row, checkpoint: &Checkpoint, examples: &[Example], seed: u64) -> T
             let column = |mean: f32| std::iter::repeat_n(mean, kinodynamics::WINDOW);
             Told::Constant(Arc::new(means.into_iter().flat_map(column).collect()))
         }
-        Row::Oracle | Row::UnfilteredOracle => Told::Known,
+        Row::Oracle => Told::Known,
         _ => Told::Measured,
     }
 }

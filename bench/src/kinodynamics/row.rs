@@ -26,17 +26,11 @@ pub enum Row {
     Wide,
     /// Learned to answer speeds too, as the paper's text has it.
     WithSpeed,
-    /// Learned without the unit from all that was driven, oversteer and large differences too.
-    UnfilteredAblation,
-    /// Learned with the unit from all that was driven.
-    Unfiltered,
-    /// The oracle, learned from all that was driven.
-    UnfilteredOracle,
 }
 
 impl Row {
     /// All, in the order of the tables.
-    pub const ALL: [Self; 11] = [
+    pub const ALL: [Self; 8] = [
         Self::Baseline,
         Self::Ablation,
         Self::Learned,
@@ -45,9 +39,6 @@ impl Row {
         Self::Constant,
         Self::Wide,
         Self::WithSpeed,
-        Self::UnfilteredAblation,
-        Self::Unfiltered,
-        Self::UnfilteredOracle,
     ];
     /// Those of the paper.
     pub const PAPER: [Self; 3] = [Self::Baseline, Self::Ablation, Self::Learned];
@@ -73,42 +64,28 @@ impl Row {
             Self::Constant => "constant IMU",
             Self::Wide => "embedding of 16",
             Self::WithSpeed => "answers speed too",
-            Self::UnfilteredAblation => "ablation, unfiltered",
-            Self::Unfiltered => "learned, unfiltered",
-            Self::UnfilteredOracle => "oracle, unfiltered",
         }
     }
 
     /// Whether it is told the truth about the ground.
     pub fn is_oracle(self) -> bool {
-        matches!(self, Self::Oracle | Self::UnfilteredOracle)
+        self == Self::Oracle
     }
 
-    /// How its model is trained; none of the baseline.
-    pub fn settings(self, seed: u64) -> Option<Settings> {
-        let paper = Settings::paper(Architecture::PAPER, seed);
-        let labels = LabelConfig::unfiltered(0.0);
-        let sensing = Sensing::Told { numbers: COEFFICIENTS };
-        let oracle =
-            Settings { architecture: Architecture { sensing, ..Architecture::PAPER }, ..paper.clone() };
+    /// How its model is trained on examples that are made like this; none of the baseline.
+    pub fn settings(self, seed: u64, labels: LabelConfig) -> Option<Settings> {
+        let of = |architecture| Settings { labels, ..Settings::paper(architecture, seed) };
+        let sensing = |sensing| of(Architecture { sensing, ..Architecture::PAPER });
+        let paper = of(Architecture::PAPER);
         Some(match self {
             Self::Baseline => return None,
-            Self::Ablation => Settings::paper(Architecture::ABLATION, seed),
+            Self::Ablation => of(Architecture::ABLATION),
             Self::Learned => paper,
-            Self::Oracle => oracle,
-            Self::UnfilteredOracle => Settings { labels, ..oracle },
+            Self::Oracle => sensing(Sensing::Told { numbers: COEFFICIENTS }),
             Self::Shuffled => Settings { history: History::Shuffled, ..paper },
             Self::Constant => Settings { history: History::Constant, ..paper },
-            Self::Wide => {
-                let sensing = Sensing::Imu { embedding: 16 };
-                Settings { architecture: Architecture { sensing, ..Architecture::PAPER }, ..paper }
-            }
-            Self::WithSpeed => {
-                let answer = Answer::SpeedAndCurvature;
-                Settings { architecture: Architecture { answer, ..Architecture::PAPER }, ..paper }
-            }
-            Self::UnfilteredAblation => Settings { labels, ..Settings::paper(Architecture::ABLATION, seed) },
-            Self::Unfiltered => Settings { labels, ..paper },
+            Self::Wide => sensing(Sensing::Imu { embedding: 16 }),
+            Self::WithSpeed => of(Architecture { answer: Answer::SpeedAndCurvature, ..Architecture::PAPER }),
         })
     }
 }

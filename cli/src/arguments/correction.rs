@@ -24,6 +24,10 @@ pub struct BenchCorrectionArguments {
           allow_hyphen_values = true)]
     pub runs: u32,
 
+    /// How the examples of the corrections are made.
+    #[command(flatten)]
+    pub labels: super::KinodynamicsLabelArguments,
+
     /// Minutes of random driving that the corrections learn from, 1 to 600
     #[arg(long, value_name = "N", value_parser = super::kinodynamics::minutes_of_driving, default_value = "30",
           allow_hyphen_values = true)]

@@ -26,13 +26,9 @@ pub struct TrainKinodynamicsArguments {
     #[arg(long, value_enum, default_value_t = KinodynamicsAnswer::Curvature)]
     pub answer: KinodynamicsAnswer,
 
-    /// Which examples are kept
-    #[arg(long, value_enum, default_value_t = KinodynamicsFilter::Paper)]
-    pub filter: KinodynamicsFilter,
-
-    /// Speed that the driven curvature is taken over
-    #[arg(long, value_enum, default_value_t = KinodynamicsSpeed::Commanded)]
-    pub speed: KinodynamicsSpeed,
+    /// How examples are made.
+    #[command(flatten)]
+    pub labels: KinodynamicsLabelArguments,
 
     /// Passes over the data
     #[arg(long, value_name = "N", value_parser = epochs, default_value = "50", allow_hyphen_values = true)]
@@ -45,6 +41,31 @@ pub struct TrainKinodynamicsArguments {
     /// Where the results go.
     #[command(flatten)]
     pub results: super::ResultArguments,
+}
+
+/// How examples are made.
+#[derive(Args, Clone, Debug)]
+pub struct KinodynamicsLabelArguments {
+    /// Which part of a command's effect the command is the answer to
+    #[arg(long, value_enum, default_value_t = KinodynamicsEffect::Middle)]
+    pub effect: KinodynamicsEffect,
+
+    /// Which examples are kept
+    #[arg(long, value_enum, default_value_t = KinodynamicsFilter::Paper)]
+    pub filter: KinodynamicsFilter,
+
+    /// Speed that the driven curvature is taken over
+    #[arg(long, value_enum, default_value_t = KinodynamicsSpeed::Commanded)]
+    pub speed: KinodynamicsSpeed,
+}
+
+/// Which part of a command's effect counts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum KinodynamicsEffect {
+    /// Its middle, where commands and yaw rates correlate most: the vehicle's lag stays as it is
+    Middle,
+    /// Its beginning, from the dead time on: a model that feels how the vehicle turns learns to lead its lag
+    Beginning,
 }
 
 /// What the model knows of the ground.
@@ -92,6 +113,10 @@ pub struct BenchKinodynamicsArguments {
     /// Which models, or groups of them
     #[arg(long, value_enum, value_delimiter = ',', default_value = "all")]
     pub rows: Vec<KinodynamicsRows>,
+
+    /// How examples are made.
+    #[command(flatten)]
+    pub labels: KinodynamicsLabelArguments,
 
     /// Minutes of random driving to learn from, 1 to 600
     #[arg(long, value_name = "N", value_parser = minutes, default_value = "30", allow_hyphen_values = true)]

@@ -5,6 +5,7 @@ use ::bench::kinodynamics::{HALF_WIDTH_M, MixedGroundReport, Request, VEHICLE, m
 use super::kinodynamics::{Progress, told_error};
 use crate::arguments::BenchCorrectionArguments;
 use crate::output::WithRevision;
+use crate::train::labels;
 use crate::{UsageError, interrupt, progress, summary};
 
 pub(crate) fn run_correction(arguments: &BenchCorrectionArguments) -> anyhow::Result<()> {
@@ -16,6 +17,7 @@ pub(crate) fn run_correction(arguments: &BenchCorrectionArguments) -> anyhow::Re
         minutes: arguments.minutes,
         epochs: arguments.epochs,
         laps: arguments.runs,
+        labels: labels(&arguments.labels),
         rows: Vec::new(),
         half_width_m: HALF_WIDTH_M,
     };

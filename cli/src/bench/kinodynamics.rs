@@ -13,6 +13,7 @@ use indicatif::ProgressBar;
 use serde::Serialize;
 
 use crate::arguments::{BenchKinodynamicsArguments, KinodynamicsRows};
+use crate::train::labels;
 use crate::{UsageError, WorkFailed, interrupt, progress, summary};
 
 /// The content of `kinodynamics.json`.
@@ -64,6 +65,7 @@ fn request(arguments: &BenchKinodynamicsArguments) -> Result<Request, UsageError
         minutes: arguments.minutes,
         epochs: arguments.epochs,
         laps: arguments.laps,
+        labels: labels(&arguments.labels),
         rows: rows(&arguments.rows),
         half_width_m: arguments.half_width.unwrap_or(HALF_WIDTH_M),
     })

@@ -3,14 +3,14 @@
 use std::ops::ControlFlow;
 
 use kinodynamics::{
-    Answer, Architecture, Epoch, LabelConfig, LabelCounts, Latency, Outcome, Recording, Sensing, Settings,
-    SpeedSource, TrainError, train,
+    Answer, Architecture, EffectPart, Epoch, LabelConfig, LabelCounts, Latency, Outcome, Recording, Sensing,
+    Settings, SpeedSource, TrainError, train,
 };
 use serde::Serialize;
 
 use crate::arguments::{
-    KinodynamicsAnswer, KinodynamicsFilter, KinodynamicsSensing, KinodynamicsSpeed,
-    TrainKinodynamicsArguments,
+    KinodynamicsAnswer, KinodynamicsEffect, KinodynamicsFilter, KinodynamicsLabelArguments,
+    KinodynamicsSensing, KinodynamicsSpeed, TrainKinodynamicsArguments,
 };
 use crate::{UsageError, interrupt, progress, summary};
 
@@ -68,16 +68,26 @@ fn settings(arguments: &TrainKinodynamicsArguments) -> Settings {
         KinodynamicsAnswer::SpeedAndCurvature => Answer::SpeedAndCurvature,
     };
     let paper = Settings::paper(Architecture { sensing, answer }, arguments.seed);
-    let labels = match arguments.filter {
-        KinodynamicsFilter::Paper => paper.labels,
-        KinodynamicsFilter::Understeer => LabelConfig { difference_max_per_m: None, ..paper.labels },
+    Settings { labels: labels(&arguments.labels), epochs: arguments.epochs, ..paper }
+}
+
+/// How examples are made; the latency is the drive's.
+pub(crate) fn labels(arguments: &KinodynamicsLabelArguments) -> LabelConfig {
+    let paper = LabelConfig::paper(0.0);
+    let kept = match arguments.filter {
+        KinodynamicsFilter::Paper => paper,
+        KinodynamicsFilter::Understeer => LabelConfig { difference_max_per_m: None, ..paper },
         KinodynamicsFilter::None => LabelConfig::unfiltered(0.0),
     };
     let speed_source = match arguments.speed {
         KinodynamicsSpeed::Commanded => SpeedSource::Commanded,
         KinodynamicsSpeed::Wheels => SpeedSource::Wheels,
     };
-    Settings { labels: LabelConfig { speed_source, ..labels }, epochs: arguments.epochs, ..paper }
+    let effect = match arguments.effect {
+        KinodynamicsEffect::Middle => EffectPart::Middle,
+        KinodynamicsEffect::Beginning => EffectPart::Beginning,
+    };
+    LabelConfig { effect, speed_source, ..kept }
 }
 
 fn write(
@@ -107,12 +117,13 @@ fn told(outcome: &Outcome) -> String {
     } = outcome;
     let best = curves.iter().map(|epoch| epoch.validation_rmse_per_m).fold(f64::INFINITY, f64::min);
     format!(
-        "  latency {:.3} s (correlation {:.2})\n  of {} commands {} are examples; dropped: {} without samples, {} slow, {} \
+        "  latency {:.3} s (correlation {:.2}), dead time {:.3} s\n  of {} commands {} are examples; dropped: {} without samples, {} slow, {} \
          of other sign, {} oversteer, {} too different\n  {n_training} examples to learn from, {n_validation} in other \
          blocks of time to choose by\n  curvature on these off by {best:.4} 1/m (root mean square); the wish itself by \
          {identity_rmse_per_m:.4}\n",
         latency.seconds,
         latency.correlation,
+        latency.dead_time_s,
         counts.ticks,
         counts.kept,
         counts.no_samples,

@@ -43,6 +43,40 @@ fn driven_curvature_is_the_mean_yaw_rate_of_the_shifted_interval_over_the_comman
 }
 
 #[test]
+fn examples_begin_where_the_part_of_the_effect_does() {
+    let latency = Latency { seconds: 0.14, dead_time_s: 0.08, correlation: 1.0 };
+    let beginning = LabelConfig { effect: EffectPart::Beginning, ..LabelConfig::unfiltered(0.0) };
+    assert_eq!(LabelConfig::paper(0.0).after(&latency).latency_s, 0.14);
+    assert_eq!(beginning.after(&latency).latency_s, 0.08);
+}
+
+/// A vehicle without dead time and with a lag T of 0.1 s. In the first 50 ms of a command c its curvature comes from k nearer
+/// to c by s = 1 - T / 0.05 s (1 - exp(-0.05 s / T)) = 0.213 in the mean: from the beginning of the effect on the answer is
+/// k + (driven - k) / s, which leads, and k is in the window.
+#[test]
+fn answer_from_the_beginning_leads_the_lag_by_what_the_window_holds() {
+    let mut lagging = recording(1.0);
+    let run = &mut lagging.runs[0];
+    let (ticks, mut turning) = (run.ticks.clone(), 0.0);
+    for (k, sample) in run.imu.iter_mut().enumerate() {
+        sample.angular_rate_radps[2] = turning;
+        let wished = SPEED_MPS * ticks[(k / 10).min(399)].curvature_per_m;
+        turning += (1.0 - (-0.05_f32).exp()) * (wished - turning);
+    }
+    let (examples, _) = label(&lagging, &LabelConfig::unfiltered(0.0));
+    let share = 1.0 - 2.0 * (1.0 - (-0.5_f32).exp());
+    let mut leads = 0;
+    for example in &examples {
+        let turns = example.window[3 * WINDOW - 1] / SPEED_MPS;
+        let driven = turns + share * (example.commanded[0] - turns);
+        // Samples stand for the 5 ms after them: half a sample of 0.1 s.
+        assert!((example.driven[1] - driven).abs() < 0.03 * (example.commanded[0] - turns).abs() + 1e-5);
+        leads += usize::from((example.commanded[0] - example.driven[1]).abs() > 0.05);
+    }
+    assert!(leads > 20 && examples.len() > 300, "{leads} of {}", examples.len());
+}
+
+#[test]
 fn window_ends_with_the_sample_at_the_command_and_holds_columns() {
     let (examples, _) = label(&recording(1.0), &LabelConfig::paper(0.08));
     let example = &examples[30];

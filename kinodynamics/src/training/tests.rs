@@ -79,8 +79,8 @@ fn blind_model_is_off_by_what_it_cannot_know() {
 
 /// What is off on the chosen blocks, to the square, beyond what stays off for who knows the ground and divides by its share.
 fn error_by_ground(recording: &Recording, settings: &Settings) -> f64 {
-    let latency_s = estimate_latency(recording).unwrap().seconds;
-    let (examples, _) = label(recording, &LabelConfig { latency_s, ..settings.labels });
+    let latency = estimate_latency(recording).unwrap();
+    let (examples, _) = label(recording, &settings.labels.after(&latency));
     let places = block_split(&examples, settings.seed).validation;
     let known = |place: &usize| {
         let Example { commanded, driven, ground, .. } = &examples[*place];

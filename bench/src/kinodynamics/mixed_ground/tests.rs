@@ -47,8 +47,16 @@ impl Watch for Silent {
 #[test]
 fn an_adapted_model_knows_the_understeer_of_the_car() {
     let vehicle = formats::read_vehicle(super::super::VEHICLE).unwrap();
-    let request =
-        Request { vehicle, seed: 1001, minutes: 1, epochs: 1, laps: 1, rows: Vec::new(), half_width_m: 0.29 };
+    let request = Request {
+        vehicle,
+        seed: 1001,
+        minutes: 1,
+        epochs: 1,
+        laps: 1,
+        labels: kinodynamics::LabelConfig::paper(0.0),
+        rows: Vec::new(),
+        half_width_m: 0.29,
+    };
     let report = mixed_ground(&request, &[Method::Plain, Method::Adapted], "test", &Silent).unwrap();
     assert_eq!(report.speeds.len(), MIXED_MPS.len());
     for speed in &report.speeds {
