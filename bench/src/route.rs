@@ -5,11 +5,13 @@
 //! knows of friction; what it planned is driven on the true ground, whose friction is another. The plan knows the published
 //! friction of each ground, the plant up to a tenth more or less of it.
 
+mod experts;
 pub mod grip;
 mod method;
 mod mppi_follower;
 mod plan;
 mod published;
+mod reference;
 mod row;
 mod rules;
 pub mod timing;
@@ -23,6 +25,7 @@ use thiserror::Error;
 
 use crate::Verdict;
 use crate::sweep::in_turns;
+pub use experts::{Attempt, ExpertReport, ExpertRow, Pair, measure_reference};
 pub use method::Method;
 use method::known;
 use mppi_follower::MppiFollower;
@@ -188,10 +191,7 @@ impl Field<'_> {
         };
         let driven = match tracking {
             Tracking::Pd => {
-                let mut follower = PdFollower {
-                    wheelbase_m: self.vehicle.geometry.wheelbase_m,
-                    steering_max_rad: self.vehicle.limits.steering_max_rad,
-                };
+                let mut follower = PdFollower::of(self.vehicle);
                 track::drive(self.landscape, self.vehicle, task, &plan, &mut follower)?
             }
             Tracking::Mppi => {

@@ -34,6 +34,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod along;
 mod alternatives;
 mod config;
 mod edges;
@@ -50,6 +51,7 @@ mod smooth;
 mod speed;
 mod tiles;
 
+pub use along::LaidLine;
 pub use config::RouteConfig;
 pub use edges::Barrier;
 pub use far::{FarRoute, FarRouteError, far_route};

@@ -194,6 +194,11 @@ impl Planner {
         Ok(())
     }
 
+    /// What is weighed and forbidden.
+    pub(crate) fn config(&self) -> &RouteConfig {
+        &self.config
+    }
+
     /// Has an obstacle stand on a cell.
     pub(crate) fn block(&mut self, cell: Cell) {
         self.ground[cell].is_obstacle = true;

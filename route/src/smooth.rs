@@ -46,6 +46,12 @@ impl Spline {
                 }
             }
         }
+        Some(Self::between_ends(controls_m))
+    }
+
+    /// With these control points, at least one; from the first to the last of them.
+    pub fn between_ends(mut controls_m: Vec<[f64; 2]>) -> Self {
+        let n = controls_m.len();
         let (first, last) = (controls_m[0], controls_m[n - 1]);
         let mirrored = |end: [f64; 2], next: [f64; 2]| [0, 1].map(|axis| 2.0 * end[axis] - next[axis]);
         let (before, behind) = match n {
@@ -54,7 +60,7 @@ impl Spline {
         };
         controls_m.insert(0, before);
         controls_m.push(behind);
-        Some(Self { controls_m })
+        Self { controls_m }
     }
 
     fn n_segments(&self) -> usize {

@@ -129,6 +129,12 @@ pub(super) struct PdFollower {
     pub steering_max_rad: f64,
 }
 
+impl PdFollower {
+    pub fn of(vehicle: &Vehicle) -> Self {
+        Self { wheelbase_m: vehicle.geometry.wheelbase_m, steering_max_rad: vehicle.limits.steering_max_rad }
+    }
+}
+
 /// How fast offsets decay [rad/s], and over no less than so much way [m].
 const DECAY_RADPS: f64 = 1.0;
 const DECAY_MIN_M: f64 = 3.0;

@@ -25,6 +25,11 @@ pub struct BenchRouteArguments {
     #[arg(long, value_name = "N", default_value_t = 6)]
     pub grip_drives: u32,
 
+    /// In place of all that, our routes beside those of a slow reference (table 7), on so many tasks in each landscape
+    #[arg(long, value_name = "N", num_args = 0..=1, require_equals = true, default_missing_value = "10",
+          value_parser = values::seed_count, conflicts_with_all = ["tasks", "mppi_tasks", "grip_drives"])]
+    pub reference: Option<u64>,
+
     /// Of the landscapes and tasks; what is published comes from 1000, on which nothing was developed
     #[arg(long, value_name = "N", value_parser = values::seed, default_value = "1000",
           allow_hyphen_values = true)]
@@ -55,7 +60,10 @@ speeds, and on some tasks so does the controller that `surefoot drive` has.
   no steering cost  turns cost nothing in the search
 
 Before that, turns of 20 m radius at shares of the speed that friction holds, and climbs, on level and sloping ground of each kind: \
-on grounds as published, and on others whose friction a drive of two minutes showed (figure 12 and table 3).";
+on grounds as published, and on others whose friction a drive of two minutes showed (figure 12 and table 3).
+
+With --reference, in place of the paper's human drivers (table 7), lines that are bent from several ways until nothing makes them \
+faster, under the same limits: how much time our planner leaves, and how long either plans.";
 
 const AFTER_HELP: &str = "\
 A drive fails where there is no route, and where the vehicle rolls over, touches a tree, stands in water, does not move for 5 s, \
@@ -67,7 +75,9 @@ Writes route_table.png (bars), route_garden.png and route_island.png (the routes
   verdicts     the rules, which were fixed before the first drive
   drives       every drive
   grip         turns and climbs
+With --reference, route_reference.json alone, with rows and pairs.
 
 Examples:
   surefoot bench route
-  surefoot bench route --tasks 5 --mppi-tasks 0 --seed 1";
+  surefoot bench route --tasks 5 --mppi-tasks 0 --seed 1
+  surefoot bench route --reference";

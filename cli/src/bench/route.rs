@@ -1,7 +1,9 @@
 //! `surefoot bench route`: routes of every method driven by the plant, as text, JSON and pictures.
 
 use ::bench::route::grip::{GripError, GripRow, measure_grip};
-use ::bench::route::{Method, Report, Request, RouteBenchError, measure, n_drives};
+use ::bench::route::{Method, Report, Request, RouteBenchError, measure, measure_reference, n_drives};
+use bicycle::Vehicle;
+use scenarios::LandscapeKind;
 use serde::Serialize;
 
 use crate::arguments::BenchRouteArguments;
@@ -19,6 +21,9 @@ struct Results<'a> {
 pub(crate) fn run_route(arguments: &BenchRouteArguments) -> anyhow::Result<()> {
     let vehicle = formats::read_vehicle(&arguments.vehicle).map_err(UsageError::from_input)?;
     arguments.results.prepare()?;
+    if let Some(n_tasks) = arguments.reference {
+        return run_reference(arguments, &vehicle, n_tasks as usize);
+    }
     let request = Request {
         vehicle,
         seed: arguments.seed,
@@ -43,6 +48,19 @@ pub(crate) fn run_route(arguments: &BenchRouteArguments) -> anyhow::Result<()> {
         results.write(&name, &report::routes::map(shown)?)?;
     }
     println!("\n  route_table.json and pictures in {}", results.out.display());
+    Ok(())
+}
+
+fn run_reference(arguments: &BenchRouteArguments, vehicle: &Vehicle, n_tasks: usize) -> anyhow::Result<()> {
+    let bar = progress::bar((LandscapeKind::ALL.len() * n_tasks) as u64, "{pos}/{len} tasks");
+    let size = (arguments.seed, n_tasks, arguments.threads.count());
+    let report = measure_reference(vehicle, size, || bar.inc(1));
+    bar.finish_and_clear();
+    let report = report.map_err(told)?;
+    print!("{}", report::routes::experts(&report));
+    let results = &arguments.results;
+    results.write_json("route_reference.json", &WithRevision::of(&report))?;
+    println!("\n  route_reference.json in {}", results.out.display());
     Ok(())
 }
 

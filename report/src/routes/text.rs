@@ -61,7 +61,7 @@ fn line(row: &Row) -> Vec<String> {
     ]
 }
 
-fn spread(mean: Option<Mean>, decimals: usize) -> String {
+pub(super) fn spread(mean: Option<Mean>, decimals: usize) -> String {
     mean.map_or("-".to_owned(), |Mean { value, low, high }| {
         format!("{value:.decimals$} [{low:.decimals$}, {high:.decimals$}]")
     })
