@@ -161,7 +161,7 @@ impl Recording {
     }
 
     /// Between moments [s].
-    pub(crate) fn spacing_s(&self) -> f64 {
+    pub fn spacing_s(&self) -> f64 {
         (self.moments[1].time_s - self.moments[0].time_s).max(1e-9)
     }
 

@@ -6,6 +6,7 @@ use crate::axes::{Axes, Range};
 use crate::canvas::{Anchor, Canvas, EncodeError, Image, MARGIN, PAGE_WIDTH, Rect, Stroke, TextStyle};
 use crate::colour::{Ramp, Rgb};
 use crate::table::Table;
+use crate::verdict;
 
 /// The paper's row that stands beside each of ours: ATE [m], RRE [deg], RTE [m].
 type Published = (&'static str, &'static str, [f64; 3]);
@@ -25,13 +26,15 @@ const PAPER_REAL: [Published; 6] = [
     ("fine-tuned, inertia held", "fixed inertia", [0.37, 3.48, 0.64]),
     ("fine-tuned", "AnyNav", [0.310, 2.349, 0.543]),
 ];
-const GROUNDS: [&str; 7] = ["asphalt", "rock", "dirt", "grass", "mud", "sand", "ice"];
 
 /// All tables, for a terminal.
 pub fn text(report: &Report) -> String {
     let by_ground = Table {
         title: "absolute trajectory error by the ground that most of the way lies on [m]".to_owned(),
-        header: std::iter::once("").chain(GROUNDS).map(str::to_owned).collect(),
+        header: std::iter::once("")
+            .chain(report.grounds.iter().map(|ground| ground.ground))
+            .map(str::to_owned)
+            .collect(),
         rows: report.rows.iter().map(by_ground).collect(),
         ..Table::default()
     };
@@ -49,10 +52,6 @@ pub fn text(report: &Report) -> String {
             .collect(),
         ..Table::default()
     };
-    let verdicts = report.verdicts.iter().map(|verdict| {
-        let holds = if verdict.holds { "holds" } else { "FAILS" };
-        format!("  {:<68}{:<70} {holds}\n", verdict.rule, verdict.found)
-    });
     overall(report).text()
         + "\n"
         + &by_ground.text()
@@ -63,7 +62,7 @@ pub fn text(report: &Report) -> String {
         + "\n"
         + &seen.text()
         + "\n"
-        + &verdicts.collect::<String>()
+        + &verdict::text(&report.verdicts)
         + &format!(
             "\n  seeing takes {:.2} s for 200 x 200 m in pixels of 0.2 m, {:.2} s for 40 x 40 m of it\n",
             report.seeing.whole_s, report.seeing.part_s

@@ -78,7 +78,7 @@ pub(super) fn particle_levels(lesson: &Lesson, seed: u64) -> Vec<f64> {
     let mut rng = stream(seed, &[0x9F]);
     let mut particles = vec![0.0_f64; PARTICLES];
     particles.iter_mut().for_each(|particle| *particle = 0.4 * rng.sample::<f64, _>(StandardNormal));
-    let every = (PERIOD_S / (moments[1].time_s - moments[0].time_s)).round().max(1.0) as usize;
+    let every = (PERIOD_S / lesson.recording.spacing_s()).round().max(1.0) as usize;
     let mut levels = Vec::with_capacity(lesson.windows.len());
     let mut windows = lesson.windows.iter().peekable();
     for (index, moment) in moments.iter().enumerate() {

@@ -1,4 +1,4 @@
-//! Errors of predicted motion, the tables they make and the pass rules, fixed before the first training.
+//! Errors of predicted motion, and the tables that they make.
 
 use friction::State;
 use serde::Serialize;
@@ -92,15 +92,4 @@ pub struct SeenGround {
     pub friction: [f64; 2],
     /// Mean viscous coefficient [s/m], likewise.
     pub viscous: [f64; 2],
-}
-
-/// A part of the rule.
-#[derive(Clone, Debug, Serialize)]
-pub struct Verdict {
-    /// What is asked for.
-    pub rule: &'static str,
-    /// What was found.
-    pub found: String,
-    /// Whether it holds.
-    pub holds: bool,
 }

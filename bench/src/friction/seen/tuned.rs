@@ -7,8 +7,9 @@ use scenarios::Looks;
 use serde::Serialize;
 
 use super::drives::{Domain, Job, Machine, SeenDrive, seen_drive};
-use super::errors::{Row, Verdict};
+use super::errors::Row;
 use super::{FrictionBenchError, Request, TRAINING_SEED, baseline_rows, errors, see};
+use crate::Verdict;
 use crate::sweep::in_turns;
 
 /// Of the worlds to tune on, over those to learn from; and of the worlds to be tested on, over those of the first test.
@@ -152,8 +153,8 @@ fn verdict(rows: &[Row]) -> Verdict {
     };
     let ([full, inertia, wheel], untuned) = (VARIANTS.map(|(name, _)| of(name)), of(UNTUNED));
     Verdict {
-        rule: "fine-tuned < inertia held < wheel speed held <= not, by ATE",
+        rule: "fine-tuned < inertia held < wheel speed held <= not, by ATE".to_owned(),
         found: format!("{full:.3}, {inertia:.3}, {wheel:.3}, {untuned:.3}"),
-        holds: full < inertia && inertia < wheel && wheel <= untuned,
+        is_passed: full < inertia && inertia < wheel && wheel <= untuned,
     }
 }
