@@ -26,7 +26,7 @@ use std::sync::Arc;
 
 use bicycle::Vehicle;
 use bicycle::lanes::Instructions;
-use kinodynamics::{LabelConfig, Latency, TrainError, label};
+use kinodynamics::{LabelConfig, Latency, Teacher, TrainError, label};
 use rayon::prelude::*;
 use scenarios::{CommandError, PlantError, World, WorldError, seed_of};
 use serde::Serialize;
@@ -76,6 +76,8 @@ pub struct Request {
     pub laps: u32,
     /// How examples are made; the latency is the drive's.
     pub labels: LabelConfig,
+    /// Who judges the models' answers while they learn.
+    pub teacher: Teacher,
     /// Which models.
     pub rows: Vec<Row>,
     /// From the middle line to the walls [m].
@@ -95,6 +97,8 @@ pub struct Report {
     pub half_width_m: f64,
     /// How the examples were made.
     pub labels: LabelConfig,
+    /// Who judged the models' answers while they learned.
+    pub teacher: Teacher,
     /// Latency that the drives showed.
     pub latency: Latency,
     /// What can be told of the ground.
@@ -209,6 +213,7 @@ pub fn measure(request: &Request, revision: &str, watch: &dyn Watch) -> Result<R
         laps,
         half_width_m,
         labels: request.labels.after(&lessons.latency),
+        teacher: request.teacher,
         latency: lessons.latency,
         probe,
         grounds,

@@ -13,9 +13,14 @@ pub const CURVATURE_MAX_PER_M: f32 = 2.0;
 
 /// Width of the encoder's two hidden layers.
 const ENCODER_HIDDEN: usize = 256;
+/// Pieces of the history that a forward model sees the mean and the deviation of: with all samples it learns their noise by
+/// heart.
+pub(crate) const PIECES: usize = 10;
+/// Width of a forward model's hidden layer before its embedding, and of that.
+const FORWARD_HIDDEN: usize = 64;
+const FORWARD_EMBEDDING: usize = 16;
 /// Width of the command network's two hidden layers.
 const COMMAND_HIDDEN: usize = 32;
-
 /// What a model knows of the ground.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -129,6 +134,18 @@ impl Architecture {
     pub(crate) fn command(&self) -> Vec<LayerShape> {
         let widths = [2 + self.n_embedding(), COMMAND_HIDDEN, COMMAND_HIDDEN, self.n_answers()];
         layers("command", &widths, Activation::Tanh)
+    }
+
+    /// The layers of the forward model that teaches it: `120 -> 64 -> 16` of [`PIECES`] pieces of the history instead of all
+    /// samples, and `18 -> 32 -> 32 -> 1`. Who is told of the ground, or nothing, teaches the like.
+    pub(crate) fn forward(&self) -> [Vec<LayerShape>; 2] {
+        let widths = [2 * PIECES * AXES, FORWARD_HIDDEN, FORWARD_EMBEDDING];
+        let (encoder, n_embedding) = match self.sensing {
+            Sensing::Imu { .. } => (layers("encoder", &widths, Activation::Relu), FORWARD_EMBEDDING),
+            Sensing::Blind | Sensing::Told { .. } => (Vec::new(), self.n_embedding()),
+        };
+        let widths = [2 + n_embedding, COMMAND_HIDDEN, COMMAND_HIDDEN, 1];
+        [encoder, layers("command", &widths, Activation::Tanh)]
     }
 
     /// Multiply-adds of one answer.

@@ -10,10 +10,10 @@ use crate::architecture::{AXES, Architecture, LayerShape};
 use crate::dense::Dense;
 use crate::familiarity::{Fade, Familiarity, LAYERS, n_features};
 use crate::recording::VehicleSummary;
-use crate::{LabelConfig, Latency};
+use crate::{LabelConfig, Latency, Teacher};
 
 /// The version that this program writes and reads.
-const FORMAT: u32 = 2;
+const FORMAT: u32 = 3;
 
 /// What the unit's components are standardised by: angular rate x, y, z, then specific force x, y, z.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -45,6 +45,8 @@ pub struct Sidecar {
     pub latency: Latency,
     /// How the examples were made.
     pub labels: LabelConfig,
+    /// Who judged the answers.
+    pub teacher: Teacher,
     /// Names of the grounds that were driven on, as far as they were told.
     pub grounds: Vec<String>,
     /// Hash of the weights' file.

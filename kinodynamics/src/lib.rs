@@ -41,4 +41,4 @@ pub use recording::{
     ImuCheckError, RecordedRun, Recording, RecordingFileError, Tick, VehicleSummary, check_imu,
 };
 pub use split::{Split, block_split};
-pub use training::{Epoch, History, Outcome, Settings, TrainError, train, train_without_history};
+pub use training::{Epoch, History, Outcome, Settings, Teacher, TrainError, train, train_without_history};

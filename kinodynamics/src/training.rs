@@ -48,6 +48,20 @@ pub enum History {
     Constant,
 }
 
+/// Who judges a command that a model answers.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Teacher {
+    /// The examples: the wish is what was driven, and the command that led to it is right. So does the paper. What is driven
+    /// is noisy, and a regression on noise is drawn towards what was commanded anyway.
+    #[default]
+    Examples,
+    /// A forward model that is learned from the examples beforehand, from commands to what is driven, whose noise averages
+    /// out: the wish is what the driver commanded, and what the forward model foretells of the answer should be the wish.
+    /// Distal supervised learning (Jordan and Rumelhart, Forward Models: Supervised Learning with a Distal Teacher, 1992).
+    ForwardModel,
+}
+
 /// How to fit.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -56,6 +70,8 @@ pub struct Settings {
     pub architecture: Architecture,
     /// What becomes of the history.
     pub history: History,
+    /// Who judges the answers.
+    pub teacher: Teacher,
     /// Seed of the initial weights, of the split and of the order of the examples.
     pub seed: u64,
     /// Passes over the data.
@@ -76,6 +92,7 @@ impl Settings {
         Self {
             architecture,
             history: History::AsMeasured,
+            teacher: Teacher::Examples,
             seed,
             epochs: 50,
             batch: 64,
@@ -90,9 +107,13 @@ impl Settings {
         self.epochs.div_ceil(10)
     }
 
-    /// Passes over the data in all, those of the starts that do not go on included.
+    /// Passes over the data in all, those of the starts that do not go on and of a forward model included.
     pub fn n_passes(&self) -> usize {
-        self.epochs + (STARTS - 1) * self.n_heat()
+        let n_models = match self.teacher {
+            Teacher::Examples => 1,
+            Teacher::ForwardModel => 2,
+        };
+        n_models * (self.epochs + (STARTS - 1) * self.n_heat())
     }
 
     /// Learning rate of a pass, from 1 on.
@@ -109,7 +130,8 @@ pub struct Epoch {
     pub epoch: usize,
     /// Mean square over the training examples while they were learned [answers over their scale].
     pub training_loss: f64,
-    /// Root mean square of what the curvature is off by on the validation examples [1/m].
+    /// Root mean square of what the curvature is off by on the validation examples [1/m]; by a forward model's word, and
+    /// counted by speed, where one teaches.
     pub validation_rmse_per_m: f64,
 }
 
@@ -216,6 +238,7 @@ pub fn train(
         fade: Fade { none: 0.0, whole: 1.0 },
         latency,
         labels,
+        teacher: settings.teacher,
         grounds: grounds.into_iter().map(str::to_owned).collect(),
         weights_sha256: String::new(),
     };
@@ -256,6 +279,7 @@ pub fn train_without_history(
             correlation: 1.0,
         },
         labels: settings.labels,
+        teacher: settings.teacher,
         grounds: Vec::new(),
         weights_sha256: String::new(),
     };
@@ -298,7 +322,7 @@ fn fit_to(
 
 fn validate(settings: &Settings) -> Result<(), TrainError> {
     let refuse = |field, expected, found| Err(TrainError::Setting { field, expected, found });
-    let Settings { epochs, batch, learning_rate, .. } = *settings;
+    let Settings { epochs, batch, learning_rate, teacher, architecture, .. } = *settings;
     if epochs == 0 {
         return refuse("epochs", "at least 1", 0.0);
     }
@@ -307,6 +331,10 @@ fn validate(settings: &Settings) -> Result<(), TrainError> {
     }
     if !(learning_rate.is_finite() && learning_rate > 0.0) {
         return refuse("learning rate", "a number > 0", learning_rate);
+    }
+    if teacher == Teacher::ForwardModel && architecture.n_answers() > 1 {
+        let expected = "curvature alone: a forward model foretells no speeds";
+        return refuse("answers", expected, architecture.n_answers() as f64);
     }
     Ok(())
 }

@@ -3,7 +3,7 @@
 use std::ops::ControlFlow;
 
 use bicycle::lanes::Instructions;
-use kinodynamics::{Desired, InverseModel, LabelConfig, Recording, Settings, label, train};
+use kinodynamics::{Desired, InverseModel, LabelConfig, Recording, label, train};
 use serde::Serialize;
 
 use super::teleoperation::{Teleoperation, teleoperate};
@@ -49,9 +49,8 @@ pub fn data_curve(
     for &minutes in minutes {
         let part = Recording { runs: recording.runs[..minutes as usize].to_vec(), ..recording.clone() };
         for row in [Row::Ablation, Row::Learned] {
-            let Some(settings) = row.settings(request.seed, request.labels) else { continue };
-            let settings = Settings { epochs: request.epochs, ..settings };
-            watch.stage(Stage::Training(row, settings.epochs as u64));
+            let Some(settings) = row.settings(request) else { continue };
+            watch.stage(Stage::Training(row, settings.n_passes() as u64));
             let outcome = train(&part, &settings, revision, &mut |_| {
                 watch.step();
                 if watch.interrupted() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }

@@ -52,10 +52,9 @@ pub(super) fn prepare(
     lessons: &Lessons,
     (revision, watch): (&str, &dyn Watch),
 ) -> Result<(Driver, Option<TrainingReport>), KinodynamicsError> {
-    let Some(settings) = row.settings(request.seed, request.labels) else {
+    let Some(settings) = row.settings(request) else {
         return Ok((Driver::Baseline, None));
     };
-    let settings = Settings { epochs: request.epochs, ..settings };
     watch.stage(Stage::Training(row, settings.n_passes() as u64));
     let mut on_epoch = |_: &Epoch| {
         watch.step();

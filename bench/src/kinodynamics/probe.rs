@@ -90,16 +90,29 @@ fn wish_features(example: &Example) -> Vec<f64> {
     ]
 }
 
+/// How much each component shakes in each quarter of a second, slowly and from sample to sample, and products of all these.
 fn imu_features(example: &Example) -> Vec<f64> {
-    let mut features = wish_features(example);
-    let speed = f64::from(example.commanded[1]);
+    let mut shakes = vec![f64::from(example.commanded[1])];
     for column in example.window.chunks_exact(WINDOW) {
-        let mean = column.iter().map(|v| f64::from(*v)).sum::<f64>() / WINDOW as f64;
-        let square = column.iter().map(|v| (f64::from(*v) - mean).powi(2)).sum::<f64>() / WINDOW as f64;
-        let shake = square.sqrt().max(1e-4).ln();
-        features.extend([shake, shake * shake, shake * speed]);
+        for part in column.chunks_exact(WINDOW / 2) {
+            let steps: Vec<f32> = part.windows(2).map(|pair| pair[1] - pair[0]).collect();
+            shakes.extend([log_deviation(part), log_deviation(&steps)]);
+        }
+    }
+    let mut features = wish_features(example);
+    for (k, shake) in shakes.iter().enumerate() {
+        features.push(*shake);
+        features.extend(shakes[..=k].iter().map(|other| shake * other));
     }
     features
+}
+
+/// Natural logarithm of the standard deviation.
+fn log_deviation(values: &[f32]) -> f64 {
+    let n = values.len() as f64;
+    let mean = values.iter().map(|v| f64::from(*v)).sum::<f64>() / n;
+    let square = values.iter().map(|v| (f64::from(*v) - mean).powi(2)).sum::<f64>() / n;
+    square.sqrt().max(1e-4).ln()
 }
 
 #[cfg(test)]

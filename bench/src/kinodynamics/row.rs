@@ -1,8 +1,9 @@
 //! Which models are driven against each other.
 
-use kinodynamics::{Answer, Architecture, History, LabelConfig, Sensing, Settings};
+use kinodynamics::{Answer, Architecture, History, Sensing, Settings};
 use serde::Serialize;
 
+use super::Request;
 use super::surfaces::COEFFICIENTS;
 
 /// A model, or none.
@@ -72,9 +73,10 @@ impl Row {
         self == Self::Oracle
     }
 
-    /// How its model is trained on examples that are made like this; none of the baseline.
-    pub fn settings(self, seed: u64, labels: LabelConfig) -> Option<Settings> {
-        let of = |architecture| Settings { labels, ..Settings::paper(architecture, seed) };
+    /// How its model is trained; none of the baseline.
+    pub fn settings(self, request: &Request) -> Option<Settings> {
+        let &Request { seed, epochs, labels, teacher, .. } = request;
+        let of = |architecture| Settings { epochs, labels, teacher, ..Settings::paper(architecture, seed) };
         let sensing = |sensing| of(Architecture { sensing, ..Architecture::PAPER });
         let paper = of(Architecture::PAPER);
         Some(match self {

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
+use kinodynamics::Teacher;
 
 use super::values;
 
@@ -43,7 +44,7 @@ pub struct TrainKinodynamicsArguments {
     pub results: super::ResultArguments,
 }
 
-/// How examples are made.
+/// How examples are made, and who judges by them.
 #[derive(Args, Clone, Debug)]
 pub struct KinodynamicsLabelArguments {
     /// Which part of a command's effect the command is the answer to
@@ -57,6 +58,28 @@ pub struct KinodynamicsLabelArguments {
     /// Speed that the driven curvature is taken over
     #[arg(long, value_enum, default_value_t = KinodynamicsSpeed::Commanded)]
     pub speed: KinodynamicsSpeed,
+
+    /// Who judges the answers of a model while it learns
+    #[arg(long, value_enum, default_value_t = KinodynamicsTeacher::Examples)]
+    pub teacher: KinodynamicsTeacher,
+}
+
+/// Who judges the answers of a model while it learns.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum KinodynamicsTeacher {
+    /// The examples, as the paper: the command of an example is the answer to what was driven
+    Examples,
+    /// A forward model that learns from the examples beforehand: what it foretells of an answer should be the wish
+    ForwardModel,
+}
+
+impl From<KinodynamicsTeacher> for Teacher {
+    fn from(teacher: KinodynamicsTeacher) -> Self {
+        match teacher {
+            KinodynamicsTeacher::Examples => Self::Examples,
+            KinodynamicsTeacher::ForwardModel => Self::ForwardModel,
+        }
+    }
 }
 
 /// Which part of a command's effect counts.
@@ -224,7 +247,8 @@ Writes kinodynamics.safetensors and kinodynamics.json, which belong together, an
 
 Example:
   surefoot collect --teleop-random --minutes 30 --out drive.safetensors
-  surefoot train kinodynamics --train drive.safetensors --out weights";
+  surefoot train kinodynamics --train drive.safetensors --out weights
+  surefoot train kinodynamics --train drive.safetensors --effect beginning --filter none --teacher forward-model --out leading";
 
 pub(super) const BENCH_LONG_ABOUT: &str = "\
 Repeats the experiments of inverse kinodynamics in simulation: thirty minutes of random driving on four surfaces, then \
@@ -250,6 +274,7 @@ Intervals are 95 %: Wilson's of shares, of ratios a bootstrap over laps. With --
 Examples:
   surefoot bench kinodynamics                          all models, about a quarter of an hour
   surefoot bench kinodynamics --rows baseline,ablation,oracle
+  surefoot bench kinodynamics --rows paper --effect beginning --filter none --teacher forward-model
   surefoot bench kinodynamics --rows paper --minutes 5 --epochs 10 --laps 2
   surefoot bench kinodynamics --data-minutes 1,5,20,60
   surefoot bench kinodynamics --tune-walls 0.3,0.35,0.4

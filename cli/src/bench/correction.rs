@@ -18,6 +18,7 @@ pub(crate) fn run_correction(arguments: &BenchCorrectionArguments) -> anyhow::Re
         epochs: arguments.epochs,
         laps: arguments.runs,
         labels: labels(&arguments.labels),
+        teacher: arguments.labels.teacher.into(),
         rows: Vec::new(),
         half_width_m: HALF_WIDTH_M,
     };

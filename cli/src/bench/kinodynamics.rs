@@ -66,6 +66,7 @@ fn request(arguments: &BenchKinodynamicsArguments) -> Result<Request, UsageError
         epochs: arguments.epochs,
         laps: arguments.laps,
         labels: labels(&arguments.labels),
+        teacher: arguments.labels.teacher.into(),
         rows: rows(&arguments.rows),
         half_width_m: arguments.half_width.unwrap_or(HALF_WIDTH_M),
     })

@@ -68,7 +68,8 @@ fn settings(arguments: &TrainKinodynamicsArguments) -> Settings {
         KinodynamicsAnswer::SpeedAndCurvature => Answer::SpeedAndCurvature,
     };
     let paper = Settings::paper(Architecture { sensing, answer }, arguments.seed);
-    Settings { labels: labels(&arguments.labels), epochs: arguments.epochs, ..paper }
+    let (labels, teacher) = (labels(&arguments.labels), arguments.labels.teacher.into());
+    Settings { labels, teacher, epochs: arguments.epochs, ..paper }
 }
 
 /// How examples are made; the latency is the drive's.

@@ -86,14 +86,25 @@ pub(super) struct Network {
 }
 
 impl Network {
-    pub(super) fn new(architecture: &Architecture, seed: u64) -> Result<Self> {
+    /// An inverse model.
+    pub(super) fn inverse(architecture: &Architecture, seed: u64) -> Result<Self> {
+        let network = Self::new([architecture.encoder(), architecture.command()], seed)?;
+        network.embed_how_much_is_felt()?;
+        Ok(network)
+    }
+
+    /// The forward model that teaches an inverse one.
+    pub(super) fn forward_model(architecture: &Architecture, seed: u64) -> Result<Self> {
+        Self::new(architecture.forward(), seed)
+    }
+
+    fn new(shapes: [Vec<LayerShape>; 2], seed: u64) -> Result<Self> {
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
         let mut layers = |shapes: Vec<LayerShape>| -> Result<Vec<Layer>> {
             shapes.into_iter().map(|shape| Layer::new(shape, &mut rng)).collect()
         };
-        let network =
-            Self { encoder: layers(architecture.encoder())?, command: layers(architecture.command())? };
-        network.embed_how_much_is_felt()?;
+        let [encoder, command] = shapes;
+        let network = Self { encoder: layers(encoder)?, command: layers(command)? };
         network.command_what_is_desired()?;
         Ok(network)
     }
@@ -128,30 +139,23 @@ impl Network {
 
     /// Makes every unit answer to some of these windows [rows, 600] and wishes [rows, 2] at least.
     pub(super) fn wake(&self, windows: &Tensor, desired: &Tensor) -> Result<()> {
-        self.pass(windows, desired, Layer::wake).map(drop)
+        let embedding = through(&self.encoder, windows.clone(), Layer::wake)?;
+        through(&self.command, told(&embedding, desired)?, Layer::wake).map(drop)
     }
 
     /// Answers over their scales [rows, answers] for standardised windows [rows, 600] and wishes [rows, 2].
     pub(super) fn forward(&self, windows: &Tensor, desired: &Tensor) -> Result<Tensor> {
-        self.pass(windows, desired, Layer::forward)
+        self.answer(&self.embed(windows)?, desired)
     }
 
-    fn pass(
-        &self,
-        windows: &Tensor,
-        desired: &Tensor,
-        through: fn(&Layer, &Tensor) -> Result<Tensor>,
-    ) -> Result<Tensor> {
-        let mut embedding = windows.clone();
-        for layer in &self.encoder {
-            embedding = through(layer, &embedding)?;
-        }
-        let is_blind = embedding.dim(1)? == 0;
-        let mut values = if is_blind { desired.clone() } else { Tensor::cat(&[desired, &embedding], 1)? };
-        for layer in &self.command {
-            values = through(layer, &values)?;
-        }
-        Ok(values)
+    /// Embedding [rows, numbers] of standardised windows [rows, 600].
+    pub(super) fn embed(&self, windows: &Tensor) -> Result<Tensor> {
+        through(&self.encoder, windows.clone(), Layer::forward)
+    }
+
+    /// Answers over their scales [rows, answers] for embeddings [rows, numbers] and wishes [rows, 2].
+    pub(super) fn answer(&self, embedding: &Tensor, desired: &Tensor) -> Result<Tensor> {
+        through(&self.command, told(embedding, desired)?, Layer::forward)
     }
 
     /// Share of these inputs that every unit behind a ReLU answers to, layer after layer.
@@ -191,4 +195,13 @@ impl Network {
         }
         Ok(tensors)
     }
+}
+
+fn through(layers: &[Layer], inputs: Tensor, pass: fn(&Layer, &Tensor) -> Result<Tensor>) -> Result<Tensor> {
+    layers.iter().try_fold(inputs, |values, layer| pass(layer, &values))
+}
+
+/// What the command network is told: the wish, and the embedding if there is one.
+fn told(embedding: &Tensor, desired: &Tensor) -> Result<Tensor> {
+    if embedding.dim(1)? == 0 { Ok(desired.clone()) } else { Tensor::cat(&[desired, embedding], 1) }
 }

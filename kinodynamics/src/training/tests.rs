@@ -7,6 +7,7 @@ use super::*;
 use crate::architecture::Answer;
 use crate::architecture::Sensing;
 use crate::history::PERIOD_NS;
+use crate::label::EffectPart;
 use crate::model::Desired;
 use crate::model::InverseModel;
 use crate::recording::{RecordedRun, Tick, VehicleSummary};
@@ -139,9 +140,94 @@ fn ground_that_is_told_is_learned() {
     assert!(refused.unwrap_err().to_string().ends_with("found 1"));
 }
 
+/// Of 0.8 of what was commanded, with noise of 0.3 1/m, examples teach less than the wish asks for and a forward model all of
+/// it. Commands c are uniform up to 0.9: of all that lead to 0.4 the mean is that of a normal distribution of mean
+/// 0.4 / 0.8 = 0.5 and deviation 0.3 / 0.8 = 0.375, cut off at 0.9, (0.9 - 0.5) / 0.375 = 1.07 deviations above it:
+/// 0.5 - 0.375 x 0.226 / 0.857 = 0.40.
+#[test]
+fn noise_of_what_is_driven_shrinks_what_examples_teach_and_not_what_a_forward_model_does() {
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(5);
+    let example = |k: usize| {
+        let commanded_per_m = rng.random_range(-0.9..0.9f32);
+        let noise: f32 = rng.sample(rand_distr::StandardNormal);
+        Example {
+            time_s: 0.05 * (k % 1200) as f64,
+            driven: [1.5, 0.8 * commanded_per_m + 0.3 * noise],
+            commanded: [commanded_per_m, 1.5],
+            window: Vec::new(),
+            run: k / 1200,
+            ground: None,
+        }
+    };
+    let examples: Vec<Example> = (0..12_000).map(example).collect();
+    let answer = |teacher| {
+        let settings = Settings { teacher, ..settings(Sensing::Blind, 10) };
+        let outcome =
+            train_without_history(&examples, &settings, &mut |_| ControlFlow::Continue(())).unwrap();
+        let mut model = InverseModel::new(&outcome.checkpoint, Instructions::widest()).unwrap();
+        model.command(Desired { speed_mps: 1.5, curvature_per_m: 0.4 }).curvature_per_m
+    };
+    let (shrunk, whole) = (answer(Teacher::Examples), answer(Teacher::ForwardModel));
+    println!("examples {shrunk:.3}, forward model {whole:.3} 1/m");
+    assert!((shrunk - 0.40).abs() < 0.03 && (whole - 0.50).abs() < 0.03, "{shrunk} {whole}");
+}
+
+/// A vehicle that with every command comes nearer to it by 0.4 of what is left.
+fn lagging(n_runs: usize) -> Recording {
+    let mut recording = two_grounds(n_runs);
+    for run in &mut recording.runs {
+        let mut turning_per_m = 0.0;
+        for (k, tick) in run.ticks.iter_mut().enumerate() {
+            turning_per_m += 0.4 * (tick.curvature_per_m - turning_per_m);
+            tick.yaw_rate_radps = tick.speed_mps * turning_per_m;
+            for sample in &mut run.imu[10 * k..10 * (k + 1)] {
+                sample.angular_rate_radps[2] = tick.yaw_rate_radps;
+            }
+        }
+    }
+    recording
+}
+
+/// Who feels a curvature k and wishes k + 0.15 answers k + 0.15 / 0.4: it leads the lag.
+#[test]
+fn inverse_of_a_forward_model_leads_a_lag_that_it_feels() {
+    let recording = lagging(4);
+    let labels = LabelConfig { effect: EffectPart::Beginning, ..LabelConfig::unfiltered(0.0) };
+    let sensing = Sensing::Imu { embedding: 2 };
+    let settings = Settings { labels, teacher: Teacher::ForwardModel, ..settings(sensing, 10) };
+    let outcome = train(&recording, &settings, "test", &mut |_| ControlFlow::Continue(())).unwrap();
+    let mut model = InverseModel::new(&outcome.checkpoint, Instructions::widest()).unwrap();
+    let (examples, _) = label(&recording, &outcome.checkpoint.sidecar().labels);
+    let mut squares = [0.0; 2];
+    let slow = examples.iter().filter(|example| example.driven[0] > 1.2);
+    let slow = slow.filter(|example| example.window[3 * WINDOW - 1].abs() < 0.4 * example.driven[0]);
+    for (n, example) in slow.step_by(7).enumerate() {
+        let speed_mps = example.driven[0];
+        let felt_per_m = example.window[3 * WINDOW - 1] / speed_mps;
+        model.sense_columns(&example.window);
+        let wish_per_m = felt_per_m + 0.15;
+        let found = model.command(Desired { speed_mps, curvature_per_m: wish_per_m }).curvature_per_m;
+        for (square, answer_per_m) in squares.iter_mut().zip([found, wish_per_m]) {
+            *square += ((answer_per_m - felt_per_m - 0.15 / 0.4).powi(2) - *square) / (n + 1) as f32;
+        }
+    }
+    let [found, wish] = squares.map(f32::sqrt);
+    println!("off by {found:.3}, the wish itself by {wish:.3} 1/m");
+    // The wish itself is off by 0.15 / 0.4 - 0.15 = 0.225.
+    assert!(found < 0.4 * wish, "{found} {wish}");
+}
+
+#[test]
+fn forward_model_teaches_no_speeds() {
+    let architecture = Architecture { answer: Answer::SpeedAndCurvature, ..Architecture::ABLATION };
+    let settings = Settings { teacher: Teacher::ForwardModel, ..Settings::paper(architecture, 1) };
+    let refused = train(&two_grounds(1), &settings, "", &mut |_| ControlFlow::Continue(())).unwrap_err();
+    assert!(refused.to_string().starts_with("answers: expected curvature alone"), "{refused}");
+}
+
 #[test]
 fn every_unit_answers_to_some_of_the_data() {
-    let network = Network::new(&Architecture::PAPER, 3).unwrap();
+    let network = Network::inverse(&Architecture::PAPER, 3).unwrap();
     let rows = 64;
     let wave = |n: usize| Tensor::from_vec((0..n).map(|k| (k as f32 * 0.7).sin()).collect(), n, &Device::Cpu);
     // All windows lie to one side, which leaves half of the first units silent.
@@ -166,7 +252,7 @@ fn flat_weights_answer_as_candle_does() {
         let sensing = if embedding == 0 { Sensing::Blind } else { Sensing::Imu { embedding } };
         let settings = Settings { architecture: Architecture { sensing, answer }, ..settings(sensing, 2) };
         let outcome = train(&recording, &settings, "test", &mut |_| ControlFlow::Continue(())).unwrap();
-        let network = Network::new(&settings.architecture, 5).unwrap();
+        let network = Network::inverse(&settings.architecture, 5).unwrap();
         for (variable, (name, _)) in named(&network) {
             let tensor = &outcome.checkpoint.tensors()[&name];
             variable

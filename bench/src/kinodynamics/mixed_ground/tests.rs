@@ -54,6 +54,7 @@ fn an_adapted_model_knows_the_understeer_of_the_car() {
         epochs: 1,
         laps: 1,
         labels: kinodynamics::LabelConfig::paper(0.0),
+        teacher: kinodynamics::Teacher::Examples,
         rows: Vec::new(),
         half_width_m: 0.29,
     };
