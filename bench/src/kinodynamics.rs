@@ -26,7 +26,8 @@ use std::sync::Arc;
 
 use bicycle::Vehicle;
 use bicycle::lanes::Instructions;
-use kinodynamics::{LabelConfig, Latency, Teacher, TrainError, label};
+pub use kinodynamics::Teacher;
+use kinodynamics::{LabelConfig, Latency, TrainError, label};
 use rayon::prelude::*;
 use scenarios::{CommandError, PlantError, World, WorldError, seed_of};
 use serde::Serialize;

@@ -1,6 +1,6 @@
 //! The report as text.
 
-use bench::kinodynamics::{DataPoint, Report, Row, RowReport, TrackReport, TrainingReport};
+use bench::kinodynamics::{DataPoint, Report, Row, RowReport, Teacher, TrackReport, TrainingReport};
 
 use crate::verdict;
 
@@ -17,12 +17,16 @@ pub(super) fn published(row: Row) -> [Option<f64>; 2] {
 /// Everything.
 pub fn text(report: &Report) -> String {
     let mut told = format!(
-        "  {} minutes of random driving, latency {:.3} s, dead time {:.3} s; examples from {:.3} s on; walls {} m from the nominal line; {} laps at every speed\n  the ground \
+        "  {} minutes of random driving, latency {:.3} s, dead time {:.3} s; examples from {:.3} s on{}; walls {} m from the nominal line; {} laps at every speed\n  the ground \
          is named rightly in {:.2} of the cases from the unit, {:.2} from speed and curvature, {:.2} by chance\n\n",
         report.minutes,
         report.latency.seconds,
         report.latency.dead_time_s,
         report.labels.latency_s,
+        match report.teacher {
+            Teacher::Examples => "",
+            Teacher::ForwardModel => ", learned through a forward model",
+        },
         report.half_width_m,
         report.laps,
         report.probe.from_imu,
