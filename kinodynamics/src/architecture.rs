@@ -21,6 +21,7 @@ const FORWARD_HIDDEN: usize = 64;
 const FORWARD_EMBEDDING: usize = 16;
 /// Width of the command network's two hidden layers.
 const COMMAND_HIDDEN: usize = 32;
+
 /// What a model knows of the ground.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]

@@ -5,6 +5,7 @@
 //! from Adam's averages; the learning rate begins at 1e-3 and sinks to nothing along a cosine. Networks begin so that what
 //! can be learned is in reach: as the nominal model, with an embedding that tells how much the unit shakes, and with units
 //! of which each answers to some of the data. Of three starts the one goes on that does best after a tenth of the passes.
+//! Where a forward model teaches ([`Teacher`]), it is fitted beforehand in the same way.
 
 mod data;
 mod density;
