@@ -42,7 +42,7 @@ fn random_driving_is_recorded_and_learned_from() {
     let latency_s = written["latency"]["seconds"].as_f64().expect("a number");
     assert!((0.08..0.18).contains(&latency_s), "{latency_s}");
     let sidecar = json(&here.join("weights/kinodynamics.json"));
-    assert_eq!((&sidecar["vehicle"]["name"], &sidecar["format"]), (&"ut_automata".into(), &2.into()));
+    assert_eq!((&sidecar["vehicle"]["name"], &sidecar["format"]), (&"ut_automata".into(), &3.into()));
     what_was_learned_corrects_a_drive(here);
 }
 
