@@ -180,7 +180,8 @@ fn lagging(n_runs: usize) -> Recording {
         for (k, tick) in run.ticks.iter_mut().enumerate() {
             turning_per_m += 0.4 * (tick.curvature_per_m - turning_per_m);
             tick.yaw_rate_radps = tick.speed_mps * turning_per_m;
-            for sample in &mut run.imu[10 * k..10 * (k + 1)] {
+            // What a command does begins after its own moment, up to which the history reaches.
+            for sample in run.imu.iter_mut().skip(10 * k + 1).take(10) {
                 sample.angular_rate_radps[2] = tick.yaw_rate_radps;
             }
         }
