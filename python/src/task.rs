@@ -29,8 +29,8 @@ impl Task {
     /// 40 m through a rock field that belongs to the seed.
     ///
     /// settings: a dict, TOML text or a path with what differs from the default field: side_m, resolution_m, rolling_std_m,
-    /// test_height_scale, and for "small", "medium", "boulders" and "ridges" density_per_m2, height_m, height_to_radius and
-    /// elongation. Raises `ValueError` for a setting out of range.
+    /// test_height_scale, and for "small", "medium", "boulders" and "ridges" density_per_m2, height_m, height_to_radius,
+    /// elongation and gap_m. Raises `ValueError` for a setting out of range.
     #[staticmethod]
     #[pyo3(signature = (seed, settings: "_Settings | None" = None))]
     fn rock_field(py: Python<'_>, seed: u64, settings: Option<&Bound<'_, PyAny>>) -> PyResult<Self> {

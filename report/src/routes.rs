@@ -7,7 +7,7 @@ mod map;
 mod text;
 
 pub use bars::picture;
-pub use experts::experts;
+pub use experts::{experts, experts_picture};
 pub use grip::grip;
 pub use map::map;
 pub use text::text;

@@ -8,12 +8,13 @@ use std::path::Path;
 
 use bench::closed_loop::Method;
 use bench::navigation::{DriveResult, Plan, Report, Request};
+use bench::route::{Attempt, End, ExpertReport, Pair};
 use bicycle::Vehicle;
 use navigator::Areas;
 use report::drive::{DrivePicture, PathSample, RiskLayer};
 use scenarios::{
-    ARENA_GOAL_M, ARENA_START, ArenaConfig, Outcome, RockFieldConfig, RockMap, Split, World, arena,
-    rock_field,
+    ARENA_GOAL_M, ARENA_START, ArenaConfig, LandscapeKind, Outcome, RockFieldConfig, RockMap, Split, World,
+    arena, rock_field,
 };
 use terrain::GridMap;
 use traversability::CvarLevel;
@@ -269,4 +270,33 @@ fn navigation_over_the_risk_tolerance_needs_two_of_them() {
     assert_eq!(kept(picture.file, &picture.png)[0], 1600);
     table.rows.retain(|row| row.alpha.is_none_or(|alpha| alpha == 0.6));
     assert!(report::navigation::picture_of_levels(&table).expect("no page").is_none());
+}
+
+/// Ten tasks of each landscape, of which a drive of each kind ends early.
+fn made_up_experts() -> ExpertReport {
+    let attempt = |expected_s: f64, end: End| Attempt {
+        planning_s: 0.1,
+        length_m: 8.0 * expected_s,
+        expected_s,
+        end,
+        time_s: if end == End::Goal { 1.07 * expected_s } else { 0.4 * expected_s },
+    };
+    let pair = |landscape: LandscapeKind, task: usize| {
+        let ours_s = 20.0 + 3.0 * task as f64;
+        let end = |n: usize| if task == n { End::Collision } else { End::Goal };
+        let (ours, reference) = (attempt(ours_s, end(8)), attempt(0.92 * ours_s, end(3)));
+        Pair { landscape, task, ours, reference }
+    };
+    let pairs = LandscapeKind::ALL.iter().flat_map(|kind| (0..10).map(|task| pair(*kind, task))).collect();
+    ExpertReport { vehicle: "pietra_full_size".to_owned(), seed: 1, rows: Vec::new(), pairs }
+}
+
+#[test]
+fn experts_with_and_without_tasks() {
+    let full = made_up_experts();
+    let empty = ExpertReport { pairs: Vec::new(), ..full.clone() };
+    for (name, report) in [("experts.png", full), ("experts_empty.png", empty)] {
+        let size = kept(name, &report::routes::experts_picture(&report).expect("a page"));
+        assert_eq!(size[0], 1600);
+    }
 }

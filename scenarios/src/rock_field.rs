@@ -41,11 +41,11 @@ pub struct RockMap {
     pub index: u32,
 }
 
-/// Rocks of one kind, scattered as a Poisson process.
+/// Rocks of one kind, scattered as a Poisson process that is thinned where they would stand too close.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RockPopulation {
-    /// Mean number of rocks per square metre.
+    /// Mean number of rocks per square metre, before any is left out.
     pub density_per_m2: f64,
     /// Smallest and largest height, log-uniform between [m].
     pub height_m: [f64; 2],
@@ -53,6 +53,8 @@ pub struct RockPopulation {
     pub height_to_radius: [f64; 2],
     /// Smallest and largest ratio of length to width; above 2 the rocks are ridges [-].
     pub elongation: [f64; 2],
+    /// A rock whose centre is nearer than this to one of its kind that is there already is left out [m].
+    pub gap_m: f64,
 }
 
 /// What a rock field looks like. Density and steepness of `boulders` and `ridges` decide whether there is a way
@@ -91,6 +93,7 @@ impl Default for RockFieldConfig {
             height_m,
             height_to_radius,
             elongation,
+            gap_m: 0.0,
         };
         Self {
             side_m: 50.0,
@@ -139,10 +142,25 @@ impl RockFieldConfig {
         }
     }
 
-    /// The field of the navigation benchmark: to tell methods apart, what believes in level ground fails on it in two
-    /// drives of five or more, what knows the truth hardly ever.
+    /// The field of the navigation benchmark: boulders that nothing drives over, with room for a vehicle between them,
+    /// among rocks that the belly clears. Frozen on drives that believe in level ground, about half of which fail, and
+    /// on drives that know the truth, which hardly ever do.
     pub fn navigation() -> Self {
-        Self::default()
+        let default = Self::default();
+        Self {
+            medium: RockPopulation { density_per_m2: 0.06, height_m: [0.07, 0.13], ..default.medium },
+            boulders: RockPopulation {
+                density_per_m2: 0.04,
+                height_m: [0.5, 0.7],
+                height_to_radius: [0.4, 0.6],
+                elongation: [1.0, 1.3],
+                gap_m: 5.5,
+            },
+            ridges: RockPopulation { density_per_m2: 0.0, ..default.ridges },
+            rolling_std_m: 0.08,
+            pad_radius_m: 7.0,
+            ..default
+        }
     }
 
     /// Refuses settings that no field can have.
@@ -167,6 +185,7 @@ impl RockFieldConfig {
             check_range(&format!("{name}.height_m"), population.height_m)?;
             check_range(&format!("{name}.height_to_radius"), population.height_to_radius)?;
             check_range(&format!("{name}.elongation"), population.elongation)?;
+            check(&format!("{name}.gap_m"), population.gap_m, not_negative, |v| v >= 0.0)?;
         }
         Ok(())
     }
@@ -258,9 +277,15 @@ fn scatter(population: &RockPopulation, side_m: f64, rng: &mut Xoshiro256PlusPlu
     let margin_m = population.height_m[1] / population.height_to_radius[0] * population.elongation[1];
     let mean = population.density_per_m2 * (side_m + 2.0 * margin_m).powi(2);
     let Ok(count) = Poisson::new(mean) else { return };
+    let mut centres_m: Vec<[f64; 2]> = Vec::new();
     for _ in 0..count.sample(rng) as usize {
         let centre_m = [(); 2].map(|()| rng.random_range(-margin_m..side_m + margin_m));
-        Rock::random(population, centre_m, rng).raise(rocks);
+        let rock = Rock::random(population, centre_m, rng);
+        let is_near = |[x_m, y_m]: &[f64; 2]| (centre_m[0] - x_m).hypot(centre_m[1] - y_m) < population.gap_m;
+        if !centres_m.iter().any(is_near) {
+            rock.raise(rocks);
+            centres_m.push(centre_m);
+        }
     }
 }
 

@@ -180,6 +180,29 @@ fn the_belly_hangs_up_on_a_ridge_that_the_wheels_clear() {
     assert!(at(0.60).linear_traction < 0.1, "{:?}", at(0.60));
 }
 
+/// The wheels are 1.55 m apart and the belly is 0.42 m above the ground: rocks with a flat top of 0.8 m between them.
+#[test]
+fn the_plant_hangs_on_the_rocks_that_the_truth_says() {
+    for (slope, left_m) in [(0.8, 0.0), (0.8, 0.35), (1.2, 0.0), (1.2, 0.35)] {
+        for (rock_m, hangs) in [(0.4, false), (0.6, true)] {
+            let height_m = move |x: f64, y: f64| {
+                let beyond_top_m = (x.hypot(y - left_m) - 0.4).max(0.0);
+                (rock_m - slope * beyond_top_m).max(0.0)
+            };
+            let world = ground(height_m, |_, _| Patch::open(Stribeck::ROCK));
+            let truth = Truth::new(&full_size(), Arc::clone(&world));
+            let along = (-70..70).map(|x| truth.traversability(0.1 * f64::from(x), 0.0, 0.0).linear_traction);
+            let least = along.fold(1.0, f64::min);
+            let mut plant = Plant::new(&full_size(), world, [-7.0, 0.0, 0.0]).unwrap();
+            plant.set_command(Command { speed_mps: 1.0, steering_rad: 0.0 }).unwrap();
+            plant.advance(12.0);
+            let (ends_m, rock) = (plant.pose().x_m, format!("{rock_m} m, {slope}, {left_m} m to the left"));
+            assert_eq!(ends_m < 0.0, hangs, "{rock}: the plant ends at {ends_m}");
+            assert_eq!(least < 0.05, hangs, "{rock}: least traction {least}");
+        }
+    }
+}
+
 #[test]
 fn obstacles_block_where_the_outline_covers_them() {
     let post = |x: f64, y: f64| (3.0..3.2).contains(&x) && (0.6..0.8).contains(&y);

@@ -152,6 +152,7 @@ fn rocks_cover_the_share_of_ground_that_a_poisson_process_would() {
         height_m: [0.5, 0.5],
         height_to_radius: [0.5, 0.5],
         elongation: [1.0, 1.0],
+        gap_m: 0.0,
     };
     let config = RockFieldConfig {
         small: none,
@@ -172,6 +173,41 @@ fn rocks_cover_the_share_of_ground_that_a_poisson_process_would() {
     // more where the sides are unevenly spread: up to 4.2 m2.
     let area_m2 = -(1.0 - covered).ln() / 0.2;
     assert!((3.0..4.2).contains(&area_m2), "mean rock area {area_m2} m2");
+}
+
+#[test]
+fn rocks_with_a_gap_stand_apart() {
+    let none = RockPopulation {
+        density_per_m2: 0.0,
+        height_m: [0.2, 0.2],
+        height_to_radius: [0.5, 0.5],
+        elongation: [1.0, 1.0],
+        gap_m: 0.0,
+    };
+    // Sides at up to 0.46 m from the centre, five of them up to 115 degrees apart: no corner is farther out than
+    // 0.46 / cos(57.6 deg) = 0.86 m. Cells of one rock are within 1.72 m, those of two beyond 8 - 1.72 = 6.28 m.
+    let between = |gap_m: f64| {
+        let boulders = RockPopulation { density_per_m2: 0.05, gap_m, ..none };
+        let (small, medium, ridges) = (none, none, none);
+        let config = RockFieldConfig {
+            small,
+            medium,
+            boulders,
+            ridges,
+            rolling_std_m: 0.0,
+            ..RockFieldConfig::default()
+        };
+        let world = rock_field(&config, RockMap { seed: 3, split: Split::Train, index: 0 }, &[]).unwrap();
+        let geometry = *world.geometry();
+        let raised = (0..geometry.n_cells()).filter(|&index| world.heights.values()[index] > 0.0);
+        let raised_m: Vec<_> = raised.map(|index| geometry.centre_m(geometry.cell(index))).collect();
+        assert!(raised_m.len() > 500, "{} cells are raised", raised_m.len());
+        let apart_m = |a: &[f64; 2], b: &[f64; 2]| (a[0] - b[0]).hypot(a[1] - b[1]);
+        let pairs = raised_m.iter().flat_map(|a| raised_m.iter().map(move |b| apart_m(a, b)));
+        pairs.filter(|apart_m| (1.72..6.28).contains(apart_m)).count()
+    };
+    assert_eq!(between(8.0), 0);
+    assert!(between(0.0) > 0);
 }
 
 /// Unevenness at a low-discrepancy spread of poses (golden ratio steps) over all maps of a split, sorted.

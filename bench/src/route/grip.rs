@@ -100,15 +100,14 @@ struct Case {
 }
 
 /// Turns and climbs on the seven grounds as published, and on those that drives of `n_drives` seeds from `seed` on
-/// found.
+/// found. `after` is called after each drive and after each ground, with how many of both there are as far as is known.
 ///
 /// # Errors
 /// A vehicle that cannot be driven.
 pub fn measure_grip(
-    vehicle: &Vehicle,
-    seed: u64,
-    n_drives: u64,
-    n_threads: usize,
+    (vehicle, n_threads): (&Vehicle, usize),
+    (seed, n_drives): (u64, u64),
+    after: impl Fn(usize) + Sync,
 ) -> Result<Vec<GripRow>, GripError> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(n_threads).build()?;
     let published = GroundKind::ALL.map(|kind| Case {
@@ -117,7 +116,12 @@ pub fn measure_grip(
         truth: kind.friction(),
         friction: f64::from(FrictionCurve::PUBLISHED[kind as usize].1.at(SLIDING_MPS as f32)),
     });
-    let found = in_turns(&pool, n_drives as usize, |index| found_grounds(vehicle, seed + index as u64))?;
+    let n_drives = n_drives as usize;
+    let found = in_turns(&pool, n_drives, |index| {
+        let found = found_grounds(vehicle, seed + index as u64);
+        after(n_drives + GroundKind::ALL.len());
+        found
+    })?;
     let found = found.into_iter().flatten().map(|found| Case {
         ground: found.name,
         source: Source::Driven,
@@ -127,7 +131,11 @@ pub fn measure_grip(
     let cases: Vec<Case> = published.into_iter().chain(found).collect();
     let mut vehicle = super::unbound(vehicle);
     vehicle.limits.speed_max_mps = 25.0;
-    in_turns(&pool, cases.len(), |index| row(&vehicle, &cases[index]))
+    in_turns(&pool, cases.len(), |index| {
+        let row = row(&vehicle, &cases[index]);
+        after(n_drives + cases.len());
+        row
+    })
 }
 
 fn row(vehicle: &Vehicle, case: &Case) -> Result<GripRow, GripError> {

@@ -75,7 +75,7 @@ Writes route_table.png (bars), route_garden.png and route_island.png (the routes
   verdicts     the rules, which were fixed before the first drive
   drives       every drive
   grip         turns and climbs
-With --reference, route_reference.json alone, with rows and pairs.
+With --reference, route_reference.json alone, with rows and pairs, and route_reference.png.
 
 Examples:
   surefoot bench route

@@ -33,7 +33,13 @@ pub(crate) fn run_route(arguments: &BenchRouteArguments) -> anyhow::Result<()> {
         n_threads: arguments.threads.count(),
     };
     let (n_grip_drives, n_threads) = (u64::from(arguments.grip_drives), request.n_threads);
-    let grip = measure_grip(&request.vehicle, request.seed, n_grip_drives, n_threads).map_err(refused)?;
+    let bar = progress::bar(n_grip_drives, "{pos}/{len} drives and grounds");
+    let grip = measure_grip((&request.vehicle, n_threads), (request.seed, n_grip_drives), |n| {
+        bar.set_length(n as u64);
+        bar.inc(1);
+    });
+    bar.finish_and_clear();
+    let grip = grip.map_err(refused)?;
     print!("{}", report::routes::grip(&grip));
     let bar = progress::bar(n_drives(&request) as u64, "{pos}/{len} drives");
     let report = measure(&request, || bar.inc(1));
@@ -60,7 +66,8 @@ fn run_reference(arguments: &BenchRouteArguments, vehicle: &Vehicle, n_tasks: us
     print!("{}", report::routes::experts(&report));
     let results = &arguments.results;
     results.write_json("route_reference.json", &WithRevision::of(&report))?;
-    println!("\n  route_reference.json in {}", results.out.display());
+    results.write("route_reference.png", &report::routes::experts_picture(&report)?)?;
+    println!("\n  route_reference.json and route_reference.png in {}", results.out.display());
     Ok(())
 }
 
