@@ -6,7 +6,7 @@ use bench::closed_loop::layers_of;
 use formats::{overlay, read_elevation};
 use numpy::ndarray::Ix2;
 use pyo3::prelude::*;
-use scenarios::{ArenaConfig, PairWish, RockFieldConfig, WorldLayers};
+use scenarios::{ArenaConfig, PairWish, RockFieldConfig, RockMap, Split, WorldLayers};
 use terrain::{GridGeometry, GridMap};
 
 use crate::arrays::{kind, numbers, owned};
@@ -19,8 +19,8 @@ use crate::vehicle::Vehicle;
 
 /// A drive to be done: a world, a start, a goal.
 ///
-/// Made by `Task.rock_field`, `Task.arena` and `Task.terrain`. The same arguments give the same world, bit for bit. A task can
-/// be driven any number of times, by any number of simulations at once, which share its world.
+/// Made by `Task.rock_field`, `Task.navigation`, `Task.arena` and `Task.terrain`. The same arguments give the same world, bit
+/// for bit. A task can be driven any number of times, by any number of simulations at once, which share its world.
 #[pyclass(frozen, module = "surefoot")]
 pub struct Task(pub scenarios::Task);
 
@@ -36,6 +36,24 @@ impl Task {
     fn rock_field(py: Python<'_>, seed: u64, settings: Option<&Bound<'_, PyAny>>) -> PyResult<Self> {
         let config = changed(RockFieldConfig::default(), settings)?;
         detached(py, || scenarios::Task::rock_field(&config, seed))?.map(Self).map_err(refused_value)
+    }
+
+    /// A drive of `surefoot bench navigation`: 40 m between two cleared pads of a map.
+    ///
+    /// map and pair, from 0, and the seed of the maps, as the benchmark counts them; settings as of `rock_field`, for what
+    /// differs from the benchmark's field. Raises `ValueError` for a setting out of range, or that leaves no room for 40 m.
+    #[staticmethod]
+    #[pyo3(signature = (map, pair, *, seed=1, settings: "_Settings | None" = None))]
+    fn navigation(
+        py: Python<'_>,
+        map: u32,
+        pair: u32,
+        seed: u64,
+        settings: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<Self> {
+        let config = changed(RockFieldConfig::navigation(), settings)?;
+        let map = RockMap { seed, split: Split::Test, index: map };
+        detached(py, || scenarios::Task::on_rock_map(&config, map, pair))?.map(Self).map_err(refused_value)
     }
 
     /// A hall of 9.6 x 8 m with bushes and a ramp, for a car of 33 cm.

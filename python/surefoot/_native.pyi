@@ -976,8 +976,8 @@ class Surface:
 class Task:
     """A drive to be done: a world, a start, a goal.
 
-    Made by `Task.rock_field`, `Task.arena` and `Task.terrain`. The same arguments give the same world, bit for bit. A task can
-    be driven any number of times, by any number of simulations at once, which share its world.
+    Made by `Task.rock_field`, `Task.navigation`, `Task.arena` and `Task.terrain`. The same arguments give the same world, bit
+    for bit. A task can be driven any number of times, by any number of simulations at once, which share its world.
     """
 
     def __repr__(self) -> str:
@@ -1006,6 +1006,14 @@ class Task:
     def name(self) -> str:
         """What the world is called."""
 
+    @staticmethod
+    def navigation(map: SupportsIndex, pair: SupportsIndex, *, seed: SupportsIndex=1, settings: _Settings | None=None) -> Task:
+        """A drive of `surefoot bench navigation`: 40 m between two cleared pads of a map.
+
+        map and pair, from 0, and the seed of the maps, as the benchmark counts them; settings as of `rock_field`, for what
+        differs from the benchmark's field. Raises `ValueError` for a setting out of range, or that leaves no room for 40 m.
+        """
+
     @property
     def resolution_m(self) -> float:
         """Edge of a cell of the world [m]; its south-west corner is that of `bounds_m`."""
@@ -1015,8 +1023,8 @@ class Task:
         """40 m through a rock field that belongs to the seed.
 
         settings: a dict, TOML text or a path with what differs from the default field: side_m, resolution_m, rolling_std_m,
-        test_height_scale, and for "small", "medium", "boulders" and "ridges" density_per_m2, height_m, height_to_radius and
-        elongation. Raises `ValueError` for a setting out of range.
+        test_height_scale, and for "small", "medium", "boulders" and "ridges" density_per_m2, height_m, height_to_radius,
+        elongation and gap_m. Raises `ValueError` for a setting out of range.
         """
 
     @property

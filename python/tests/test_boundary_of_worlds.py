@@ -24,6 +24,7 @@ def entries(folder):
     decide = {"state": np.zeros(5), "risk_map": risk_map, "goal_m": (1.0, 0.0)}
     return [
         (surefoot.Task.rock_field, {"seed": 1, "settings": {"side_m": 50.0}}, 8),
+        (surefoot.Task.navigation, {"map": 0, "pair": 0, "seed": 1, "settings": {"side_m": 50.0}}, 8),
         (surefoot.Task.arena, {"settings": {"bush_height_m": 0.1}}, 20),
         (surefoot.Task.terrain, {
             "ground": slope, "vehicle": VEHICLE, "start": (3.0, 3.0, 0.0), "goal_m": (5.0, 5.0), "distance_m": 2.0, "seed": 1,

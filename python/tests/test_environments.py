@@ -304,3 +304,22 @@ def test_simulations_are_the_same_in_every_process(method):
     expected = drive_in_child(4)
     with multiprocessing.get_context(method).Pool(1) as pool:
         assert pool.apply(drive_in_child, (4,)) == expected
+
+
+def test_the_pairs_of_the_navigation_benchmark_are_40_m_apart_on_maps_of_their_own():
+    tasks = {(seed, map, pair): surefoot.Task.navigation(map, pair, seed=seed)
+             for seed, map, pair in ((1, 0, 0), (1, 0, 1), (1, 1, 0), (2, 0, 0))}  # fmt: skip
+    for task in tasks.values():
+        (x_m, y_m, yaw_rad), goal_m = task.start, np.array(task.goal_m)
+        there_m = np.array([x_m + 40.0 * np.cos(yaw_rad), y_m + 40.0 * np.sin(yaw_rad)])
+        np.testing.assert_allclose(there_m, goal_m, atol=1e-9)
+        # Pads of 7 m are level but for the rocks that a pad's edge cuts.
+        row, col = (goal_m[::-1] / task.resolution_m).astype(int)
+        pad_m = task.height_m[row - 45 : row + 45, col - 45 : col + 45]
+        assert pad_m.size == 0 or np.ptp(pad_m) < 1e-4
+    starts = {task.start for task in tasks.values()}
+    assert len(starts) == len(tasks)
+    again = surefoot.Task.navigation(0, 0, seed=1)
+    assert again.start == tasks[1, 0, 0].start and (again.height_m == tasks[1, 0, 0].height_m).all()
+    with pytest.raises(ValueError, match="room for a drive of 40 m"):
+        surefoot.Task.navigation(0, 0, settings={"side_m": 40.0})

@@ -9,6 +9,9 @@ use crate::canvas::{Anchor, Canvas, EncodeError, MARGIN, PAGE_WIDTH, Rect, Strok
 use crate::colour::Rgb;
 use crate::table::Table;
 
+/// Time of an attempt [s], and whether it got there.
+type TimeOf = fn(&Attempt) -> (f64, bool);
+
 const TOP: f64 = 175.0;
 const LINE: f64 = 30.0;
 const BETWEEN: f64 = 130.0;
@@ -121,23 +124,15 @@ fn draw_block(pairs: &[&Pair], top: f64, canvas: &mut Canvas) {
         x: Range { low: 0.0, high: (most_s / step).ceil() * step },
         y: Range { low: -n, high: 0.0 },
     };
-    let expected = |of: &Attempt| (of.expected_s, true);
-    let driven = |of: &Attempt| (of.time_s, of.end == End::Goal);
-    draw_panel(pairs, &axes(0.0), ("expected time [s]", &expected), canvas);
-    draw_panel(pairs, &axes(1.0), ("driven time [s]", &driven), canvas);
+    draw_panel(pairs, &axes(0.0), ("expected time [s]", |of| (of.expected_s, true)), canvas);
+    draw_panel(pairs, &axes(1.0), ("driven time [s]", |of| (of.time_s, of.end == End::Goal)), canvas);
     for (index, pair) in pairs.iter().enumerate() {
         let y = top + (index as f64 + 0.5) * LINE + 6.0;
         canvas.text((LABELS - 14.0, y), &format!("task {}", pair.task), LABEL);
     }
 }
 
-/// `time` is that of an attempt [s], and whether it got there.
-fn draw_panel(
-    pairs: &[&Pair],
-    axes: &Axes,
-    (label, time): (&str, &dyn Fn(&Attempt) -> (f64, bool)),
-    canvas: &mut Canvas,
-) {
+fn draw_panel(pairs: &[&Pair], axes: &Axes, (label, time): (&str, TimeOf), canvas: &mut Canvas) {
     axes.draw_rules(canvas);
     for (index, pair) in pairs.iter().enumerate() {
         let place = |of: &Attempt| axes.place(time(of).0, -(index as f64) - 0.5);
