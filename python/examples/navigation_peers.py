@@ -27,7 +27,9 @@ Command = tuple[float, float]
 #: What a planner makes of state, ground and goal.
 Planner = Callable[[State, surefoot.Surface, Point], Command]
 #: Cells of the costmap have so many of the elevation map along their edge.
-COARSE = 4
+COARSE = 2
+#: Cost of a metre that nobody has seen, beside 1 on level ground.
+UNKNOWN = 3.0
 #: The costmap is searched anew every so many cycles.
 CYCLES = 5
 
@@ -64,7 +66,8 @@ class Pursuit:
         high, low = np.where(known, blocks, -np.inf).max((1, 3)), np.where(known, blocks, np.inf).min((1, 3))
         reach = math.ceil(self.half_m / (COARSE * ground.resolution_m))
         step_m = np.maximum(spread(high, reach) + spread(-low, reach), 0.0)
-        return np.asarray(np.where(step_m > self.step_max_m, 100.0, 1.0 + 10.0 * step_m / self.step_max_m))
+        costs = np.where(step_m > self.step_max_m, 100.0, 1.0 + 10.0 * step_m / self.step_max_m)
+        return np.asarray(np.where(known.any((1, 3)), costs, UNKNOWN))
 
     def cheapest(self, ground: surefoot.Surface, at_m: NDArray[np.float64], goal_m: NDArray[np.float64]) -> NDArray[np.float64]:
         """Places along the cheapest way to the goal, or to the place of the map that is nearest to it."""

@@ -8,6 +8,8 @@ use crate::colour::{Ramp, Rgb};
 
 const PATH_WIDTH: f64 = 5.0;
 const PATH_RIM: f64 = 9.0;
+/// Height from which a map has its scale drawn inside [px].
+const SCALED_FROM: f64 = 300.0;
 const PLANNED: Stroke = Stroke { colour: Rgb::INK, width: 2.5, dash: "10 7" };
 
 pub(super) fn draw(picture: &DrivePicture<'_>, axes: &Axes, canvas: &mut Canvas) {
@@ -26,7 +28,10 @@ pub(super) fn draw_inside(picture: &DrivePicture<'_>, axes: &Axes, canvas: &mut 
         draw_driven(picture, axes, canvas);
         draw_walked(picture, axes, canvas);
         draw_ends(picture, axes, canvas);
-        draw_scale_bar(axes, canvas);
+        // On a low map it would hide the way, and the ticks tell lengths too.
+        if axes.frame.height > SCALED_FROM {
+            draw_scale_bar(axes, canvas);
+        }
     });
 }
 
