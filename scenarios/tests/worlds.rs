@@ -145,23 +145,22 @@ fn pads_are_level_and_clear() {
     }
 }
 
+/// Level ground with boulders of one shape, and these alone.
+fn boulders_alone(boulders: RockPopulation) -> RockFieldConfig {
+    let none = RockPopulation { density_per_m2: 0.0, ..boulders };
+    let (small, medium, ridges) = (none, none, none);
+    RockFieldConfig { small, medium, boulders, ridges, rolling_std_m: 0.0, ..RockFieldConfig::default() }
+}
+
 #[test]
 fn rocks_cover_the_share_of_ground_that_a_poisson_process_would() {
-    let none = RockPopulation {
-        density_per_m2: 0.0,
+    let config = boulders_alone(RockPopulation {
+        density_per_m2: 0.2,
         height_m: [0.5, 0.5],
         height_to_radius: [0.5, 0.5],
         elongation: [1.0, 1.0],
         gap_m: 0.0,
-    };
-    let config = RockFieldConfig {
-        small: none,
-        medium: none,
-        boulders: RockPopulation { density_per_m2: 0.2, ..none },
-        ridges: none,
-        rolling_std_m: 0.0,
-        ..RockFieldConfig::default()
-    };
+    });
     let mut covered = 0.0;
     for index in 0..4 {
         let world = rock_field(&config, RockMap { seed: 2, split: Split::Train, index }, &[]).unwrap();
@@ -177,26 +176,16 @@ fn rocks_cover_the_share_of_ground_that_a_poisson_process_would() {
 
 #[test]
 fn rocks_with_a_gap_stand_apart() {
-    let none = RockPopulation {
-        density_per_m2: 0.0,
-        height_m: [0.2, 0.2],
-        height_to_radius: [0.5, 0.5],
-        elongation: [1.0, 1.0],
-        gap_m: 0.0,
-    };
     // Sides at up to 0.46 m from the centre, five of them up to 115 degrees apart: no corner is farther out than
     // 0.46 / cos(57.6 deg) = 0.86 m. Cells of one rock are within 1.72 m, those of two at least 8 - 1.72 m apart.
     let between = |gap_m: f64| {
-        let boulders = RockPopulation { density_per_m2: 0.05, gap_m, ..none };
-        let (small, medium, ridges) = (none, none, none);
-        let config = RockFieldConfig {
-            small,
-            medium,
-            boulders,
-            ridges,
-            rolling_std_m: 0.0,
-            ..RockFieldConfig::default()
-        };
+        let config = boulders_alone(RockPopulation {
+            density_per_m2: 0.05,
+            height_m: [0.2, 0.2],
+            height_to_radius: [0.5, 0.5],
+            elongation: [1.0, 1.0],
+            gap_m,
+        });
         let world = rock_field(&config, RockMap { seed: 3, split: Split::Train, index: 0 }, &[]).unwrap();
         let geometry = *world.geometry();
         let raised = (0..geometry.n_cells()).filter(|&index| world.heights.values()[index] > 0.0);
