@@ -7,6 +7,7 @@ may know is what the vehicle knows: the measured state and the elevation map of 
 """
 
 import heapq
+import itertools
 import math
 import sys
 import time
@@ -111,8 +112,13 @@ def dijkstra(costs: NDArray[np.float64], start: tuple[int, int], goal: tuple[int
 
 def ours(vehicle: surefoot.Vehicle) -> Planner:
     """Surefoot's planner by the physics prior."""
-    planner = surefoot.Planner(vehicle)
-    return lambda state, ground, goal_m: planner.decide(state, ground, goal_m).command
+    planner, cycles = surefoot.Planner(vehicle), itertools.count()
+
+    def command(state: State, ground: surefoot.Surface, goal_m: Point) -> Command:
+        # A scan comes every other cycle; in between the map stays as it is.
+        return planner.decide(state, ground if next(cycles) % 2 == 0 else None, goal_m).command
+
+    return command
 
 
 PLANNERS: dict[str, Callable[[surefoot.Vehicle], Planner]] = {"pursuit on a costmap": Pursuit, "surefoot": ours}
