@@ -19,6 +19,7 @@ mod inspect;
 mod kernels;
 mod kinodynamics;
 mod learned_map;
+mod map;
 mod orders;
 mod plant;
 mod play;
@@ -62,6 +63,7 @@ pub use kinodynamics::{
     KinodynamicsLabelArguments, KinodynamicsRows, KinodynamicsSensing, KinodynamicsSpeed,
     TrainKinodynamicsArguments,
 };
+pub use map::MapArguments;
 pub use learned_map::{BenchLearnedMapArguments, NetworkSizes};
 pub use orders::{AlphaArguments, AskedRun, GoalArguments, PathArguments};
 pub use plant::BenchPlantArguments;
@@ -70,7 +72,7 @@ pub use replay::ReplayArguments;
 pub use results::{JsonArguments, ResultArguments};
 pub use risk::BenchRiskArguments;
 pub use robot::RobotArguments;
-pub use route::{BareGround, RouteArguments, RouteGround};
+pub use route::{BareGround, GroundKinds, RouteArguments, RouteGround};
 pub use scaling::BenchScalingArguments;
 pub use slippery::BenchSlipperyArguments;
 pub use train::{TrainArguments, TrainCommand};
@@ -139,6 +141,9 @@ pub enum Command {
     /// Search a route over measured ground, and the fastest speeds along it
     #[command(long_about = route::LONG_ABOUT)]
     Route(RouteArguments),
+    /// Merge what files and vehicles know of the ground into a map for routes that outgrows memory
+    #[command(long_about = map::LONG_ABOUT)]
+    Map(MapArguments),
     /// Say what a recording, an elevation map, a vehicle or networks hold
     #[command(long_about = inspect::LONG_ABOUT)]
     Inspect(InspectArguments),

@@ -9,10 +9,12 @@ pub(crate) mod record;
 pub(crate) mod scene;
 
 use std::collections::BTreeMap;
+use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 use bench::closed_loop::{self, ClosedLoop, Cycle, Drive, DriveError};
 use bicycle::{Decision, StopReason};
+use ::route::MapKeeper;
 use formats::config_hash;
 use report::drive::{DrivePicture, RiskLayer};
 use scenarios::{Episode, EpisodeConfig, Walker};
@@ -20,7 +22,9 @@ use traversability::CvarLevel;
 
 use crate::arguments::{DriveArguments, Goal, MapSource, Pace, StartPose};
 use crate::progress::{DriveProgress, ProgressLine};
+use crate::map::keep::{self, LOOK_PERIOD_S, Merged};
 use crate::route::Guided;
+use crate::route::known::class_friction;
 use crate::summary::{Milliseconds, Outcome, Summary, revision};
 use crate::{UsageError, interrupt};
 pub(crate) use correction::read_inverse_model;
@@ -38,6 +42,7 @@ pub(crate) fn run(arguments: &DriveArguments) -> anyhow::Result<()> {
     arguments.bush_height_m()?;
     let scene = scene::prepare(arguments)?;
     let mut guided = guided::plan(arguments, &scene)?;
+    let mut keeper = keeper(arguments, &scene)?;
     let mut closed = ClosedLoop::new(drive(arguments, &scene)?).map_err(|error| refused(arguments, error))?;
     closed.follow(scene::route(arguments, &scene.task)?)?;
     let results = &arguments.results;
@@ -50,14 +55,16 @@ pub(crate) fn run(arguments: &DriveArguments) -> anyhow::Result<()> {
     if let Some(why) = &scene.knowledge.why_not_learned {
         println!("  method physics: {why}");
     }
-    let kept = follow(arguments, &scene, &mut closed, guided.as_mut(), &mut recording)?;
+    let kept = follow(arguments, &scene, &mut closed, (guided.as_mut(), keeper.as_mut()), &mut recording)?;
+    let merged = keeper.map(MapKeeper::finish).transpose()?.map(|(_, report)| report);
     recording.finish()?;
     let summary = Summary {
         route: guided.as_ref().map(|guided| guided.told().clone()),
+        kept: arguments.keep.as_ref().zip(merged).map(|(folder, report)| Merged::of(folder.display().to_string(), report)),
         ..summarise(arguments, &scene, &closed, &kept, config_hash)
     };
     results.write_json(SUMMARY, &summary)?;
-    let planned = guided.as_ref().map(|guided| guided.route().line_m()).unwrap_or_default();
+    let planned = guided.as_ref().map(|guided| guided.route().line.places_m()).unwrap_or_default();
     results.write(PICTURE, &drawn(&scene, &closed, &kept, &planned, &summary)?)?;
     println!("{summary}");
     let files = [SUMMARY, RECORDING, PICTURE].map(|name| results.file(name));
@@ -136,6 +143,13 @@ fn drive<'a>(arguments: &DriveArguments, scene: &'a Scene) -> Result<Drive<'a>, 
     })
 }
 
+/// Keeps what is seen, where that was asked for.
+fn keeper(arguments: &DriveArguments, scene: &Scene) -> Result<Option<MapKeeper>, UsageError> {
+    let cell_m = scene.config.elevation.resolution_m;
+    let open = |folder: &PathBuf| keep::keeper(folder, cell_m, class_friction(&arguments.ground.kinds)?);
+    arguments.keep.as_ref().map(open).transpose()
+}
+
 /// Settings that cannot be together are told with the file that they come from.
 fn refused(arguments: &DriveArguments, error: DriveError) -> UsageError {
     let from_file = arguments.config.as_ref().filter(|_| matches!(error, DriveError::Navigator(_)));
@@ -148,7 +162,7 @@ fn follow(
     arguments: &DriveArguments,
     scene: &Scene,
     closed: &mut ClosedLoop,
-    mut guided: Option<&mut Guided>,
+    (mut guided, mut keeper): (Option<&mut Guided>, Option<&mut MapKeeper>),
     recording: &mut Recording,
 ) -> anyhow::Result<Kept> {
     let [x_m, y_m, _] = scene.task.start;
@@ -157,6 +171,7 @@ fn follow(
         KnownRisk::new(scene.task.world.bounds(), scene.config.risk_resolution_m(), &scene.vehicle.limits);
     let mut kept = Kept { tally: Tally::default(), known, walked: Vec::new() };
     let began = Instant::now();
+    let cycles_per_look = (LOOK_PERIOD_S / closed.episode.cycle_s()).round() as u64;
     while closed.episode.outcome().is_none() {
         let measured = closed.episode.observe().clone();
         let cycle = match &scene.script {
@@ -165,6 +180,9 @@ fn follow(
         };
         if let Some(guided) = &mut guided {
             guided::lead(guided, closed, scene.task.goal_tolerance_m, cycle.map_ms.is_some())?;
+        }
+        if let Some(keeper) = keeper.as_mut().filter(|_| closed.episode.n_cycles() % cycles_per_look == 1) {
+            keeper.look(closed.navigator.surface())?;
         }
         kept.tally.count(&cycle, closed.episode.cycle_s());
         if let Some(map) = closed.navigator.risk_map().filter(|_| cycle.map_ms.is_some()) {
@@ -184,6 +202,7 @@ fn follow(
         }
     }
     progress.finish();
+    keeper.map_or(Ok(()), |keeper| keeper.look(closed.navigator.surface()))?;
     Ok(kept)
 }
 
@@ -245,6 +264,7 @@ fn summarise(
         walked_into: episode.n_walked_into(),
         was_avoidable: episode.strike().map(|strike| strike.was_avoidable),
         route: None,
+        kept: None,
         correction: closed.navigator.corrector().map(|corrector| corrector.counts().clone()),
         seed: arguments.seed,
         vehicle: scene.vehicle.name.clone(),

@@ -97,6 +97,7 @@ mod failure;
 mod gap;
 mod inspect;
 pub mod interrupt;
+mod map;
 mod orders;
 pub mod output;
 mod play;
@@ -178,6 +179,7 @@ fn dispatch(command: Command) -> anyhow::Result<()> {
         Command::Play(play) => play::run(&play),
         Command::Convert(convert) => convert::run(&convert),
         Command::Route(route) => route::run(&route),
+        Command::Map(map) => map::run(&map),
         Command::Inspect(inspect) => inspect::run(&inspect),
         Command::Gap { command } => gap::run(&command),
         Command::Collect(collect) => collect::run(&collect),

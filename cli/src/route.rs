@@ -2,24 +2,27 @@
 
 mod answer;
 mod guided;
+pub(crate) mod known;
 mod lead;
+pub(crate) mod tiles;
 
 use std::path::Path;
 
-use ::route::{FrictionCurve, GroundLayers, Planner, RouteConfig, RouteError, SpeedLimits};
+use ::route::{Planner, RouteConfig, RouteError, RouteLine, SpeedLimits};
 use bicycle::Vehicle;
 use bus::channel::RunName;
-use formats::{ConfigText, ElevationFile, read_elevation, read_vehicle};
-use friction::FrictionTable;
-use navigator::{Config, FrictionConfig};
+use formats::read_vehicle;
+use navigator::Config;
 
-use crate::arguments::{BareGround, RouteArguments, RouteGround, StartPose};
+use crate::arguments::{GroundKinds, RouteArguments, RouteGround, StartPose};
 use crate::{UsageError, WorkFailed};
 use answer::Answer;
 pub use guided::GuidedSummary;
 use guided::SearchedMap;
 pub(crate) use guided::{Guided, Place};
+use known::{Known, known};
 use lead::Led;
+use tiles::Tiles;
 
 /// Share of the attitude limits that a route may use; the rest is for what no map shows.
 const ATTITUDE_SHARE: f64 = 0.9;
@@ -32,18 +35,37 @@ pub(crate) fn run(arguments: &RouteArguments) -> anyhow::Result<()> {
     if let Some(name) = &arguments.lead {
         return lead(arguments, &vehicle, name, goal_m);
     }
-    let limits = speed_limits(&vehicle, arguments.speed)?;
-    let file = read_elevation(&arguments.world).map_err(UsageError::from_input)?;
-    let planner = planner(&vehicle, &file, &arguments.ground, vehicle.geometry.width_m + MARGIN_M)?;
-    arguments.results.prepare()?;
     let start =
         arguments.start.ok_or_else(|| UsageError("--start: expected X,Y,YAW, found none".to_owned()))?;
     let from = ([start.x_m, start.y_m], start.yaw_rad);
+    let limits = speed_limits(&vehicle, arguments.speed)?;
+    let config = config(&vehicle, vehicle.geometry.width_m + MARGIN_M);
+    if arguments.world.is_dir() {
+        refuse_kinds(&arguments.ground.kinds)?;
+        let tiles = Tiles::open(&arguments.world, &arguments.ground)?;
+        if !tiles.fits([from.0, goal_m]) {
+            arguments.results.prepare()?;
+            return tiles.far((&vehicle, &config, &limits), from, goal_m, arguments);
+        }
+    }
+    let Known { ground, reference } = known(&arguments.world, &arguments.ground, [from.0, goal_m])?;
+    let planner = Planner::new(ground, config).map_err(UsageError::from_input)?;
+    arguments.results.prepare()?;
     let route = planner.route(from, goal_m, &limits).map_err(failed)?;
     let n_others = usize::from(arguments.alternatives);
     let others = planner.alternatives(from, goal_m, &limits, &route, n_others);
-    let reference = file.reference();
-    Answer { planner: &planner, route: &route, others: &others, reference }.show(&vehicle, arguments)
+    let others: Vec<&RouteLine> = others.iter().map(|other| &other.line).collect();
+    Answer { others: &others, reference, ..Answer::of(&planner, &route) }.show(&vehicle, arguments)
+}
+
+/// A map in tiles says of every cell itself how much it holds.
+fn refuse_kinds(kinds: &GroundKinds) -> Result<(), UsageError> {
+    let found = match (kinds.bare, &kinds.friction) {
+        (Some(_), _) => "--bare",
+        (None, Some(_)) => "--friction",
+        (None, None) => return Ok(()),
+    };
+    Err(UsageError(format!("{found}: expected with a file, or where `surefoot map` merges one, found with a map in tiles")))
 }
 
 /// Leads the vehicle of a run to the goal, and shows the route that it drove in the end.
@@ -68,26 +90,27 @@ fn lead(
     led.lead(&mut guided)?;
     let GuidedSummary { n_again, n_kept, .. } = guided.told();
     println!("run {name}: goal reached; {n_again} routes again, {n_kept} times none other was found");
-    let (planner, route, reference) = (guided.planner(), guided.route(), guided.reference());
-    Answer { planner, route, others: &[], reference }.show(vehicle, arguments)
+    let answer = Answer::of(guided.planner(), guided.route());
+    Answer { reference: guided.reference(), ..answer }.show(vehicle, arguments)
 }
 
-/// A route to lead a vehicle along, over the ground of an elevation file.
+/// A route to lead a vehicle along, over the ground of an elevation file or of a map in tiles.
 pub(crate) fn guided(
     world: &Path,
     asked: &RouteGround,
     asked_mps: Option<f64>,
-    (vehicle, config): (&Vehicle, &Config),
+    (vehicle, settings): (&Vehicle, &Config),
     start: Place,
     goal_m: [f64; 2],
 ) -> anyhow::Result<Guided> {
     // Whoever turns on the way sweeps his length.
-    let file = read_elevation(world).map_err(UsageError::from_input)?;
-    let planner = planner(vehicle, &file, asked, vehicle.geometry.length_m + MARGIN_M)?;
+    let config = config(vehicle, vehicle.geometry.length_m + MARGIN_M);
+    let Known { ground, reference } = known(world, asked, [start.at_m, goal_m])?;
+    let planner = Planner::new(ground, config).map_err(UsageError::from_input)?;
     let limits = speed_limits(vehicle, asked_mps)?;
     let name = world.file_name().unwrap_or_default().to_string_lossy().into_owned();
-    let map = SearchedMap { planner, name, reference: file.reference() };
-    Guided::plan(map, limits, (vehicle, config), start, goal_m).map_err(failed)
+    let map = SearchedMap { planner, name, reference };
+    Guided::plan(map, limits, (vehicle, settings), start, goal_m).map_err(failed)
 }
 
 /// Places where nobody can stand are bad input; no way between them is an answer.
@@ -96,31 +119,6 @@ fn failed(error: RouteError) -> anyhow::Error {
         RouteError::Outside { .. } | RouteError::Blocked { .. } => UsageError::from_input(error).into(),
         _ => WorkFailed(error.to_string()).into(),
     }
-}
-
-/// Searches the ground of an elevation file for routes of a vehicle, which are clear of obstacles by half of a width [m].
-fn planner(
-    vehicle: &Vehicle,
-    file: &ElevationFile,
-    asked: &RouteGround,
-    clear_width_m: f64,
-) -> Result<Planner, UsageError> {
-    let cell_m = asked.cell.unwrap_or_else(|| file.elevation.geometry().resolution_m.clamp(0.5, 2.0));
-    let learned = learned(asked.friction.as_deref())?;
-    let curve = |ground: BareGround| {
-        let (name, published) = ground.published();
-        learned.as_ref().map_or(published, |table| table.curve_or(name, published))
-    };
-    let layers = GroundLayers {
-        elevation_m: &file.elevation,
-        low_vegetation_fraction: file.layers.low_vegetation_fraction.as_ref(),
-        water: file.layers.water.as_ref(),
-        ground_gap_m: file.layers.ground_gap_m.as_ref(),
-        bare: curve(asked.bare),
-        grass: curve(BareGround::Grass),
-    };
-    let ground = layers.ground(cell_m).map_err(UsageError::from_input)?;
-    Planner::new(ground, config(vehicle, clear_width_m)).map_err(UsageError::from_input)
 }
 
 fn config(vehicle: &Vehicle, clear_width_m: f64) -> RouteConfig {
@@ -144,40 +142,4 @@ fn speed_limits(vehicle: &Vehicle, asked_mps: Option<f64>) -> Result<SpeedLimits
     };
     limits.validate().map_err(UsageError::from_input)?;
     Ok(limits)
-}
-
-impl BareGround {
-    fn published(self) -> (&'static str, FrictionCurve) {
-        FrictionCurve::PUBLISHED[self as usize]
-    }
-}
-
-/// Sliding speed at which the controller is told of friction [m/s].
-const TOLD_AT_MPS: f32 = 1.0;
-
-/// What the controller is told of friction, if a file was named.
-pub(crate) fn known_friction(asked: &RouteGround) -> Result<Option<FrictionConfig>, UsageError> {
-    let told = |table: FrictionTable| {
-        let at = |ground: BareGround| {
-            let (name, published) = ground.published();
-            Some(f64::from(table.curve_or(name, published).at(TOLD_AT_MPS)))
-        };
-        FrictionConfig {
-            open: at(asked.bare),
-            loose: at(BareGround::Sand),
-            vegetation: at(BareGround::Grass),
-        }
-    };
-    Ok(learned(asked.friction.as_deref())?.map(told))
-}
-
-/// The friction that drives showed, if a file was named.
-fn learned(path: Option<&Path>) -> Result<Option<FrictionTable>, UsageError> {
-    let Some(path) = path else { return Ok(None) };
-    let text = ConfigText::read(path).map_err(UsageError::from_input)?;
-    let table: FrictionTable = text.parse().map_err(UsageError::from_input)?;
-    match table.validate() {
-        Ok(()) => Ok(Some(table)),
-        Err(error) => Err(UsageError::from_input(text.refuse(&error.field, error.expected, error.found))),
-    }
 }

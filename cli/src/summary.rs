@@ -10,6 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::WorkFailed;
 use crate::arguments::{Goal, StartPose};
+pub use crate::map::keep::Merged;
 pub use crate::route::GuidedSummary;
 use bench::closed_loop::Method;
 pub use scenarios::Outcome;
@@ -86,6 +87,9 @@ pub struct Summary {
     /// What became of the routes that the drive followed; null where it followed none.
     #[serde(default)]
     pub route: Option<GuidedSummary>,
+    /// What became of what was seen in the map that it was kept in; null where none was.
+    #[serde(default)]
+    pub kept: Option<Merged>,
     /// What became of the commands on their way to the vehicle; null where nobody corrects them.
     #[serde(default)]
     pub correction: Option<CorrectionCounts>,
@@ -187,6 +191,9 @@ impl fmt::Display for Summary {
             row("route", format!("{length_m:.0} m in {expected_s:.0} s expected, over {map}"))?;
             row("routes again", format!("{n_again}, {n_kept} times none other was found"))?;
         }
+        if let Some(merged) = &self.kept {
+            row("kept in", merged.to_string())?;
+        }
         if let Some(correction) = &self.correction {
             row("correction", correction.to_string())?;
         }
@@ -246,6 +253,7 @@ mod tests {
             walked_into: 0,
             was_avoidable: None,
             route: None,
+            kept: None,
             correction: None,
             seed: 1,
             vehicle: "pietra_full_size".to_owned(),

@@ -55,6 +55,7 @@ fn refuse_what_needs_one_process(arguments: &UpArguments) -> Result<(), UsageErr
         (_, MapSource::Oracle) => "--oracle-map",
         _ if arguments.drive.commands.is_some() => "--commands",
         _ if arguments.drive.route.is_some() => "--route",
+        _ if arguments.drive.keep.is_some() => "--keep",
         _ if arguments.drive.pace == Some(Pace::Fast) => "--pace fast",
         _ => return Ok(()),
     };

@@ -75,6 +75,12 @@ fn what_makes_no_route_is_told_in_one_line() {
     assert_refused(&run(&two), 2, "--route: expected one --goal, found 2");
     assert_refused(&run(&["drive", "--route=/nowhere.npz"]), 2, "/nowhere.npz");
     assert_refused(&run(&["up", "--route"]), 2, "--route: expected only with surefoot drive");
+    assert_refused(&run(&["up", "--keep", "map"]), 2, "--keep: expected only with surefoot drive");
+    let nobody = folder.path().join("nobody").to_str().unwrap().to_owned();
+    std::fs::create_dir(&nobody).unwrap();
+    std::fs::write(folder.path().join("nobody/resolution_m"), "7").unwrap();
+    let keep = ["drive", "--method", "physics", "--world", &now, "--keep", &nobody];
+    assert_refused(&run(&[&keep[..], &TASK].concat()), 2, "size of the cells [m]: expected 0.05, found 7");
     let lead = ["route", "--world", &now, "--goal", "14,8", "--lead", "nobody-is-here"];
     assert_refused(&run(&lead), 2, "--lead: expected a run that is there, found none named nobody-is-here");
     assert_refused(&run(&["route", "--world", &now, "--goal", "14,8"]), 2, "--start");
@@ -98,7 +104,7 @@ fn a_run_is_led_around_what_its_map_did_not_show() {
     let mut up = surefoot(&["up", "--standby", "--world", &now, "--method", "physics", "--run", &name]);
     up.args(TASK).args(["--time-limit", "300", "--out"]).arg(folder.path().join("up"));
     let _run = Run(up.stdout(Stdio::null()).spawn().unwrap());
-    let out = folder.path().join("out");
+    let (out, kept) = (folder.path().join("out"), folder.path().join("kept"));
     let words =
         ["route", "--world", &before, "--goal", "14,8", "--vehicle", "rc_car", "--lead", &name, "--out"];
     let began = Instant::now();
@@ -117,4 +123,40 @@ fn a_run_is_led_around_what_its_map_did_not_show() {
     let told = String::from_utf8(output.stdout).unwrap();
     assert!(told.contains("goal reached; ") && !told.contains("goal reached; 0 routes again"), "{told}");
     assert!(std::fs::read(out.join("route.png")).unwrap().starts_with(b"\x89PNG"));
+    listen(&name, &kept);
+}
+
+/// Keeps what the vehicle of a run sees for a few seconds, until Ctrl-C.
+fn listen(run: &str, kept: &Path) {
+    let mut map = surefoot(&["map", kept.to_str().unwrap(), "--listen", run, "--out"]);
+    let listening = map.arg(kept.with_extension("out")).stdout(Stdio::piped()).spawn().unwrap();
+    std::thread::sleep(Duration::from_secs(4));
+    let interrupted = Command::new("kill").args(["-INT", &listening.id().to_string()]).status().unwrap();
+    let output = listening.wait_with_output().unwrap();
+    let told = String::from_utf8(output.stdout).unwrap();
+    assert!(interrupted.success() && output.status.success(), "{told}");
+    assert!(told.contains(&format!("run {run}: ")) && told.contains(" cells new, 0 agree"), "{told}");
+    assert!(std::fs::read(kept.with_extension("out").join("map.png")).unwrap().starts_with(b"\x89PNG"));
+}
+
+/// The first mission meets a pond that no map shows; what it saw is kept, and the next one's route knows the pond.
+#[test]
+fn what_a_drive_saw_is_known_to_the_route_of_the_next() {
+    let folder = tempfile::tempdir().unwrap();
+    let [now, before] = grounds(folder.path());
+    let kept = folder.path().join("kept").to_str().unwrap().to_owned();
+    let drive = |out: &str, words: &[&str]| {
+        let out = folder.path().join(out);
+        let mut drive = surefoot(&["drive", "--world", &now, "--method", "physics", "--time-limit", "60"]);
+        let output = drive.args(TASK).args(words).arg("--out").arg(&out).output().unwrap();
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        (String::from_utf8(output.stdout).unwrap(), read(&out.join("summary.json")))
+    };
+    let (told, first) = drive("first", &[&format!("--route={before}"), "--keep", &kept]);
+    assert!(told.contains("kept in") && first["kept"]["new"].as_u64().unwrap() > 1000, "{told}");
+    let (_, second) = drive("second", &[&format!("--route={kept}"), "--keep", &kept]);
+    let length_m = |summary: &Value| summary["route"]["length_m"].as_f64().unwrap();
+    // Straight on at first; then through (8, 13) and (10, 13): 5.8 + 2 + 6.4.
+    assert!(length_m(&first) < 9.5 && length_m(&second) > 13.0, "{} {}", first["route"], second["route"]);
+    assert!(second["kept"]["agreeing"].as_u64().unwrap() > 1000, "{}", second["kept"]);
 }

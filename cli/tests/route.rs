@@ -121,3 +121,69 @@ fn what_cannot_be_is_told_in_one_line_and_leaves_nothing() {
     // Cells of 20 m do not show the ford.
     refused(&["--start", "20,20,0", "--goal", "80,20", "--cell", "20"], 1, "no route: ");
 }
+
+fn surefoot(words: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_surefoot")).args(words).output().unwrap()
+}
+
+/// The ford in two files, west and east of 60 m, as of two surveys.
+#[test]
+fn files_become_a_map_in_tiles_that_routes_are_searched_on() {
+    let (folder, world) = ford();
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let (map, out) = (path("map"), path("out"));
+    let merged = surefoot(&["map", &map, &world, "--cell", "0.5", "--out", &out]);
+    let told = String::from_utf8(merged.stdout).unwrap();
+    assert!(merged.status.success(), "{}", String::from_utf8_lossy(&merged.stderr));
+    // 120 m in tiles of 128 m; 100 of them were measured, but for what lies nearest to the border.
+    assert!(told.contains("1 tiles in cells of 0.5 m") && told.contains("from (0, 0) to (128, 128) m"), "{told}");
+    let summary: serde_json::Value =
+        serde_json::from_slice(&std::fs::read(Path::new(&out).join("map.json")).unwrap()).unwrap();
+    let n_new = summary["merged"][0]["new"].as_u64().unwrap();
+    assert!((47_000..=48_500).contains(&n_new), "{summary}");
+    assert!(std::fs::read(Path::new(&out).join("map.png")).unwrap().starts_with(b"\x89PNG"));
+    // Another robot's, 100 m north of it.
+    let other = path("other");
+    let north = surefoot(&["map", &other, &world, "--cell", "0.5", "--at", "0,100", "--out", &out]);
+    assert!(north.status.success(), "{}", String::from_utf8_lossy(&north.stderr));
+    let both = surefoot(&["map", &map, &other, "--out", &out]);
+    let told = String::from_utf8(both.stdout).unwrap();
+    // Of the 20 m that they share, the northern says there is a pond where the southern has ground, at one height.
+    assert!(told.contains("2 tiles") && told.contains("agree, 0 contradict"), "{told}");
+    let found = route(&map, Path::new(&out), &["--start", "20,20,0", "--goal", "80,180", "--speed", "3"]);
+    let told = String::from_utf8(found.stdout).unwrap();
+    assert!(found.status.success(), "{}", String::from_utf8_lossy(&found.stderr));
+    assert!(told.contains("over map") && told.contains("expected time"), "{told}");
+}
+
+#[test]
+fn what_makes_no_map_in_tiles_is_told_in_one_line() {
+    let (folder, world) = ford();
+    let map = folder.path().join("map");
+    let out = folder.path().join("out");
+    let refused = |words: &[&str], told: &str| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_surefoot"));
+        let found = command.args(words).arg("--out").arg(&out).output().unwrap();
+        let error = String::from_utf8(found.stderr).unwrap();
+        assert_eq!((found.status.code(), error.lines().count()), (Some(2), 1), "{words:?}: {error}");
+        assert!(error.contains(told), "{words:?}: {error}");
+    };
+    let folder = folder.path().to_str().unwrap();
+    let tiles = map.to_str().unwrap();
+    refused(&["map", tiles], "resolution_m: map in tiles: expected the size of its cells in metres");
+    refused(&["map", tiles, "nowhere.npz"], "nowhere.npz");
+    refused(&["map", tiles, &world, "--cell", "0"], "--cell: expected 0.05 to 100 m, found 0");
+    refused(&["map", tiles, &world, "--deviation", "nan"], "--deviation: expected 0.01 to 2.5 m, found NaN");
+    refused(&["map", tiles, &world, "--listen", "field"], "--listen");
+    refused(&["map", tiles, "--listen", "nobody-is-here"], "expected a run that is there, found none named");
+    assert!(!map.exists(), "nothing was merged");
+    let ways = ["--start", "20,20,0", "--goal", "80,20"];
+    let with = |words: &[&'static str]| [&["route", "--world", folder][..], &ways, words].concat();
+    refused(&with(&[]), "map in tiles: expected the size of its cells in metres, found no such file");
+    assert!(surefoot(&["map", tiles, &world, "--out", out.to_str().unwrap()]).status.success());
+    let with = |words: &[&'static str]| [&["route", "--world", tiles][..], &ways, words].concat();
+    refused(&with(&["--bare", "mud"]), "--bare: expected with a file");
+    refused(&with(&["--cell", "0.3"]), "--cell: expected 1 to 1024 m, as");
+    std::fs::write(map.join("0_0_0.tile"), "torn").unwrap();
+    refused(&with(&[]), "0_0_0.tile: bytes: expected 45 or 786465, found 4");
+}

@@ -16,10 +16,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let ground = GridMap::from_values(geometry, values).ok_or("a value for every cell")?;
     let planner = Planner::new(ground, RouteConfig::default())?;
     let route = planner.route(([10.5, 30.5], 0.0), [90.5, 30.5], &SpeedLimits::default())?;
-    for point in route.points.iter().step_by(10) {
+    for point in route.line.points.iter().step_by(10) {
         println!("({:5.1}, {:5.1}) m at {:.1} m/s", point.at_m[0], point.at_m[1], point.speed_mps);
     }
-    println!("{:.1} m in {:.1} s", route.spacing_m * (route.points.len() - 1) as f64, route.duration_s);
-    assert!(route.points.iter().all(|point| point.bend.friction > 0.3));
+    println!("{:.1} m in {:.1} s", route.line.length_m(), route.line.duration_s);
+    assert!(route.line.points.iter().all(|point| point.bend.friction > 0.3));
     Ok(())
 }

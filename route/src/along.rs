@@ -1,19 +1,15 @@
 //! What a line that somebody lays by hand is worth.
 
 use crate::line::{Line, grounded};
-use crate::planner::{Planner, RoutePoint};
+use crate::planner::{Planner, RouteLine, RoutePoint};
 use crate::smooth::Spline;
 use crate::speed::SpeedLimits;
 
 /// A line with the fastest speeds along it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LaidLine {
-    /// Its points, evenly spaced.
-    pub points: Vec<RoutePoint>,
-    /// Between two points along it [m].
-    pub spacing_m: f64,
-    /// Expected time [s].
-    pub duration_s: f64,
+    /// The line.
+    pub line: RouteLine,
     /// Points where nobody can stand, or that lean farther than may be.
     pub n_barred: usize,
 }
@@ -30,9 +26,9 @@ impl Planner {
         let line = Line { samples, spacing_m };
         let sliding_mps = self.config().sliding_mps as f32;
         let ground = line.samples.iter().map(|sample| grounded(self.ground(), sliding_mps, sample));
-        let (points, duration_s) = line.driven(ground.collect(), limits).ok()?;
-        let n_barred = points.iter().filter(|point| self.is_barred(point)).count();
-        Some(LaidLine { points, spacing_m: line.spacing_m, duration_s, n_barred })
+        let line = line.driven(ground.collect(), limits).ok()?;
+        let n_barred = line.points.iter().filter(|point| self.is_barred(point)).count();
+        Some(LaidLine { line, n_barred })
     }
 
     fn is_barred(&self, point: &RoutePoint) -> bool {
@@ -65,8 +61,8 @@ mod tests {
         let route = planner.route(([5.5, 20.5], 0.0), [65.5, 20.5], &limits).unwrap();
         let controls_m: Vec<[f64; 2]> = (0..=60).map(|x_m| [5.5 + f64::from(x_m), 20.5]).collect();
         let laid = planner.along(&controls_m, &limits).unwrap();
-        assert!((laid.duration_s - route.duration_s).abs() < 1e-3 * route.duration_s);
-        assert_eq!((laid.n_barred, laid.points.len()), (0, route.points.len()));
+        assert!((laid.line.duration_s - route.line.duration_s).abs() < 1e-3 * route.line.duration_s);
+        assert_eq!((laid.n_barred, laid.line.points.len()), (0, route.line.points.len()));
     }
 
     #[test]

@@ -29,7 +29,7 @@ impl Planner {
     ) -> Vec<Route> {
         let mut dearer = self.clone();
         let mut is_near = vec![false; self.ground().geometry().n_cells()];
-        let near_m = (NEAR_SHARE * best.length_m()).max(self.clear_width_m());
+        let near_m = (NEAR_SHARE * best.line.length_m()).max(self.clear_width_m());
         let mut found: Vec<Route> = Vec::new();
         dearer.burden(best, near_m, &mut is_near);
         for _ in 0..TRIES * n {
@@ -39,7 +39,7 @@ impl Planner {
             let Ok(next) = dearer.route(start, goal_m, limits) else { break };
             let is_another = self.shared(&next, &is_near) <= SHARED_MAX;
             dearer.burden(&next, near_m, &mut is_near);
-            if is_another && next.duration_s <= TIME_RATIO_MAX * best.duration_s {
+            if is_another && next.line.duration_s <= TIME_RATIO_MAX * best.line.duration_s {
                 found.push(next);
             }
         }
@@ -102,7 +102,7 @@ mod tests {
     }
 
     fn north_m(route: &Route) -> f64 {
-        let over = route.points.iter().filter(|point| (45.0..55.0).contains(&point.at_m[0]));
+        let over = route.line.points.iter().filter(|point| (45.0..55.0).contains(&point.at_m[0]));
         let (sum_m, n) = over.fold((0.0, 0.0), |(sum_m, n), point| (sum_m + point.at_m[1], n + 1.0));
         sum_m / n
     }
@@ -114,7 +114,7 @@ mod tests {
         assert!((10.0..20.0).contains(&north_m(&best)), "{}", north_m(&best));
         let [other] = &others[..] else { panic!("expected one other way, found {}", others.len()) };
         assert!((70.0..80.0).contains(&north_m(other)), "{}", north_m(other));
-        assert!(other.duration_s >= best.duration_s && other.duration_s <= 1.5 * best.duration_s);
+        assert!(other.line.duration_s >= best.line.duration_s && other.line.duration_s <= 1.5 * best.line.duration_s);
         assert_eq!(planner.route(([10.5, 40.5], 0.0), [90.5, 40.5], &SpeedLimits::default()).unwrap(), best);
     }
 
@@ -124,7 +124,7 @@ mod tests {
         let (best, others) = alternatives(&planner, 2);
         assert_eq!(others.len(), 2);
         let mut is_near = vec![false; planner.ground().geometry().n_cells()];
-        planner.clone().burden(&best, NEAR_SHARE * best.length_m(), &mut is_near);
+        planner.clone().burden(&best, NEAR_SHARE * best.line.length_m(), &mut is_near);
         for other in &others {
             assert!((10.0..20.0).contains(&north_m(other)), "{}", north_m(other));
             let shared = planner.shared(other, &is_near);

@@ -1,23 +1,40 @@
 //! Routes over maps that do not fit into memory: coarsely over the whole way, then finely along it, a leg at a time.
 
 use crate::line::{self, Gate, Line, heading_of};
-use crate::planner::{Planner, PlannerError, RouteError, RoutePoint};
-use crate::speed::SpeedLimits;
+use crate::planner::{Planner, PlannerError, RouteError, RouteLine};
+use crate::speed::{Bend, SpeedLimits};
 use crate::tiles::{LEVEL_MAX, TileError, TileMap};
 use crate::{GroundCell, RouteConfig};
-use terrain::{Cell, GridGeometry, GridMap};
+use terrain::{Cell, CellRegion, GridMap};
 
 /// Cells that the coarse search may have: with its edges and states less than half a gigabyte.
 const COARSE_CELLS_MAX: f64 = 2e6;
 /// Room around start and goal that the coarse search sees, as a share of the way between them, and at least [m].
 const COARSE_MARGIN: (f64, f64) = (0.25, 50.0);
-/// How far ahead along the coarse way a leg is searched, and how much of it is kept [m].
-const LEG_M: (f64, f64) = (150.0, 100.0);
-/// Room around a leg [m]; twice and four times as much where there is no way.
-const LEG_MARGIN_M: f64 = 40.0;
-const WIDENINGS: [f64; 3] = [1.0, 2.0, 4.0];
+/// Levels between the cells that were asked for and those between them and the coarse ones.
+const MIDDLE_LEVELS: u8 = 2;
+/// Room around a leg is twice, four and eight times as much where there is no way.
+const WIDENINGS: [f64; 4] = [1.0, 2.0, 4.0, 8.0];
 /// Points of the line whose ground is read at a time.
 const READ_POINTS: usize = 128;
+/// Places that a line is led around, at most, since no speed will do there.
+const DETOURS_MAX: usize = 16;
+
+/// How a way over larger cells is searched again over smaller ones, a leg at a time.
+#[derive(Clone, Copy)]
+struct Refinement {
+    /// How far ahead a leg is searched [m].
+    searched_m: f64,
+    /// And how much of it is kept [m].
+    kept_m: f64,
+    /// Room around it [m].
+    margin_m: f64,
+}
+
+/// Along the coarse way, whose cells are metres long.
+const BROAD: Refinement = Refinement { searched_m: 150.0, kept_m: 100.0, margin_m: 40.0 };
+/// Along a way over cells four times as large: what is left to find is how it passes what these do not show.
+const NARROW: Refinement = Refinement { searched_m: 60.0, kept_m: 40.0, margin_m: 3.0 };
 
 /// Why there is no far route.
 #[derive(Debug, thiserror::Error)]
@@ -36,12 +53,8 @@ pub enum FarRouteError {
 /// A route over a map in tiles.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FarRoute {
-    /// Points of the smooth line, evenly spaced.
-    pub points: Vec<RoutePoint>,
-    /// Between two points along the line [m].
-    pub spacing_m: f64,
-    /// Expected time [s].
-    pub duration_s: f64,
+    /// The smooth line, and how fast to drive it.
+    pub line: RouteLine,
     /// Legs that it was searched in.
     pub n_legs: usize,
     /// States that all searches expanded.
@@ -49,7 +62,8 @@ pub struct FarRoute {
 }
 
 /// The route from a pose to a point over the cells of a map's `level`, as [`Planner::route`] finds it on one grid, but
-/// that the coarse search decides which side of a hill is taken: it sees cells so large that two million hold the way.
+/// that larger cells decide which side of a hill is taken: a search over cells so large that two million hold the way,
+/// then one along that over cells four times as large as the level's, and one along that over these.
 ///
 /// # Errors
 /// A map that cannot be read, or no way, and why.
@@ -64,85 +78,142 @@ pub fn far_route(
     if !yaw_rad.is_finite() {
         return Err(RouteError::Yaw { found_rad: yaw_rad }.into());
     }
-    let mut n_expanded = 0;
-    let guide = guide(map, level, config, (start_m, yaw_rad), goal_m, &mut n_expanded)?;
-    let (mut corridor, mut at_m, mut heading) = (Vec::new(), start_m, heading_of(yaw_rad));
-    let mut n_legs = 0;
+    let from = (start_m, heading_of(yaw_rad));
+    let mut search = Search { map, level, config, goal_m, closed_m: Vec::new(), n_legs: 0, n_expanded: 0 };
+    let (coarse, mut guide) = search.coarse(from)?;
+    let middle = level + MIDDLE_LEVELS;
+    let is_broad = coarse <= middle;
+    if !is_broad {
+        let gates = search.refined(middle, BROAD, &guide, from)?;
+        guide = gates.iter().map(|gate| gate.at_m).chain([goal_m]).collect();
+    }
+    let refinement = if is_broad { BROAD } else { NARROW };
     loop {
-        let leg = Leg::ahead(&guide, at_m);
-        let kept = leg.searched(map, level, config, (at_m, heading), &mut n_expanded)?;
-        n_legs += 1;
-        corridor.extend_from_slice(if corridor.is_empty() { &kept.gates } else { &kept.gates[1..] });
-        if leg.is_last {
-            break;
-        }
-        if kept.gates.len() < 2 {
-            return Err(RouteError::Smooth { n_cells: corridor.len() }.into());
-        }
-        (at_m, heading) = (kept.end_m, kept.heading);
+        let mut corridor = search.refined(level, refinement, &guide, from)?;
+        line::fix_ends(&mut corridor, start_m, goal_m);
+        let line = Line::through(&corridor, search.map.cell_m(level))?;
+        let grounded = search.grounded(&line)?;
+        let error = match line.driven(grounded, limits) {
+            Ok(line) => return Ok(FarRoute { line, n_legs: search.n_legs, n_expanded: search.n_expanded }),
+            Err(error) => error,
+        };
+        let place_m = error.along_m().map(|along_m| line.place_m(along_m));
+        let Some(place_m) = place_m.filter(|_| search.closed_m.len() < DETOURS_MAX) else {
+            return Err(RouteError::from(error).into());
+        };
+        search.closed_m.push(place_m);
     }
-    line::fix_ends(&mut corridor, start_m, goal_m);
-    let line = Line::through(&corridor, map.cell_m(level))?;
-    let mut grounded = Vec::with_capacity(line.samples.len());
-    for samples in line.samples.chunks(READ_POINTS) {
-        let points_m: Vec<[f64; 2]> = samples.iter().map(|sample| sample.at_m).collect();
-        let ground = read(map, level, &points_m, 3.0 * map.cell_m(level))?;
-        let sliding_mps = config.sliding_mps as f32;
-        grounded.extend(samples.iter().map(|sample| line::grounded(&ground, sliding_mps, sample)));
-    }
-    let (points, duration_s) = line.driven(grounded, limits).map_err(RouteError::from)?;
-    Ok(FarRoute { points, spacing_m: line.spacing_m, duration_s, n_legs, n_expanded })
 }
 
-/// The way over large cells [m].
-fn guide(
-    map: &mut TileMap,
+/// A search over several levels of a map.
+struct Search<'a> {
+    map: &'a mut TileMap,
     level: u8,
-    config: &RouteConfig,
-    (start_m, yaw_rad): ([f64; 2], f64),
+    config: &'a RouteConfig,
     goal_m: [f64; 2],
-    n_expanded: &mut usize,
-) -> Result<Vec<[f64; 2]>, FarRouteError> {
-    let way_m = libm::hypot(goal_m[0] - start_m[0], goal_m[1] - start_m[1]);
-    let margin_m = (COARSE_MARGIN.0 * way_m).max(COARSE_MARGIN.1);
-    let n_cells = |level: u8| {
-        let edge = |axis: usize| ((goal_m[axis] - start_m[axis]).abs() + 2.0 * margin_m) / map.cell_m(level);
-        edge(0) * edge(1)
-    };
-    let coarse = (level..=LEVEL_MAX).find(|level| n_cells(*level) <= COARSE_CELLS_MAX);
-    let coarse = coarse.ok_or(RouteError::Outside { name: "goal", found_m: goal_m })?;
-    let ground = read(map, coarse, &[start_m, goal_m], margin_m)?;
-    // Ground of larger cells is rougher by the shape that small ones follow.
-    let growth = map.cell_m(coarse) / map.cell_m(level);
-    let config = RouteConfig { roughness_max_m: (config.roughness_max_m * growth).min(100.0), ..*config };
-    let planner = Planner::new(ground, config)?;
-    let (start, goal) = (planner.open_cell("start", start_m)?, planner.open_cell("goal", goal_m)?);
-    let path = planner.search((start, heading_of(yaw_rad)), goal, goal_m)?;
-    *n_expanded += path.n_expanded;
-    let geometry = *planner.ground().geometry();
-    let mut guide: Vec<[f64; 2]> = path.cells.iter().map(|cell| geometry.centre_m(*cell)).collect();
-    guide.push(goal_m);
-    Ok(guide)
+    /// Places that no line over the cells of the level is to pass again [m].
+    closed_m: Vec<[f64; 2]>,
+    n_legs: usize,
+    n_expanded: usize,
 }
 
-/// The part of the map around some points.
-fn read(
-    map: &mut TileMap,
-    level: u8,
-    points_m: &[[f64; 2]],
-    margin_m: f64,
-) -> Result<GridMap<GroundCell>, TileError> {
-    let cell_m = map.cell_m(level);
-    let along = |axis: usize| points_m.iter().map(move |point| point[axis]);
-    let low =
-        [0, 1].map(|axis| ((along(axis).fold(f64::INFINITY, f64::min) - margin_m) / cell_m).floor() as i64);
-    let high = [0, 1]
-        .map(|axis| ((along(axis).fold(f64::NEG_INFINITY, f64::max) + margin_m) / cell_m).ceil() as i64);
-    let [n_cols, n_rows] = [0, 1].map(|axis| (high[axis] - low[axis]).max(1) as usize);
-    map.window(level, &GridGeometry { resolution_m: cell_m, origin: low, n_rows, n_cols })
+impl Search<'_> {
+    /// The way over so large cells that all of it can be searched at once, and their level.
+    fn coarse(&mut self, (start_m, heading): ([f64; 2], usize)) -> Result<(u8, Vec<[f64; 2]>), FarRouteError> {
+        let goal_m = self.goal_m;
+        let way_m = libm::hypot(goal_m[0] - start_m[0], goal_m[1] - start_m[1]);
+        let margin_m = (COARSE_MARGIN.0 * way_m).max(COARSE_MARGIN.1);
+        let n_cells = |level: u8| {
+            let edge = |axis: usize| {
+                ((goal_m[axis] - start_m[axis]).abs() + 2.0 * margin_m) / self.map.cell_m(level)
+            };
+            edge(0) * edge(1)
+        };
+        let level = (self.level..=LEVEL_MAX).find(|level| n_cells(*level) <= COARSE_CELLS_MAX);
+        let level = level.ok_or(RouteError::Outside { name: "goal", found_m: goal_m })?;
+        let ground = self.map.around(level, &[start_m, goal_m], margin_m)?;
+        let planner = self.planner(level, ground)?;
+        let (start, goal) = (planner.open_cell("start", start_m)?, planner.open_cell("goal", goal_m)?);
+        let path = planner.search((start, heading), goal, goal_m)?;
+        self.n_expanded += path.n_expanded;
+        let geometry = *planner.ground().geometry();
+        let centres_m = path.cells.iter().map(|cell| geometry.centre_m(*cell));
+        Ok((level, centres_m.chain([goal_m]).collect()))
+    }
+
+    /// A planner over a part of a level.
+    fn planner(&self, level: u8, ground: GridMap<GroundCell>) -> Result<Planner, FarRouteError> {
+        // Ground of larger cells is rougher by the shape that small ones follow.
+        let growth = self.map.cell_m(level) / self.map.cell_m(self.level);
+        let roughness_max_m = (self.config.roughness_max_m * growth).min(100.0);
+        let mut planner = Planner::new(ground, RouteConfig { roughness_max_m, ..*self.config })?;
+        if level == self.level {
+            self.closed_m.iter().for_each(|place_m| planner.close_around(*place_m));
+        }
+        Ok(planner)
+    }
+
+    /// The way over the cells of a level along one over larger cells.
+    fn refined(
+        &mut self,
+        level: u8,
+        refinement: Refinement,
+        guide: &[[f64; 2]],
+        (mut at_m, mut heading): ([f64; 2], usize),
+    ) -> Result<Vec<Gate>, FarRouteError> {
+        let mut corridor: Vec<Gate> = Vec::new();
+        loop {
+            let leg = Leg::ahead(guide, at_m, refinement.searched_m);
+            let kept = self.searched(level, refinement, &leg, (at_m, heading))?;
+            self.n_legs += 1;
+            corridor.extend_from_slice(if corridor.is_empty() { &kept.gates } else { &kept.gates[1..] });
+            if leg.is_last {
+                return Ok(corridor);
+            }
+            if kept.gates.len() < 2 {
+                return Err(RouteError::Smooth { n_cells: corridor.len() }.into());
+            }
+            (at_m, heading) = (kept.end_m, kept.heading);
+        }
+    }
+
+    /// The way of a leg, as far as it is kept.
+    fn searched(
+        &mut self,
+        level: u8,
+        Refinement { kept_m, margin_m, .. }: Refinement,
+        leg: &Leg,
+        (from_m, heading): ([f64; 2], usize),
+    ) -> Result<Kept, FarRouteError> {
+        let mut found = None;
+        for widening in WIDENINGS {
+            let ground = leg.ground(self.map, level, from_m, widening * margin_m)?;
+            let planner = self.planner(level, ground)?;
+            match leg.attempt(&planner, (from_m, heading)) {
+                Ok((cells, n)) => {
+                    self.n_expanded += n;
+                    return Ok(leg.kept(&planner, &cells, kept_m));
+                }
+                Err(error) => found = Some(error),
+            }
+        }
+        Err(found.unwrap_or(RouteError::Smooth { n_cells: 0 }).into())
+    }
+
+    /// The ground under a line.
+    fn grounded(&mut self, line: &Line) -> Result<Vec<(Bend, f64)>, FarRouteError> {
+        let sliding_mps = self.config.sliding_mps as f32;
+        let mut grounded = Vec::with_capacity(line.samples.len());
+        for samples in line.samples.chunks(READ_POINTS) {
+            let points_m: Vec<[f64; 2]> = samples.iter().map(|sample| sample.at_m).collect();
+            let ground = self.map.around(self.level, &points_m, 3.0 * self.map.cell_m(self.level))?;
+            grounded.extend(samples.iter().map(|sample| line::grounded(&ground, sliding_mps, sample)));
+        }
+        Ok(grounded)
+    }
 }
 
-/// A piece of the coarse way.
+/// A piece of a way over larger cells.
 struct Leg {
     /// From about where it begins [m].
     guide: Vec<[f64; 2]>,
@@ -159,11 +230,11 @@ struct Kept {
 }
 
 impl Leg {
-    fn ahead(guide: &[[f64; 2]], from_m: [f64; 2]) -> Self {
+    fn ahead(guide: &[[f64; 2]], from_m: [f64; 2], searched_m: f64) -> Self {
         let away_m = |point: &[f64; 2]| libm::hypot(point[0] - from_m[0], point[1] - from_m[1]);
         let nearest = (0..guide.len()).min_by(|a, b| away_m(&guide[*a]).total_cmp(&away_m(&guide[*b])));
         let nearest = nearest.unwrap_or(0);
-        let mut left_m = LEG_M.0;
+        let mut left_m = searched_m;
         let step_m = |index: usize| {
             let [from, to] = [guide[index - 1], guide[index]];
             libm::hypot(to[0] - from[0], to[1] - from[1])
@@ -176,30 +247,27 @@ impl Leg {
         Self { guide: guide[nearest..=end].to_vec(), is_last: end == guide.len() - 1 }
     }
 
-    /// Its way over fine cells, as far as it is kept.
-    fn searched(
+    /// The ground that is nearer to it than a margin [m].
+    fn ground(
         &self,
         map: &mut TileMap,
         level: u8,
-        config: &RouteConfig,
-        (from_m, heading): ([f64; 2], usize),
-        n_expanded: &mut usize,
-    ) -> Result<Kept, FarRouteError> {
-        let mut found = None;
-        for widening in WIDENINGS {
-            let mut points_m = self.guide.clone();
-            points_m.push(from_m);
-            let ground = read(map, level, &points_m, widening * LEG_MARGIN_M)?;
-            let planner = Planner::new(ground, *config)?;
-            match self.attempt(&planner, (from_m, heading)) {
-                Ok((cells, n)) => {
-                    *n_expanded += n;
-                    return Ok(self.kept(&planner, &cells));
-                }
-                Err(error) => found = Some(error),
+        from_m: [f64; 2],
+        margin_m: f64,
+    ) -> Result<GridMap<GroundCell>, TileError> {
+        let points_m: Vec<[f64; 2]> = self.guide.iter().copied().chain([from_m]).collect();
+        let all = map.around(level, &points_m, margin_m)?;
+        let geometry = *all.geometry();
+        let reach = (margin_m / geometry.resolution_m) as usize;
+        let mut near = GridMap::filled(geometry, GroundCell::UNKNOWN);
+        for cell in points_m.iter().filter_map(|[x_m, y_m]| geometry.cell_at(*x_m, *y_m)) {
+            let CellRegion { rows, cols } = CellRegion::of_cell(cell).grown(reach, &geometry);
+            for first in rows.map(|row| row * geometry.n_cols) {
+                let part = first + cols.start..first + cols.end;
+                near.values_mut()[part.clone()].copy_from_slice(&all.values()[part]);
             }
         }
-        Err(found.unwrap_or(RouteError::Smooth { n_cells: 0 }).into())
+        Ok(near)
     }
 
     fn attempt(
@@ -224,9 +292,9 @@ impl Leg {
         Err(error.unwrap_or(RouteError::Smooth { n_cells: 0 }))
     }
 
-    fn kept(&self, planner: &Planner, cells: &[Cell]) -> Kept {
+    fn kept(&self, planner: &Planner, cells: &[Cell], kept_m: f64) -> Kept {
         let geometry = *planner.ground().geometry();
-        let n_kept = (LEG_M.1 / geometry.resolution_m) as usize;
+        let n_kept = (kept_m / geometry.resolution_m) as usize;
         let n = if self.is_last { cells.len() } else { n_kept.max(2).min(cells.len()) };
         let kept = &cells[..n];
         let heading = match kept {

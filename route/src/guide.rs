@@ -17,9 +17,9 @@ pub struct Guide {
 impl Guide {
     /// Nobody has set out on it yet; a reach of at least two points [m].
     pub fn new(route: &Route, reach_m: f64) -> Self {
-        let points_m = route.line_m();
-        let reach = (reach_m / route.spacing_m).round().clamp(2.0, points_m.len().max(2) as f64) as usize;
-        Self { points_m, spacing_m: route.spacing_m, reach, abreast: 0, headed: None }
+        let points_m = route.line.places_m();
+        let reach = (reach_m / route.line.spacing_m).round().clamp(2.0, points_m.len().max(2) as f64) as usize;
+        Self { points_m, spacing_m: route.line.spacing_m, reach, abreast: 0, headed: None }
     }
 
     /// Takes in where the vehicle is. Returns the place to head for when it is another than before by a quarter of the
@@ -109,19 +109,19 @@ mod tests {
         let route = east(&planner());
         let mut guide = Guide::new(&route, 10.0);
         let place_m = guide.advance([5.5, 20.5]).unwrap();
-        assert!((place_m[0] - 15.5).abs() <= route.spacing_m, "{place_m:?}");
+        assert!((place_m[0] - 15.5).abs() <= route.line.spacing_m, "{place_m:?}");
         assert_eq!(guide.advance([6.0, 20.5]), None, "hardly any nearer");
         // Two metres beside the line it is abreast of the same point.
         let place_m = guide.advance([9.5, 22.5]).unwrap();
-        assert!((place_m[0] - 19.5).abs() <= route.spacing_m, "{place_m:?}");
-        assert!((guide.way_made_m() - 4.0).abs() <= route.spacing_m);
+        assert!((place_m[0] - 19.5).abs() <= route.line.spacing_m, "{place_m:?}");
+        assert!((guide.way_made_m() - 4.0).abs() <= route.line.spacing_m);
         assert_eq!(guide.advance([5.5, 20.5]), None, "who goes back heads for the same place");
-        assert!((guide.way_made_m() - 4.0).abs() <= route.spacing_m);
+        assert!((guide.way_made_m() - 4.0).abs() <= route.line.spacing_m);
         let mut last = None;
         for x_m in 10..=70 {
             last = guide.advance([f64::from(x_m) + 0.5, 20.5]).or(last);
         }
-        assert_eq!(last, route.points.last().map(|point| point.at_m));
+        assert_eq!(last, route.line.points.last().map(|point| point.at_m));
     }
 
     #[test]
@@ -143,7 +143,7 @@ mod tests {
         let around = east(&planner);
         assert_eq!(planner.first_barrier(Guide::new(&around, 10.0).ahead_m()), None);
         // The wall's ends are at 10 and 31 m north: hypot(35, 10.5) + hypot(30, 10.5) at least.
-        let length_m = around.spacing_m * (around.points.len() - 1) as f64;
+        let length_m = around.line.length_m();
         assert!(length_m > 68.3, "{length_m}");
     }
 }

@@ -12,7 +12,7 @@
 //! vehicle may lean, or nearer to an obstacle than half the clear width is not driven on at all.
 //!
 //! [`TileMap`] keeps a map that outgrows memory in files, and merges what several robots and sources
-//! measured; [`far_route`] searches it.
+//! measured, what a vehicle's rolling window saw among it ([`MapKeeper`]); [`far_route`] searches it.
 //! [`GroundLayers`] makes the map of measured elevation.
 //!
 //! A [`Guide`] follows a vehicle along a route and tells what to head for.
@@ -30,7 +30,7 @@
 //! let planner = Planner::new(ground, RouteConfig::default())?;
 //! let route = planner.route(([5.5, 20.5], 0.0), [50.5, 20.5], &SpeedLimits::default())?;
 //! assert_eq!(route.cells.len(), 46);
-//! assert!(route.duration_s > 45.0 / 5.0);
+//! assert!(route.line.duration_s > 45.0 / 5.0);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
@@ -59,6 +59,8 @@ pub use friction::FrictionCurve;
 pub use ground::{GroundCell, GroundError};
 pub use guide::Guide;
 pub use layers::GroundLayers;
-pub use planner::{Planner, PlannerError, Route, RouteError, RoutePoint};
+pub use planner::{Planner, PlannerError, Route, RouteError, RouteLine, RoutePoint};
 pub use speed::{Bend, SpeedError, SpeedLimits, duration_s, fastest_speeds};
-pub use tiles::{LEVEL_MAX, MeasuredCell, MergeReport, TILE_EDGE, TileError, TileMap};
+pub use tiles::{
+    ClassFriction, LEVEL_MAX, MapKeeper, MeasuredCell, MergeReport, TILE_EDGE, TileError, TileMap,
+};

@@ -2,7 +2,7 @@
 
 use crate::FrictionCurve;
 use crate::ground::GroundCell;
-use crate::planner::{RouteError, RoutePoint};
+use crate::planner::{RouteError, RouteLine, RoutePoint};
 use crate::smooth::{Spline, SplinePoint};
 use crate::speed::{Bend, SpeedError, SpeedLimits, duration_s, fastest_speeds};
 use terrain::GridMap;
@@ -54,12 +54,12 @@ impl Line {
         self.samples[index.min(self.samples.len() - 1)].at_m
     }
 
-    /// Its points with the fastest speeds over ground whose bend and height [m] each has, and the time it takes [s].
+    /// The line with the fastest speeds over ground whose bend and height [m] each point has.
     pub fn driven(
         &self,
         grounded: Vec<(Bend, f64)>,
         limits: &SpeedLimits,
-    ) -> Result<(Vec<RoutePoint>, f64), SpeedError> {
+    ) -> Result<RouteLine, SpeedError> {
         let bends: Vec<Bend> = grounded.iter().map(|(bend, _)| *bend).collect();
         let speeds_mps = fastest_speeds(&bends, self.spacing_m, limits)?;
         let duration_s = duration_s(&speeds_mps, self.spacing_m);
@@ -71,7 +71,7 @@ impl Line {
             bend,
             speed_mps,
         });
-        Ok((points.collect(), duration_s))
+        Ok(RouteLine { points: points.collect(), spacing_m: self.spacing_m, duration_s })
     }
 }
 

@@ -32,21 +32,28 @@ pub struct Route {
     pub cost_m: f64,
     /// States that the search expanded.
     pub n_expanded: usize,
-    /// Points of the smooth line, evenly spaced.
+    /// The smooth line, and how fast to drive it.
+    pub line: RouteLine,
+}
+
+/// A smooth line over the ground with the fastest speeds along it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RouteLine {
+    /// Its points, evenly spaced.
     pub points: Vec<RoutePoint>,
-    /// Between two points along the line [m].
+    /// Between two points along it [m].
     pub spacing_m: f64,
     /// Expected time [s].
     pub duration_s: f64,
 }
 
-impl Route {
-    /// The places of the line [m].
-    pub fn line_m(&self) -> Vec<[f64; 2]> {
+impl RouteLine {
+    /// Its places [m].
+    pub fn places_m(&self) -> Vec<[f64; 2]> {
         self.points.iter().map(|point| point.at_m).collect()
     }
 
-    /// Length of the line [m].
+    /// Its length [m].
     pub fn length_m(&self) -> f64 {
         self.spacing_m * self.points.len().saturating_sub(1) as f64
     }
@@ -266,7 +273,7 @@ impl Planner {
         let sliding_mps = self.config.sliding_mps as f32;
         let grounded = line.samples.iter().map(|sample| line::grounded(&self.ground, sliding_mps, sample));
         let driven = line.driven(grounded.collect(), limits);
-        let (points, duration_s) = driven.map_err(|error| Refusal {
+        let line = driven.map_err(|error| Refusal {
             at_m: error.along_m().map(|along_m| line.place_m(along_m)),
             error: error.into(),
         })?;
@@ -274,10 +281,17 @@ impl Planner {
             cost_m: path.cost * resolution_m,
             cells: path.cells,
             n_expanded: path.n_expanded,
-            points,
-            spacing_m: line.spacing_m,
-            duration_s,
+            line,
         })
+    }
+
+    /// Bars the cells within half of the clear width of a place.
+    pub(crate) fn close_around(&mut self, [x_m, y_m]: [f64; 2]) {
+        let geometry = *self.ground.geometry();
+        let reach = (0.5 * self.config.clear_width_m / geometry.resolution_m) as usize;
+        if let Some(cell) = geometry.cell_at(x_m, y_m) {
+            self.edges.close(&CellRegion::of_cell(cell).grown(reach.max(1), &geometry));
+        }
     }
 
     /// The cells around a place that no line is to pass again; none where they hold an end of the way.

@@ -7,9 +7,11 @@
 
 mod cell;
 mod file;
+mod keeper;
 
 use crate::GroundCell;
 pub use cell::MeasuredCell;
+pub use keeper::{ClassFriction, MapKeeper};
 use cell::Packed;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -94,6 +96,16 @@ pub struct MergeReport {
     pub largest_contradiction_m: f32,
 }
 
+impl MergeReport {
+    /// With what became of another patch.
+    pub fn add(&mut self, other: &Self) {
+        self.n_new += other.n_new;
+        self.n_agreeing += other.n_agreeing;
+        self.n_contradicting += other.n_contradicting;
+        self.largest_contradiction_m = self.largest_contradiction_m.max(other.largest_contradiction_m);
+    }
+}
+
 /// A map in a folder.
 #[derive(Debug)]
 pub struct TileMap {
@@ -135,6 +147,14 @@ impl TileMap {
         Ok(map)
     }
 
+    /// Opens a map that is there, whatever the size of its cells.
+    ///
+    /// # Errors
+    /// The folder cannot be used, or holds no map.
+    pub fn resume(folder: &Path, memory_bytes: usize) -> Result<Self, TileError> {
+        Self::open(folder, file::resolution_m(folder)?, memory_bytes)
+    }
+
     /// Edge of a cell of a level [m].
     pub fn cell_m(&self, level: u8) -> f64 {
         self.resolution_m * f64::from(1_u32 << level.min(LEVEL_MAX))
@@ -143,6 +163,25 @@ impl TileMap {
     /// Tiles of the finest level.
     pub fn n_tiles(&self) -> usize {
         self.known.iter().take_while(|key| key.level == 0).count()
+    }
+
+    /// The window of a level that holds all tiles; `None` of an empty map.
+    pub fn extent(&self, level: u8) -> Option<GridGeometry> {
+        let tiles = || self.known.iter().take_while(|key| key.level == 0);
+        let bound = |axis: usize| {
+            let along = || tiles().map(move |key| key.place[axis] * TILE_EDGE as i64);
+            let per_cell = 1_i64 << level.min(LEVEL_MAX);
+            let first = along().min()?.div_euclid(per_cell);
+            let end = along().max()? + TILE_EDGE as i64;
+            Some((first, (end + per_cell - 1).div_euclid(per_cell) - first))
+        };
+        let ((east, n_cols), (north, n_rows)) = (bound(0)?, bound(1)?);
+        Some(GridGeometry {
+            resolution_m: self.cell_m(level),
+            origin: [east, north],
+            n_rows: n_rows as usize,
+            n_cols: n_cols as usize,
+        })
     }
 
     /// Bytes of the tiles that are held.
@@ -157,12 +196,7 @@ impl TileMap {
     /// Cells of another size, or a tile that cannot be read or written; tiles before it are merged and whole.
     pub fn merge(&mut self, patch: &GridMap<MeasuredCell>) -> Result<MergeReport, TileError> {
         let geometry = *patch.geometry();
-        if (geometry.resolution_m / self.resolution_m - 1.0).abs() > 1e-9 {
-            return Err(TileError::Resolution {
-                expected_m: self.resolution_m,
-                found_m: geometry.resolution_m,
-            });
-        }
+        self.agree(&geometry)?;
         let mut report = MergeReport::default();
         for place in places(&geometry) {
             let key = Key { level: 0, place };
@@ -184,6 +218,31 @@ impl TileMap {
             file::write(&self.folder, key, &tile)?;
             self.make_known(key);
             self.hold(key, tile);
+        }
+        Ok(report)
+    }
+
+    /// Refuses cells of another size.
+    fn agree(&self, geometry: &GridGeometry) -> Result<(), TileError> {
+        let (expected_m, found_m) = (self.resolution_m, geometry.resolution_m);
+        let is_same = (found_m / expected_m - 1.0).abs() <= 1e-9;
+        is_same.then_some(()).ok_or(TileError::Resolution { expected_m, found_m })
+    }
+
+    /// Takes over another map, as of another robot.
+    ///
+    /// # Errors
+    /// As [`TileMap::merge`], or a tile of the other that cannot be read.
+    pub fn merge_map(&mut self, other: &mut Self) -> Result<MergeReport, TileError> {
+        let mut report = MergeReport::default();
+        let keys: Vec<Key> = other.known.iter().take_while(|key| key.level == 0).copied().collect();
+        for key in keys {
+            let geometry = tile_geometry(key.place, other.resolution_m);
+            let Some(tile) = other.tile(key)? else { continue };
+            let cells = tile.iter().map(|cell| cell.measured().unwrap_or(MeasuredCell::UNKNOWN)).collect();
+            if let Some(patch) = GridMap::from_values(geometry, cells) {
+                report.add(&self.merge(&patch)?);
+            }
         }
         Ok(report)
     }
@@ -213,6 +272,26 @@ impl TileMap {
             }
         }
         Ok(window)
+    }
+
+    /// A window of a level around some points, with room beyond the outermost [m].
+    ///
+    /// # Errors
+    /// As [`TileMap::window`].
+    pub fn around(
+        &mut self,
+        level: u8,
+        points_m: &[[f64; 2]],
+        margin_m: f64,
+    ) -> Result<GridMap<GroundCell>, TileError> {
+        let cell_m = self.cell_m(level);
+        let along = |axis: usize| points_m.iter().map(move |point| point[axis]);
+        let low = [0, 1]
+            .map(|axis| ((along(axis).fold(f64::INFINITY, f64::min) - margin_m) / cell_m).floor() as i64);
+        let high = [0, 1]
+            .map(|axis| ((along(axis).fold(f64::NEG_INFINITY, f64::max) + margin_m) / cell_m).ceil() as i64);
+        let [n_cols, n_rows] = [0, 1].map(|axis| (high[axis] - low[axis]).max(1) as usize);
+        self.window(level, &GridGeometry { resolution_m: cell_m, origin: low, n_rows, n_cols })
     }
 
     /// The cells of a tile; `None` where nothing is known.
@@ -293,6 +372,12 @@ fn places(geometry: &GridGeometry) -> impl Iterator<Item = [i64; 2]> {
     };
     let (cols, rows) = (range(0), range(1));
     rows.flat_map(move |row| cols.clone().map(move |col| [col, row]))
+}
+
+/// Where the cells of a tile of the finest level lie.
+fn tile_geometry(place: [i64; 2], resolution_m: f64) -> GridGeometry {
+    let origin = place.map(|index| index * TILE_EDGE as i64);
+    GridGeometry { resolution_m, origin, n_rows: TILE_EDGE, n_cols: TILE_EDGE }
 }
 
 /// The part of a window that lies in a tile, and the lattice index of the tile's south-west cell.

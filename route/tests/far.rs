@@ -45,14 +45,14 @@ fn a_far_route_is_hardly_dearer_than_one_over_the_whole_map_at_once() {
     let geometry = GridGeometry { resolution_m: 1.0, origin: [0, 0], n_rows: 600, n_cols: 600 };
     let whole = map.window(1, &geometry).unwrap();
     let at_once = Planner::new(whole.clone(), config).unwrap().route(start, goal_m, &limits).unwrap();
-    assert!(far.duration_s < 1.1 * at_once.duration_s, "{} {}", far.duration_s, at_once.duration_s);
-    for (point, expected_m) in [(far.points[0], start.0), (far.points[far.points.len() - 1], goal_m)] {
+    assert!(far.line.duration_s < 1.1 * at_once.line.duration_s, "{} {}", far.line.duration_s, at_once.line.duration_s);
+    for (point, expected_m) in [(far.line.points[0], start.0), (far.line.points[far.line.points.len() - 1], goal_m)] {
         assert!((0..2).all(|axis| (point.at_m[axis] - expected_m[axis]).abs() < 1e-9), "{point:?}");
         assert!(point.speed_mps.abs() < 1e-9);
     }
-    for ends in far.points.windows(2) {
+    for ends in far.line.points.windows(2) {
         let gap_m = (ends[1].at_m[0] - ends[0].at_m[0]).hypot(ends[1].at_m[1] - ends[0].at_m[1]);
-        assert!((gap_m - far.spacing_m).abs() < 0.02, "{gap_m}");
+        assert!((gap_m - far.line.spacing_m).abs() < 0.02, "{gap_m}");
         let Cell { row, col } = geometry.cell_at(ends[0].at_m[0], ends[0].at_m[1]).unwrap();
         assert!(!whole[Cell { row, col }].is_obstacle, "{:?}", ends[0]);
     }
@@ -76,4 +76,28 @@ fn a_goal_beyond_what_is_known_is_told_with_its_place() {
         );
     }
     assert_eq!(refused(&mut map, [300.0, 280.0]), "goal at (300.0, 280.0) m: an obstacle stands in the way");
+}
+
+/// Posts a metre apart across a strip of 60 m, but for a gap from 10 to 20 m north: cells of a metre and more show no
+/// posts, so that the way over them leads straight on at 30 m north, and only the last search meets them.
+#[test]
+fn small_cells_find_the_gap_in_what_large_ones_do_not_show() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut map = TileMap::open(folder.path(), RESOLUTION_M, 64 << 20).unwrap();
+    let geometry = GridGeometry { resolution_m: RESOLUTION_M, origin: [0, 0], n_rows: 120, n_cols: 8000 };
+    let cell = |index: usize| {
+        let Cell { row, col } = geometry.cell(index);
+        let is_obstacle = col == 4000 && row % 2 == 0 && !(20..40).contains(&row);
+        let ground = GroundCell { is_obstacle, ..GroundCell::level(FrictionCurve::GRASS) };
+        MeasuredCell { ground, deviation_m: 0.05 }
+    };
+    let values = (0..geometry.n_cells()).map(cell).collect();
+    map.merge(&GridMap::from_values(geometry, values).unwrap()).unwrap();
+    let (config, limits) = (RouteConfig::default(), SpeedLimits::default());
+    let far = far_route(&mut map, 0, &config, ([200.2, 30.2], 0.0), [3800.2, 30.2], &limits).unwrap();
+    let crossing = far.line.points.iter().find(|point| point.at_m[0] >= 2000.0).unwrap();
+    assert!((10.0..20.0).contains(&crossing.at_m[1]), "{crossing:?}");
+    assert!((3600.0..3625.0).contains(&far.line.length_m()), "{}", far.line.length_m());
+    // 36 legs of 100 m, and 90 of 40 m along them.
+    assert!((110..140).contains(&far.n_legs), "{}", far.n_legs);
 }

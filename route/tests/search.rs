@@ -161,7 +161,7 @@ fn on_level_ground_a_straight_way_costs_its_length() {
     // 30 cells, each 1 + 1 / friction + 10 * 0.005 + exp(0) + exp(0).
     let expected = 30.0 * (1.0 + 1.0 / f64::from(grass.at(1.0)) + 0.05 + 2.0);
     assert!((route.cost_m - expected).abs() < 1e-3, "{} {expected}", route.cost_m);
-    assert!((route.spacing_m * (route.points.len() - 1) as f64 - 30.0).abs() < 1e-6);
+    assert!((route.line.length_m() - 30.0).abs() < 1e-6);
     // A diagonal metre costs what a straight one does.
     let diagonal = planner.route(([5.5, 5.5], FRAC_PI_4), [25.5, 25.5], &LIMITS).unwrap();
     assert!((diagonal.cost_m / (20.0 * SQRT_2) - expected / 30.0).abs() < 1e-4);
@@ -178,7 +178,7 @@ fn slippery_ground_is_gone_around_where_that_is_cheaper() {
     let crosses = |half_width: i64| {
         let planner = Planner::new(with_ice(half_width), RouteConfig::default()).unwrap();
         let route = planner.route(([10.5, 30.5], 0.0), [50.5, 30.5], &LIMITS).unwrap();
-        route.points.iter().filter(|point| point.bend.friction < 0.3).count() > 3
+        route.line.points.iter().filter(|point| point.bend.friction < 0.3).count() > 3
     };
     assert!(!crosses(4) && crosses(40));
 }
@@ -273,11 +273,11 @@ fn a_line_that_no_speed_will_do_on_is_led_around() {
         let limits = SpeedLimits { traction_max_mps2, ..LIMITS };
         Planner::new(hump(rows), careless).unwrap().route(([5.5, 20.5], 0.0), [35.5, 20.5], &limits)
     };
-    let highest_m = |route: route::Route| route.points.iter().map(|point| point.height_m).fold(0.0, f64::max);
+    let highest_m = |route: route::Route| route.line.points.iter().map(|point| point.height_m).fold(0.0, f64::max);
     // A climb of 0.3 takes 9.81 x 0.3 / sqrt(1.09) = 2.82 m/s2.
     assert!(highest_m(route(18..23, 3.5).unwrap()) > 1.0);
     let around = route(18..23, 2.5).unwrap();
-    assert!(around.points.iter().all(|point| point.bend.grade < 0.27), "{around:?}");
+    assert!(around.line.points.iter().all(|point| point.bend.grade < 0.27), "{around:?}");
     assert!(highest_m(around) < 0.5);
     let error = route(0..40, 2.5).unwrap_err().to_string();
     assert!(

@@ -2,11 +2,11 @@
 
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
-use route::{FrictionCurve, GroundCell, MeasuredCell, TILE_EDGE, TileMap};
+use route::{ClassFriction, FrictionCurve, GroundCell, MapKeeper, MeasuredCell, TILE_EDGE, TileMap};
 use std::io::{BufRead as _, BufReader};
 use std::path::Path;
 use std::process::{Command, Stdio};
-use terrain::{Cell, GridGeometry, GridMap};
+use terrain::{Cell, GridGeometry, GridMap, Knowledge, SurfaceCell, TerrainClass};
 
 const RESOLUTION_M: f64 = 0.2;
 const MEMORY_BYTES: usize = 8 << 20;
@@ -150,6 +150,110 @@ fn a_full_disk_leaves_the_old_tile() {
     std::fs::rename(&moved, folder.path()).unwrap();
     let mut map = TileMap::open(folder.path(), RESOLUTION_M, MEMORY_BYTES).unwrap();
     assert_eq!(window(&mut map, 0, [3, 3], 1).values()[0].height_m, 1.0);
+}
+
+const CLASSES: ClassFriction = ClassFriction {
+    open: FrictionCurve::DIRT,
+    loose: FrictionCurve::SAND,
+    vegetation: FrictionCurve::GRASS,
+};
+
+/// What a vehicle at a column sees of a slope of 0.01 a cell: a window of 40 cells.
+fn seen_at(col: i64) -> GridMap<SurfaceCell> {
+    let geometry = GridGeometry { resolution_m: RESOLUTION_M, origin: [col, 0], n_rows: 40, n_cols: 40 };
+    let cell = |index: usize| {
+        let Cell { row, col: place } = geometry.cell(index);
+        let height_m = 0.01 * (col + place as i64) as f32;
+        let class = if row < 20 { TerrainClass::Open } else { TerrainClass::Vegetation };
+        SurfaceCell { height_variance_m2: 4e-4, ..SurfaceCell::certain(height_m, class, 0.0) }
+    };
+    GridMap::from_values(geometry, (0..1600).map(cell).collect()).unwrap()
+}
+
+#[test]
+fn what_a_rolling_window_saw_is_kept_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let map = TileMap::open(folder.path(), RESOLUTION_M, MEMORY_BYTES).unwrap();
+    let mut keeper = MapKeeper::new(map, CLASSES);
+    // Over three tiles; every place is seen ten times.
+    for col in (0..=560).step_by(4) {
+        keeper.look(&seen_at(col)).unwrap();
+    }
+    // The first two were left: they are on disk, whatever becomes of the keeper.
+    let mut on_disk = TileMap::resume(folder.path(), MEMORY_BYTES).unwrap();
+    assert_eq!(on_disk.n_tiles(), 2);
+    assert!((window(&mut on_disk, 0, [100, 10], 1).values()[0].height_m - 1.0).abs() < 1e-3);
+    let (mut map, report) = keeper.finish().unwrap();
+    assert_eq!((report.n_new, report.n_agreeing, report.n_contradicting), (600 * 40, 0, 0));
+    for (col, row, friction) in [(0, 0, FrictionCurve::DIRT), (599, 39, FrictionCurve::GRASS)] {
+        let cell = window(&mut map, 0, [col, row], 1).values()[0];
+        assert!((cell.height_m - 0.01 * col as f32).abs() < 1e-3 && cell.roughness_m < 2e-3, "{cell:?}");
+        assert_eq!((cell.friction, cell.is_obstacle), (friction, false));
+    }
+    // Another mission, 5 cm higher, as sure of it: half of that. Seen ten times, it counts once.
+    let mut keeper = MapKeeper::new(map, CLASSES);
+    let mut lifted = seen_at(80);
+    lifted.values_mut().iter_mut().for_each(|cell| cell.height_m += 0.05);
+    (0..10).for_each(|_| keeper.look(&lifted).unwrap());
+    let (mut map, report) = keeper.finish().unwrap();
+    assert_eq!((report.n_new, report.n_agreeing), (0, 1600));
+    assert!((window(&mut map, 0, [100, 10], 1).values()[0].height_m - 1.025).abs() < 2e-3);
+    let other = GridMap::filled(GridGeometry { resolution_m: 0.3, ..*lifted.geometry() }, SurfaceCell::UNKNOWN);
+    let error = MapKeeper::new(map, CLASSES).look(&other).unwrap_err().to_string();
+    assert_eq!(error, "patch: expected cells of 0.2 m, found 0.3 m");
+}
+
+#[test]
+fn an_obstacle_that_hides_its_ground_is_kept_and_what_was_not_seen_is_not() {
+    let folder = tempfile::tempdir().unwrap();
+    let map = TileMap::open(folder.path(), RESOLUTION_M, MEMORY_BYTES).unwrap();
+    let mut seen = seen_at(0);
+    let mut trunk = SurfaceCell { knowledge: Knowledge::Unknown, ..SurfaceCell::UNKNOWN };
+    seen[Cell { row: 5, col: 5 }] = trunk;
+    trunk.class_probability[TerrainClass::Obstacle as usize] = 1.0;
+    seen[Cell { row: 10, col: 20 }] = trunk;
+    let mut keeper = MapKeeper::new(map, CLASSES);
+    keeper.look(&seen).unwrap();
+    let (mut map, report) = keeper.finish().unwrap();
+    assert_eq!(report.n_new, 1599);
+    let trunk = window(&mut map, 0, [20, 10], 1).values()[0];
+    assert!(trunk.is_obstacle && (trunk.height_m - 0.2).abs() < 1e-3, "the mean of what is around: {trunk:?}");
+    assert!(!window(&mut map, 0, [5, 5], 1).values()[0].is_known());
+}
+
+#[test]
+fn maps_of_two_robots_become_one() {
+    let folders = [tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap()];
+    let mut maps = folders.each_ref().map(|folder| {
+        TileMap::open(folder.path(), RESOLUTION_M, MEMORY_BYTES).unwrap()
+    });
+    maps[0].merge(&patch([-300, 0], 400, |_, _| 1.0)).unwrap();
+    maps[1].merge(&patch([0, 0], 400, |_, _| 1.1)).unwrap();
+    let [mut one, mut other] = maps;
+    let report = one.merge_map(&mut other).unwrap();
+    // They share 100 columns of 400 rows.
+    assert_eq!((report.n_new, report.n_agreeing, report.n_contradicting), (120_000, 40_000, 0));
+    let heights_m = [-200, 50, 300].map(|col| window(&mut one, 0, [col, 100], 1).values()[0].height_m);
+    assert_eq!(heights_m, [1.0, 1.05, 1.1]);
+    // Tiles of 256 cells from -512 to 512 and 0 to 512; in cells four times as large a quarter of it.
+    let all = one.extent(0).unwrap();
+    assert_eq!((all.origin, all.n_cols, all.n_rows), ([-512, 0], 1024, 512));
+    let all = one.extent(2).unwrap();
+    assert_eq!((all.origin, all.n_cols, all.n_rows), ([-128, 0], 256, 128));
+}
+
+#[test]
+fn a_folder_without_a_map_is_not_taken_for_an_empty_one() {
+    let folder = tempfile::tempdir().unwrap();
+    let error = TileMap::resume(folder.path(), MEMORY_BYTES).unwrap_err().to_string();
+    let told = "resolution_m: map in tiles: expected the size of its cells in metres, found no such file";
+    assert!(error.ends_with(told), "{error}");
+    for broken in ["", "-1", "NaN", "wide"] {
+        std::fs::write(folder.path().join("resolution_m"), broken).unwrap();
+        let error = TileMap::resume(folder.path(), MEMORY_BYTES).unwrap_err().to_string();
+        assert!(error.ends_with(&format!("in metres, found {broken}")), "{error}");
+    }
+    assert!(TileMap::open(folder.path(), RESOLUTION_M, MEMORY_BYTES).is_err(), "one with broken cells");
 }
 
 /// The process that `a_kill_at_any_moment_loses_no_tile` starts and kills; without its folder there is nothing to do.

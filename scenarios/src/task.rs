@@ -21,8 +21,11 @@ pub const BORDER_M: f64 = 4.0;
 
 /// Maps up to so many cells a side are built whole.
 const WHOLE_MAP_CELLS: f64 = 3500.0;
-/// What of a larger map is built around its start and goal, beyond the distance between them [m].
+/// What of a larger map is built around its start and goal, beyond the distance between them, at least [m].
 const WINDOW_MARGIN_M: f64 = 30.0;
+/// The same as a share of the way between the two where both are given and a map that is built whole has the cells for it:
+/// no way leads straight on for long.
+const WINDOW_MARGIN_SHARE: f64 = 0.25;
 /// Places of a large map that are searched for a start and a goal.
 const WINDOWS_TRIED: u64 = 8;
 
@@ -168,9 +171,10 @@ fn windows(map: &Bounds, wish: &PairWish, seed: u64, whole_m: f64) -> Vec<Option
         return vec![None];
     }
     let given_m: Vec<[f64; 2]> = given(wish).map(|(_, at_m)| at_m).collect();
-    if !given_m.is_empty() {
-        let free_m = if given_m.len() == 2 { 0.0 } else { wish.distance_m };
-        return vec![Some(around(&given_m, WINDOW_MARGIN_M + free_m))];
+    match given_m[..] {
+        [start_m, goal_m] => return vec![Some(around(&given_m, room_m(start_m, goal_m, whole_m)))],
+        [end_m] => return vec![Some(around(&[end_m], WINDOW_MARGIN_M + wish.distance_m))],
+        _ => {}
     }
     // The fractional parts of multiples of the plastic number's powers spread evenly over a square.
     let place = |try_: u64| {
@@ -181,6 +185,15 @@ fn windows(map: &Bounds, wish: &PairWish, seed: u64, whole_m: f64) -> Vec<Option
     (0..WINDOWS_TRIED).map(|try_| Some(around(&[place(try_)], WINDOW_MARGIN_M + wish.distance_m))).collect()
 }
 
+/// Room around a start and a goal, so that all of it takes no more cells than a square of `whole_m` [m].
+fn room_m(start_m: [f64; 2], goal_m: [f64; 2], whole_m: f64) -> f64 {
+    let [east_m, north_m] = [0, 1].map(|k| (goal_m[k] - start_m[k]).abs());
+    // (east + 2 room) (north + 2 room) = whole^2.
+    let (sum_m, difference_m) = (east_m + north_m, east_m - north_m);
+    let most_m = 0.25 * (difference_m.hypot(2.0 * whole_m) - sum_m);
+    (WINDOW_MARGIN_SHARE * east_m.hypot(north_m)).min(most_m).max(WINDOW_MARGIN_M)
+}
+
 /// What lies within a distance of places, and between them.
 fn around(places_m: &[[f64; 2]], within_m: f64) -> Bounds {
     let bound = |k: usize, pick: fn(f64, f64) -> f64| {
@@ -189,5 +202,20 @@ fn around(places_m: &[[f64; 2]], within_m: f64) -> Bounds {
     Bounds {
         south_west_m: [0, 1].map(|k| bound(k, f64::min) - within_m),
         north_east_m: [0, 1].map(|k| bound(k, f64::max) + within_m),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_room_around_a_long_way_takes_no_more_than_a_map_that_is_built_whole() {
+        let room_m = |east_m: f64, north_m: f64| room_m([10.0, 500.0], [10.0 + east_m, 500.0 - north_m], 630.0);
+        assert_eq!(room_m(100.0, 0.0), 30.0);
+        assert!((room_m(240.0, 320.0) - 100.0).abs() < 1e-9, "a quarter of 400 m");
+        let most_m = room_m(1000.0, 0.0);
+        assert!(((1000.0 + 2.0 * most_m) * 2.0 * most_m - 630.0 * 630.0).abs() < 1e-6, "{most_m}");
+        assert_eq!(room_m(600.0, 600.0), 30.0, "of 660 x 660 m, which it cannot be less than");
     }
 }

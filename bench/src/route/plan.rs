@@ -105,11 +105,11 @@ impl MethodPlanner {
     /// it would.
     fn sped(&self, route: Route, known: &Planner) -> Result<Plan, RouteError> {
         let drivable = |bend: Bend| self.drivable(bend);
-        let bends: Vec<Bend> = known.bends(&route.points).into_iter().map(drivable).collect();
-        let speeds_mps = fastest_speeds(&bends, route.spacing_m, &self.limits)?;
-        let points = route.points.into_iter().zip(speeds_mps);
+        let bends: Vec<Bend> = known.bends(&route.line.points).into_iter().map(drivable).collect();
+        let speeds_mps = fastest_speeds(&bends, route.line.spacing_m, &self.limits)?;
+        let points = route.line.points.into_iter().zip(speeds_mps);
         let points = points.map(|(point, speed_mps)| RoutePoint { speed_mps, ..point }).collect();
-        Ok(Plan { points, spacing_m: route.spacing_m })
+        Ok(Plan { points, spacing_m: route.line.spacing_m })
     }
 
     fn drivable(&self, bend: Bend) -> Bend {
@@ -122,18 +122,18 @@ impl MethodPlanner {
 }
 
 fn scaled(route: Route, factor: f64) -> Plan {
-    let points = route.points.into_iter();
+    let points = route.line.points.into_iter();
     let points = points.map(|point| RoutePoint { speed_mps: factor * point.speed_mps, ..point }).collect();
-    Plan { points, spacing_m: route.spacing_m }
+    Plan { points, spacing_m: route.line.spacing_m }
 }
 
 fn at_one_speed(route: Route) -> Plan {
-    let (spacing_m, last) = (route.spacing_m, route.points.len().saturating_sub(1));
+    let (spacing_m, last) = (route.line.spacing_m, route.line.points.len().saturating_sub(1));
     let speed_mps = |index: usize| {
         let nearer_m = index.min(last - index) as f64 * spacing_m;
         (2.0 * ONE_RAMP_MPS2 * nearer_m).sqrt().min(ONE_SPEED_MPS)
     };
-    let points = route.points.into_iter().enumerate();
+    let points = route.line.points.into_iter().enumerate();
     let points = points.map(|(index, point)| RoutePoint { speed_mps: speed_mps(index), ..point }).collect();
     Plan { points, spacing_m }
 }

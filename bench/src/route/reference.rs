@@ -4,7 +4,7 @@
 //! from each of several ways it moves stretches of the line to either side, long ones and short ones, and keeps what is
 //! faster and meets no more that bars the way. It knows what our planner knows and is bound by the same limits.
 
-use route::{GroundCell, LaidLine, Planner, PlannerError, Route, RouteConfig, SpeedLimits};
+use route::{GroundCell, LaidLine, Planner, PlannerError, Route, RouteConfig, RouteLine, SpeedLimits};
 
 use super::plan::Plan;
 use scenarios::RouteTask;
@@ -48,18 +48,16 @@ impl ReferencePlanner {
     pub fn plan(&self, task: &RouteTask) -> Option<Plan> {
         let ways = self.ways(task);
         let ours = ways.first()?;
-        let laid = ways.iter().filter_map(|way| self.planner.along(&way.line_m(), &self.limits));
+        let laid = ways.iter().filter_map(|way| self.planner.along(&way.line.places_m(), &self.limits));
         let mut begun: Vec<LaidLine> =
-            laid.map(|line| Bending { of: self, line }.fastest(ROUNDS_FIRST)).collect();
-        begun.sort_by(|one, other| one.duration_s.total_cmp(&other.duration_s));
+            laid.map(|laid| Bending { of: self, laid }.fastest(ROUNDS_FIRST)).collect();
+        begun.sort_by(|one, other| one.line.duration_s.total_cmp(&other.line.duration_s));
         begun.truncate(N_KEPT);
-        let bent = begun.into_iter().map(|line| Bending { of: self, line }.fastest(ROUNDS_MAX));
-        let best = bent.min_by(|one, other| one.duration_s.total_cmp(&other.duration_s));
-        let faster = best.filter(|best| best.duration_s < ours.duration_s);
-        Some(faster.map_or_else(
-            || Plan { points: ours.points.clone(), spacing_m: ours.spacing_m },
-            |LaidLine { points, spacing_m, .. }| Plan { points, spacing_m },
-        ))
+        let bent = begun.into_iter().map(|laid| Bending { of: self, laid }.fastest(ROUNDS_MAX));
+        let best = bent.min_by(|one, other| one.line.duration_s.total_cmp(&other.line.duration_s));
+        let faster = best.filter(|best| best.line.duration_s < ours.line.duration_s);
+        let RouteLine { points, spacing_m, .. } = faster.map_or_else(|| ours.line.clone(), |faster| faster.line);
+        Some(Plan { points, spacing_m })
     }
 
     /// Our route, first, and others; none where there is none of ours.
@@ -79,37 +77,37 @@ impl ReferencePlanner {
 /// A line that is being bent.
 struct Bending<'a> {
     of: &'a ReferencePlanner,
-    line: LaidLine,
+    laid: LaidLine,
 }
 
 impl Bending<'_> {
     /// At most so many rounds over all stretches, until one gains nothing.
     fn fastest(mut self, n_rounds: usize) -> LaidLine {
         for _ in 0..n_rounds {
-            let before_s = self.line.duration_s;
+            let before_s = self.laid.line.duration_s;
             for half_m in STRETCHES_M {
                 for share in MOVES {
                     self.move_stretches(half_m, share * half_m);
                 }
             }
-            if self.line.duration_s > (1.0 - GAIN_MIN) * before_s {
+            if self.laid.line.duration_s > (1.0 - GAIN_MIN) * before_s {
                 break;
             }
         }
-        self.line
+        self.laid
     }
 
     /// Tries to move every stretch of a length to either side.
     fn move_stretches(&mut self, half_m: f64, by_m: f64) {
         let mut middle_m = 0.0;
-        while middle_m < self.line.spacing_m * self.line.points.len() as f64 {
+        while middle_m < self.laid.line.spacing_m * self.laid.line.points.len() as f64 {
             for by_m in [by_m, -by_m] {
                 let moved = self.of.planner.along(&self.moved(middle_m, half_m, by_m), &self.of.limits);
                 let is_better = |moved: &LaidLine| {
-                    moved.duration_s < self.line.duration_s && moved.n_barred <= self.line.n_barred
+                    moved.line.duration_s < self.laid.line.duration_s && moved.n_barred <= self.laid.n_barred
                 };
                 if let Some(moved) = moved.filter(is_better) {
-                    self.line = moved;
+                    self.laid = moved;
                     break;
                 }
             }
@@ -120,11 +118,11 @@ impl Bending<'_> {
     /// Control points on the line, those near a place of it beside it: the more, the nearer (a raised cosine). Its ends and
     /// its direction at the start stay.
     fn moved(&self, middle_m: f64, half_m: f64, by_m: f64) -> Vec<[f64; 2]> {
-        let every = (CONTROL_M / self.line.spacing_m).round().max(1.0) as usize;
-        let last = self.line.points.len() - 1;
+        let every = (CONTROL_M / self.laid.line.spacing_m).round().max(1.0) as usize;
+        let last = self.laid.line.points.len() - 1;
         let control = |index: usize| {
-            let point = &self.line.points[index];
-            let along_m = index as f64 * self.line.spacing_m;
+            let point = &self.laid.line.points[index];
+            let along_m = index as f64 * self.laid.line.spacing_m;
             let away = ((along_m - middle_m) / half_m).clamp(-1.0, 1.0);
             let is_free = index > 2 * every && index < last;
             let aside_m =
@@ -182,12 +180,12 @@ mod tests {
         let reference = reference(0.06);
         let detour: Vec<[f64; 2]> =
             (0..=60).map(|x| [10.5 + f64::from(x), 20.5 + 15.0 * (f64::from(x) * 0.05236).sin()]).collect();
-        let line = reference.planner.along(&detour, &limits()).unwrap();
-        let begun_s = line.duration_s;
-        let found = Bending { of: &reference, line }.fastest(ROUNDS_MAX);
+        let laid = reference.planner.along(&detour, &limits()).unwrap();
+        let begun_s = laid.line.duration_s;
+        let found = Bending { of: &reference, laid }.fastest(ROUNDS_MAX);
         let least_s = 58.0 / 5.0 + 2.0 * 2.0 / 5.0;
         assert!(begun_s > 1.1 * least_s, "{begun_s}");
-        assert!((0.999..1.005).contains(&(found.duration_s / least_s)), "{} {least_s}", found.duration_s);
+        assert!((0.999..1.005).contains(&(found.line.duration_s / least_s)), "{} {least_s}", found.line.duration_s);
         assert_eq!(found.n_barred, 0);
     }
 
@@ -213,10 +211,10 @@ mod tests {
             let ours = reference.planner.route((task.start_m, task.yaw_rad), goal_m, &limits()).unwrap();
             let found = reference.plan(&task).unwrap();
             assert!(
-                found.duration_s(0.0) <= ours.duration_s,
+                found.duration_s(0.0) <= ours.line.duration_s,
                 "{} {}",
                 found.duration_s(0.0),
-                ours.duration_s
+                ours.line.duration_s
             );
         }
     }

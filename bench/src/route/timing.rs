@@ -94,11 +94,11 @@ pub fn measure_timing(vehicle: &Vehicle, seed: u64, n_tasks: usize) -> Result<Ti
         expanded.push(n_expanded);
         routes.push(route_ms);
         let bends: Vec<Bend> =
-            route.points.iter().map(|point| point.bend).cycle().take(N_CHECKPOINTS).collect();
-        let (profile_ms, speeds) = timed_ms(|| fastest_speeds(&bends, route.spacing_m, &limits));
+            route.line.points.iter().map(|point| point.bend).cycle().take(N_CHECKPOINTS).collect();
+        let (profile_ms, speeds) = timed_ms(|| fastest_speeds(&bends, route.line.spacing_m, &limits));
         speeds?;
         profiles.push(profile_ms);
-        let halfway = &route.points[route.points.len() / 2];
+        let halfway = &route.line.points[route.line.points.len() / 2];
         let square = around(planner.ground().geometry(), halfway.at_m);
         let before: Vec<GroundCell> = square.cells().map(|cell| planner.ground()[cell]).collect();
         let muddy = |_, cell: GroundCell| GroundCell { friction: FrictionCurve::MUD, ..cell };
@@ -184,8 +184,8 @@ pub fn measure_far(
     Ok(FarTiming {
         side_m,
         cell_m,
-        length_m: again.spacing_m * again.points.len().saturating_sub(1) as f64,
-        duration_s: again.duration_s,
+        length_m: again.line.length_m(),
+        duration_s: again.line.duration_s,
         written_s: 1e-3 * written_ms,
         first_s: 1e-3 * first_ms,
         again_s: 1e-3 * again_ms,

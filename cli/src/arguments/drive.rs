@@ -59,6 +59,11 @@ pub struct DriveArguments {
           help_heading = "World")]
     pub route: Option<Option<PathBuf>>,
 
+    /// Keep what is seen of the ground in a map in tiles, the folder is made if missing; later drives take it with
+    /// --route=FOLDER, `surefoot route` with --world FOLDER
+    #[arg(long, value_name = "FOLDER", conflicts_with = "commands", help_heading = "World")]
+    pub keep: Option<PathBuf>,
+
     /// What the ground is made of.
     #[command(flatten, next_help_heading = "World")]
     pub ground: super::RouteGround,
@@ -260,6 +265,8 @@ Examples:
       Real elevation; negative coordinates are fine.
   surefoot drive --world hills.npz --start 12,-3,1.57 --goal 260,240 --route --time-limit 900
       Along a route over the whole file.
+  surefoot drive --world hills.npz --start 12,-3,1.57 --goal 60,20 --keep hills --route=hills
+      Along a route over what earlier drives kept, and keeps what this one sees.
   surefoot drive --walkers 3
       Among people who cross the way.
   surefoot drive --goal 30,25 --goal 12,14

@@ -11,8 +11,9 @@ use super::values::{Goal, StartPose};
 #[derive(Args, Clone, Debug)]
 #[command(after_long_help = AFTER_HELP)]
 pub struct RouteArguments {
-    /// Elevation file: .npz, GeoTIFF or 16-bit PNG with its scale
-    #[arg(long, value_name = "FILE")]
+    /// Elevation file: .npz, GeoTIFF or 16-bit PNG with its scale; or the folder of a map in tiles, as `surefoot map` and
+    /// `surefoot drive --keep` leave one
+    #[arg(long, value_name = "FILE|FOLDER")]
     pub world: PathBuf,
 
     /// Where the vehicle stands [m, m, rad] [default with --lead: where it says to be]
@@ -55,13 +56,22 @@ pub struct RouteArguments {
 /// What is known of the ground, beside its heights.
 #[derive(Args, Clone, Debug, Default)]
 pub struct RouteGround {
-    /// Edge of the cells that a route is searched on [m] [default: that of the file, between 0.5 and 2]
+    /// Edge of the cells that a route is searched on [m] [default: that of the file, between 0.5 and 2; of a map in tiles the
+    /// next to it that it has, and over one that is too large for a search at once, larger ones]
     #[arg(long, value_name = "M", allow_hyphen_values = true)]
     pub cell: Option<f64>,
 
-    /// Ground where no plants grow
-    #[arg(long, value_name = "GROUND", default_value = "dirt")]
-    pub bare: BareGround,
+    /// How much it holds.
+    #[command(flatten)]
+    pub kinds: GroundKinds,
+}
+
+/// How much the ground holds; a map in tiles says it of every cell itself.
+#[derive(Args, Clone, Debug, Default)]
+pub struct GroundKinds {
+    /// Ground where no plants grow [default: dirt]
+    #[arg(long, value_name = "GROUND")]
+    pub bare: Option<BareGround>,
 
     /// Friction of the vehicle's own drives in place of the published, as `surefoot train friction` writes it (TOML)
     ///
@@ -113,4 +123,7 @@ Examples:
   surefoot route --world hills.npz --start 20,20,0.8 --goal 250,240 --bare mud --speed 5 --vehicle mine.toml
   surefoot route --world hills.npz --start 20,20,0.8 --goal 250,240 --friction friction.toml
   surefoot route --world hills.npz --goal 250,240 --lead field
-      The vehicle of the run `field`, from where it stands.";
+      The vehicle of the run `field`, from where it stands.
+  surefoot route --world valley --start 20,20,0.8 --goal 3600,3500
+      Over a map in tiles. Where four million cells do not hold the way with the room around it, it is searched coarsely
+      as a whole and then finely along that, a leg of 100 m at a time.";

@@ -13,7 +13,7 @@ use super::knowledge::Knowledge;
 use super::open_loop::Script;
 use crate::UsageError;
 use crate::arguments::{DriveArguments, WorldSource};
-use crate::route::known_friction;
+use crate::route::known::known_friction;
 
 /// What is driven, with what.
 pub(super) struct Scene {
@@ -71,7 +71,7 @@ pub(crate) fn machine_of(
     if arguments.walkers > 0 {
         config.moving.get_or_insert_default();
     }
-    if let Some(known) = known_friction(&arguments.ground)? {
+    if let Some(known) = known_friction(&arguments.ground.kinds)? {
         config.keep_to_friction(known);
     }
     config.controller.n_threads = arguments.kernels.threads.count();

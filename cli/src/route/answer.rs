@@ -1,11 +1,12 @@
 //! What is said of a route, and what is left of it: text, CSV, JSON, GeoJSON and picture.
 
-use ::route::{Planner, Route, RoutePoint};
+use ::route::{GroundCell, Planner, Route, RouteLine, RoutePoint};
 use bicycle::Vehicle;
 use formats::{GeoLine, MapReference};
 use report::route::RoutePicture;
 use serde::Serialize;
 use serde_json::{Map, Value};
+use terrain::GridMap;
 
 use crate::arguments::RouteArguments;
 use crate::{UsageError, summary};
@@ -23,7 +24,8 @@ struct Summary {
     fastest_mps: f64,
     tightest_radius_m: f64,
     turning_radius_m: f64,
-    cost_m: f64,
+    /// Null of a way that was searched in legs.
+    cost_m: Option<f64>,
     n_expanded: usize,
     corners_m: Vec<[f64; 2]>,
     alternatives: Vec<Alternative>,
@@ -38,14 +40,15 @@ struct Alternative {
 }
 
 impl Alternative {
-    fn of(route: &Route) -> Self {
-        Self { length_m: route.length_m(), duration_s: route.duration_s, line_m: route.line_m() }
+    fn of(line: &&RouteLine) -> Self {
+        Self { length_m: line.length_m(), duration_s: line.duration_s, line_m: line.places_m() }
     }
 }
 
 impl Summary {
-    fn of(route: &Route, vehicle: &Vehicle, arguments: &RouteArguments) -> Self {
-        let points = &route.points;
+    fn of(answer: &Answer<'_>, vehicle: &Vehicle, arguments: &RouteArguments) -> Self {
+        let line = answer.line;
+        let points = &line.points;
         let largest = |value: &dyn Fn(&RoutePoint) -> f64| points.iter().map(value).fold(0.0, f64::max);
         let climbs_m = points.windows(2).map(|ends| (ends[1].height_m - ends[0].height_m).max(0.0));
         let slope = |point: &RoutePoint| point.bend.grade.hypot(point.bend.cross_slope);
@@ -58,17 +61,17 @@ impl Summary {
             revision: summary::revision(),
             world: arguments.world.file_name().unwrap_or_default().to_string_lossy().into_owned(),
             vehicle: vehicle.name.clone(),
-            length_m: route.length_m(),
-            duration_s: route.duration_s,
+            length_m: line.length_m(),
+            duration_s: line.duration_s,
             climb_m: climbs_m.sum(),
             steepest_deg: largest(&slope).atan().to_degrees(),
             fastest_mps: largest(&|point| point.speed_mps),
             tightest_radius_m: 1.0 / largest(&|point| point.bend.curvature_per_m.abs()).max(1e-6),
             turning_radius_m: vehicle.geometry.wheelbase_m / vehicle.limits.steering_max_rad.tan(),
-            cost_m: route.cost_m,
-            n_expanded: route.n_expanded,
+            cost_m: answer.cost_m,
+            n_expanded: answer.n_expanded,
             corners_m: corners.map(|point| point.at_m).collect(),
-            alternatives: Vec::new(),
+            alternatives: answer.others.iter().map(Alternative::of).collect(),
         }
     }
 
@@ -107,22 +110,37 @@ const CORNERS: usize = 24;
 
 /// A route that was found, on its map.
 pub(super) struct Answer<'a> {
-    pub planner: &'a Planner,
-    pub route: &'a Route,
-    pub others: &'a [Route],
+    pub ground: &'a GridMap<GroundCell>,
+    pub line: &'a RouteLine,
+    pub others: &'a [&'a RouteLine],
+    /// Of the way over the cells, where it was searched as one [metres of way].
+    pub cost_m: Option<f64>,
+    /// States that the search expanded.
+    pub n_expanded: usize,
     /// Where the map lies on the globe, if its file tells.
     pub reference: Option<MapReference>,
 }
 
-impl Answer<'_> {
+impl<'a> Answer<'a> {
+    /// A route that was searched at once, alone, of a map that lies nowhere on the globe.
+    pub fn of(planner: &'a Planner, route: &'a Route) -> Self {
+        Self {
+            ground: planner.ground(),
+            line: &route.line,
+            others: &[],
+            reference: None,
+            cost_m: Some(route.cost_m),
+            n_expanded: route.n_expanded,
+        }
+    }
+
     /// Prints it and leaves its files.
     pub fn show(&self, vehicle: &Vehicle, arguments: &RouteArguments) -> anyhow::Result<()> {
-        let alternatives = self.others.iter().map(Alternative::of).collect();
-        let summary = Summary { alternatives, ..Summary::of(self.route, vehicle, arguments) };
+        let summary = Summary::of(self, vehicle, arguments);
         print!("{}", summary.text());
         let results = &arguments.results;
         results.write_json("route.json", &summary)?;
-        results.write("route.csv", csv(self.route).as_bytes())?;
+        results.write("route.csv", csv(self.line).as_bytes())?;
         results.write("route.png", &self.picture(&summary)?)?;
         let told = match &self.reference {
             Some(reference) => {
@@ -141,14 +159,15 @@ impl Answer<'_> {
             "{}, climb {:.0} m, steepest {:.0} deg, tightest radius {:.1} m",
             summary.world, summary.climb_m, summary.steepest_deg, summary.tightest_radius_m
         );
-        let (ground, route, others) = (self.planner.ground(), self.route, self.others);
-        report::route::picture(&RoutePicture { title: &title, subtitle: &subtitle, ground, route, others })
+        let Self { ground, line, others, .. } = *self;
+        report::route::picture(&RoutePicture { title: &title, subtitle: &subtitle, ground, line, others })
     }
 
     /// The best way first.
     fn geojson(&self, reference: &MapReference) -> Result<Value, UsageError> {
-        let ways: Vec<&Route> = std::iter::once(self.route).chain(self.others).collect();
-        let lines_m: Vec<Vec<[f64; 2]>> = ways.iter().map(|way| way.line_m()).collect();
+        let ways: Vec<&RouteLine> =
+            std::iter::once(self.line).chain(self.others.iter().copied()).collect();
+        let lines_m: Vec<Vec<[f64; 2]>> = ways.iter().map(|way| way.places_m()).collect();
         let lines: Vec<GeoLine<'_>> = ways
             .iter()
             .zip(&lines_m)
@@ -158,14 +177,14 @@ impl Answer<'_> {
     }
 }
 
-fn properties(way: &Route) -> Map<String, Value> {
+fn properties(way: &RouteLine) -> Map<String, Value> {
     let told = [("length_m", way.length_m()), ("duration_s", way.duration_s)];
     told.into_iter().map(|(key, value)| (key.to_owned(), value.into())).collect()
 }
 
-fn csv(route: &Route) -> String {
+fn csv(line: &RouteLine) -> String {
     let mut text = String::from("x_m,y_m,yaw_rad,height_m,speed_mps,curvature_per_m,grade,friction\n");
-    for RoutePoint { at_m: [x_m, y_m], yaw_rad, height_m, bend, speed_mps } in &route.points {
+    for RoutePoint { at_m: [x_m, y_m], yaw_rad, height_m, bend, speed_mps } in &line.points {
         let (curvature, grade, friction) = (bend.curvature_per_m, bend.grade, bend.friction);
         let row = format!(
             "{x_m:.3},{y_m:.3},{yaw_rad:.5},{height_m:.3},{speed_mps:.4},{curvature:.5},{grade:.5},{friction:.4}\n"

@@ -80,8 +80,8 @@ impl Guided {
         let route = planner.route((start.at_m, start.yaw_rad), goal_m, &limits)?;
         let told = GuidedSummary {
             map: name,
-            length_m: route.length_m(),
-            expected_s: route.duration_s,
+            length_m: route.line.length_m(),
+            expected_s: route.line.duration_s,
             ..GuidedSummary::default()
         };
         let reach_m = REACH_SHARE * config.risk_map.n_cols as f64 * config.risk_resolution_m();
@@ -119,7 +119,7 @@ impl Guided {
         let stands = place.time_s - self.made.1 > STANDSTILL.1;
         if stands {
             // What it is that keeps the vehicle is not known, but that it is there.
-            let ahead = (self.length_m / self.route.spacing_m) as usize;
+            let ahead = (self.length_m / self.route.line.spacing_m) as usize;
             self.planner.note_obstacles(self.guide.ahead_m().get(ahead).copied());
         }
         if stands || self.planner.first_barrier(self.guide.ahead_m()).is_some() {

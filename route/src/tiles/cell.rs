@@ -12,6 +12,11 @@ pub struct MeasuredCell {
     pub deviation_m: f32,
 }
 
+impl MeasuredCell {
+    /// Nothing was measured.
+    pub const UNKNOWN: Self = Self { ground: GroundCell::UNKNOWN, deviation_m: f32::INFINITY };
+}
+
 /// Heights to 1 mm, friction coefficients to 0.01, viscous ones to 1 ms/m, Stribeck speeds to 0.1 m/s, roughness to
 /// 1 mm, deviations to 1 cm.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -77,6 +82,11 @@ impl Packed {
             roughness_m: f32::from(self.roughness_mm) / 1000.0,
             is_obstacle: self.is_obstacle != 0,
         }
+    }
+
+    /// As it was measured; `None` where it was not.
+    pub fn measured(&self) -> Option<MeasuredCell> {
+        self.is_known().then(|| MeasuredCell { ground: self.ground(), deviation_m: self.deviation_m() })
     }
 
     fn height_m(&self) -> f64 {

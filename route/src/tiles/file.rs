@@ -55,6 +55,23 @@ pub(super) fn agree_on_resolution(folder: &Path, resolution_m: f64) -> Result<()
     }
 }
 
+/// The size of a map's cells [m].
+pub(super) fn resolution_m(folder: &Path) -> Result<f64, TileError> {
+    let path = folder.join(RESOLUTION);
+    let text = match std::fs::read_to_string(&path) {
+        Ok(text) => text,
+        Err(error) if error.kind() == io::ErrorKind::NotFound => "no such file".to_owned(),
+        Err(error) => return Err(system(&path, "read")(error)),
+    };
+    let found = text.trim();
+    found.parse().ok().filter(|size_m: &f64| size_m.is_finite() && *size_m > 0.0).ok_or_else(|| TileError::Field {
+        path,
+        field: "map in tiles",
+        expected: "the size of its cells in metres".to_owned(),
+        found: found.to_owned(),
+    })
+}
+
 /// The cells of a tile's file; `None` where there is none.
 pub(super) fn read(folder: &Path, key: Key) -> Result<Option<Vec<Packed>>, TileError> {
     let path = path_of(folder, key);
