@@ -80,7 +80,7 @@ fn what_makes_no_route_is_told_in_one_line() {
     std::fs::create_dir(&nobody).unwrap();
     std::fs::write(folder.path().join("nobody/resolution_m"), "7").unwrap();
     let keep = ["drive", "--method", "physics", "--world", &now, "--keep", &nobody];
-    assert_refused(&run(&[&keep[..], &TASK].concat()), 2, "size of the cells [m]: expected 0.05, found 7");
+    assert_refused(&run(&[&keep[..], &TASK].concat()), 2, "size of the cells [m]: expected 0.063, found 7");
     let lead = ["route", "--world", &now, "--goal", "14,8", "--lead", "nobody-is-here"];
     assert_refused(&run(&lead), 2, "--lead: expected a run that is there, found none named nobody-is-here");
     assert_refused(&run(&["route", "--world", &now, "--goal", "14,8"]), 2, "--start");

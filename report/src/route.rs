@@ -61,7 +61,7 @@ pub fn map(title: &str, subtitle: &str, ground: &GridMap<GroundCell>) -> Result<
 }
 
 fn page(picture: &RoutePicture<'_>) -> Canvas {
-    let (world, interest) = (bounds(picture.ground), interest(picture));
+    let (world, interest) = (known(picture.ground), interest(picture));
     let margin_m =
         0.15 * (0..2).map(|k| interest.north_east_m[k] - interest.south_west_m[k]).fold(20.0, f64::max);
     let axes = map_axes(interest, margin_m, world, SLOT);

@@ -1,6 +1,6 @@
 //! Routes over maps that do not fit into memory: coarsely over the whole way, then finely along it, a leg at a time.
 
-use crate::line::{self, Gate, Line, heading_of};
+use crate::line::{self, Gate, Line, Undrivable, heading_of};
 use crate::planner::{Planner, PlannerError, RouteError, RouteLine};
 use crate::speed::{Bend, SpeedLimits};
 use crate::tiles::{LEVEL_MAX, TileError, TileMap};
@@ -17,7 +17,7 @@ const MIDDLE_LEVELS: u8 = 2;
 const WIDENINGS: [f64; 4] = [1.0, 2.0, 4.0, 8.0];
 /// Points of the line whose ground is read at a time.
 const READ_POINTS: usize = 128;
-/// Places that a line is led around, at most, since no speed will do there.
+/// How often the last search is made again around places where no speed will do, at most.
 const DETOURS_MAX: usize = 16;
 
 /// How a way over larger cells is searched again over smaller ones, a leg at a time.
@@ -88,20 +88,25 @@ pub fn far_route(
         guide = gates.iter().map(|gate| gate.at_m).chain([goal_m]).collect();
     }
     let refinement = if is_broad { BROAD } else { NARROW };
+    let mut n_detours = 0;
     loop {
         let mut corridor = search.refined(level, refinement, &guide, from)?;
         line::fix_ends(&mut corridor, start_m, goal_m);
         let line = Line::through(&corridor, search.map.cell_m(level))?;
         let grounded = search.grounded(&line)?;
-        let error = match line.driven(grounded, limits) {
+        let Undrivable { error, mut places_m } = match line.driven(grounded, limits) {
             Ok(line) => return Ok(FarRoute { line, n_legs: search.n_legs, n_expanded: search.n_expanded }),
-            Err(error) => error,
+            Err(undrivable) => undrivable,
         };
-        let place_m = error.along_m().map(|along_m| line.place_m(along_m));
-        let Some(place_m) = place_m.filter(|_| search.closed_m.len() < DETOURS_MAX) else {
+        n_detours += 1;
+        let is_off = |end_m: [f64; 2], [x_m, y_m]: [f64; 2]| {
+            libm::hypot(x_m - end_m[0], y_m - end_m[1]) > config.clear_width_m
+        };
+        places_m.retain(|place_m| is_off(start_m, *place_m) && is_off(goal_m, *place_m));
+        if places_m.is_empty() || n_detours > DETOURS_MAX {
             return Err(RouteError::from(error).into());
-        };
-        search.closed_m.push(place_m);
+        }
+        search.closed_m.extend(places_m);
     }
 }
 

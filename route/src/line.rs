@@ -4,7 +4,7 @@ use crate::FrictionCurve;
 use crate::ground::GroundCell;
 use crate::planner::{RouteError, RouteLine, RoutePoint};
 use crate::smooth::{Spline, SplinePoint};
-use crate::speed::{Bend, SpeedError, SpeedLimits, duration_s, fastest_speeds};
+use crate::speed::{self, Bend, SpeedError, SpeedLimits, duration_s, fastest_speeds};
 use terrain::GridMap;
 
 /// A point that a line passes, to within some metres.
@@ -48,20 +48,17 @@ impl Line {
         Ok(Self { samples, spacing_m })
     }
 
-    /// The place so far along it [m].
-    pub fn place_m(&self, along_m: f64) -> [f64; 2] {
-        let index = (along_m / self.spacing_m).round() as usize;
-        self.samples[index.min(self.samples.len() - 1)].at_m
-    }
-
     /// The line with the fastest speeds over ground whose bend and height [m] each point has.
     pub fn driven(
         &self,
         grounded: Vec<(Bend, f64)>,
         limits: &SpeedLimits,
-    ) -> Result<RouteLine, SpeedError> {
+    ) -> Result<RouteLine, Undrivable> {
         let bends: Vec<Bend> = grounded.iter().map(|(bend, _)| *bend).collect();
-        let speeds_mps = fastest_speeds(&bends, self.spacing_m, limits)?;
+        let speeds_mps = fastest_speeds(&bends, self.spacing_m, limits).map_err(|error| {
+            let faults = speed::faults(&bends, self.spacing_m, limits);
+            Undrivable { error, places_m: faults.map(|(index, _)| self.samples[index].at_m).collect() }
+        })?;
         let duration_s = duration_s(&speeds_mps, self.spacing_m);
         let points = self.samples.iter().zip(grounded).zip(speeds_mps);
         let points = points.map(|((sample, (bend, height_m)), speed_mps)| RoutePoint {
@@ -73,6 +70,14 @@ impl Line {
         });
         Ok(RouteLine { points: points.collect(), spacing_m: self.spacing_m, duration_s })
     }
+}
+
+/// No speed will do on a line.
+pub(crate) struct Undrivable {
+    /// At the first place, or with these limits.
+    pub error: SpeedError,
+    /// All the places, along the line [m]; none where it is the limits that will not do.
+    pub places_m: Vec<[f64; 2]>,
 }
 
 /// The ground under a sample of a line, and its height [m].

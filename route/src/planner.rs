@@ -3,7 +3,7 @@
 use crate::RouteConfig;
 use crate::edges::{Barrier, Edges, STEPS, stepped};
 use crate::ground::{self, GroundCell, GroundError};
-use crate::line::{self, Gate, Line, heading_of};
+use crate::line::{self, Gate, Line, Undrivable, heading_of};
 use crate::search::{self, CellPath, Unreachable};
 use crate::smooth::SplinePoint;
 use crate::speed::{Bend, SpeedError, SpeedLimits};
@@ -12,8 +12,10 @@ use terrain::{Cell, CellRegion, GridMap, SettingError};
 /// Share of friction that makes ground as good as other ground to smooth a line over, and of roughness likewise.
 const AS_GOOD: f32 = 0.9;
 
-/// Places that a route is led around, at most, since no speed will do there.
-const DETOURS_MAX: usize = 16;
+/// How often a route is searched again around places where no speed will do, at most.
+const DETOURS_MAX: usize = 32;
+/// How often around the first of them alone: another way often leaves the others out.
+const SINGLE_DETOURS: usize = 16;
 
 /// Searches one map for routes.
 #[derive(Clone, Debug)]
@@ -151,12 +153,12 @@ pub enum RouteError {
 struct Refusal {
     error: RouteError,
     /// Where no speed will do, if that is why [m].
-    at_m: Option<[f64; 2]>,
+    places_m: Vec<[f64; 2]>,
 }
 
 impl From<RouteError> for Refusal {
     fn from(error: RouteError) -> Self {
-        Self { error, at_m: None }
+        Self { error, places_m: Vec::new() }
     }
 }
 
@@ -243,15 +245,25 @@ impl Planner {
         }
         let (mut planner, mut refused, mut n_detours) = (std::borrow::Cow::Borrowed(self), None, 0);
         loop {
-            let Refusal { error, at_m } = match planner.attempt((start_m, yaw_rad), goal_m, limits) {
+            let Refusal { error, places_m } = match planner.attempt((start_m, yaw_rad), goal_m, limits) {
                 Ok(route) => return Ok(route),
                 Err(refusal) => refusal,
             };
-            let error = *refused.get_or_insert(error);
-            let place_m = at_m.filter(|_| n_detours < DETOURS_MAX);
-            let around = place_m.and_then(|at_m| planner.around(at_m, [start_m, goal_m]));
-            let Some(around) = around else { return Err(error) };
-            planner.to_mut().edges.close(&around);
+            let first = *refused.get_or_insert(error);
+            if places_m.is_empty() || n_detours == DETOURS_MAX {
+                return Err(first);
+            }
+            let n_places = if n_detours < SINGLE_DETOURS { 1 } else { places_m.len() };
+            let closed: Vec<CellRegion> = places_m
+                .into_iter()
+                .take(n_places)
+                .filter_map(|at_m| planner.around(at_m, [start_m, goal_m]))
+                .collect();
+            // Nothing leads around start and goal.
+            if closed.is_empty() {
+                return Err(error);
+            }
+            closed.iter().for_each(|region| planner.to_mut().edges.close(region));
             n_detours += 1;
         }
     }
@@ -273,10 +285,7 @@ impl Planner {
         let sliding_mps = self.config.sliding_mps as f32;
         let grounded = line.samples.iter().map(|sample| line::grounded(&self.ground, sliding_mps, sample));
         let driven = line.driven(grounded.collect(), limits);
-        let line = driven.map_err(|error| Refusal {
-            at_m: error.along_m().map(|along_m| line.place_m(along_m)),
-            error: error.into(),
-        })?;
+        let line = driven.map_err(|Undrivable { error, places_m }| Refusal { error: error.into(), places_m })?;
         Ok(Route {
             cost_m: path.cost * resolution_m,
             cells: path.cells,

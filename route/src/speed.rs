@@ -129,25 +129,13 @@ pub enum SpeedError {
     Setting(#[from] SettingError),
 }
 
-impl SpeedError {
-    /// Where along the way no speed will do, if that is why [m].
-    pub(crate) fn along_m(&self) -> Option<f64> {
-        match *self {
-            Self::Slides { at_m, .. } | Self::TooWeak { at_m, .. } | Self::BrakesTooWeak { at_m, .. } => {
-                Some(at_m)
-            }
-            Self::Setting(_) => None,
-        }
-    }
-}
-
 /// The fastest speeds [m/s] at points `spacing_m` apart, from standing to standing.
 ///
 /// # Errors
 /// A setting out of range, or a place where the vehicle could not even creep.
 pub fn fastest_speeds(bends: &[Bend], spacing_m: f64, limits: &SpeedLimits) -> Result<Vec<f64>, SpeedError> {
     limits.validate()?;
-    check_creeping(bends, spacing_m, limits)?;
+    faults(bends, spacing_m, limits).next().map_or(Ok(()), |(_, fault)| Err(fault))?;
     let n = bends.len();
     let ways: Vec<Way> = bends.iter().map(|bend| Way::after(bend, spacing_m, limits)).collect();
     let mut squares = vec![0.0; n];
@@ -221,25 +209,32 @@ pub fn duration_s(speeds_mps: &[f64], spacing_m: f64) -> f64 {
     speeds_mps.windows(2).map(|ends| 2.0 * spacing_m / (ends[0] + ends[1])).sum()
 }
 
+/// The points at which no speed will do, and why.
+pub(crate) fn faults(
+    bends: &[Bend],
+    spacing_m: f64,
+    limits: &SpeedLimits,
+) -> impl Iterator<Item = (usize, SpeedError)> {
+    let fault = move |(index, bend): (usize, &Bend)| {
+        Some((index, creeping_fault(bend, index as f64 * spacing_m, limits)?))
+    };
+    bends.iter().enumerate().filter_map(fault)
+}
+
 /// A vehicle that creeps needs friction, traction and brakes against gravity alone.
-fn check_creeping(bends: &[Bend], spacing_m: f64, limits: &SpeedLimits) -> Result<(), SpeedError> {
-    for (index, bend) in bends.iter().enumerate() {
-        let (friction_mps2, grade_mps2, cross_mps2) = bend.forces_mps2(limits);
-        let at_m = index as f64 * spacing_m;
-        if libm::hypot(grade_mps2, cross_mps2) >= friction_mps2 {
-            let held = limits.friction_share * bend.friction;
-            return Err(SpeedError::Slides { at_m, held, found: libm::hypot(bend.grade, bend.cross_slope) });
-        }
-        if grade_mps2 >= limits.traction_max_mps2 {
-            let traction_mps2 = limits.traction_max_mps2;
-            return Err(SpeedError::TooWeak { at_m, traction_mps2, found_mps2: grade_mps2 });
-        }
-        if -grade_mps2 >= limits.braking_max_mps2 {
-            let braking_mps2 = limits.braking_max_mps2;
-            return Err(SpeedError::BrakesTooWeak { at_m, braking_mps2, found_mps2: -grade_mps2 });
-        }
+fn creeping_fault(bend: &Bend, at_m: f64, limits: &SpeedLimits) -> Option<SpeedError> {
+    let (friction_mps2, grade_mps2, cross_mps2) = bend.forces_mps2(limits);
+    if libm::hypot(grade_mps2, cross_mps2) >= friction_mps2 {
+        let held = limits.friction_share * bend.friction;
+        return Some(SpeedError::Slides { at_m, held, found: libm::hypot(bend.grade, bend.cross_slope) });
     }
-    Ok(())
+    if grade_mps2 >= limits.traction_max_mps2 {
+        let traction_mps2 = limits.traction_max_mps2;
+        return Some(SpeedError::TooWeak { at_m, traction_mps2, found_mps2: grade_mps2 });
+    }
+    let braking_mps2 = limits.braking_max_mps2;
+    (-grade_mps2 >= braking_mps2)
+        .then(|| SpeedError::BrakesTooWeak { at_m, braking_mps2, found_mps2: -grade_mps2 })
 }
 
 #[cfg(test)]

@@ -4,7 +4,7 @@
 
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
-use route::{Barrier, FrictionCurve, GroundCell, Planner, RouteConfig, RouteError, SpeedLimits};
+use route::{Barrier, FrictionCurve, GroundCell, Planner, RouteConfig, RoutePoint, RouteError, SpeedLimits};
 use std::cmp::Reverse;
 use std::collections::{BinaryHeap, HashMap};
 use std::f64::consts::{FRAC_PI_4, SQRT_2};
@@ -284,4 +284,29 @@ fn a_line_that_no_speed_will_do_on_is_led_around() {
         error.starts_with("climb at") && error.contains("expected at most 2.50 m/s2, found 2.8"),
         "{error}"
     );
+}
+
+/// Forty such humps one after the other, from the south and from the north in turn: more than are led around one at a time.
+#[test]
+fn a_line_is_led_around_many_places_at_once() {
+    let geometry = GridGeometry { resolution_m: 1.0, origin: [0, 0], n_rows: 30, n_cols: 820 };
+    let cell = |index: usize| {
+        let Cell { row, col } = geometry.cell(index);
+        let from_top = (col as f32 % 20.0 - 10.0).abs();
+        let is_hump = if col / 20 % 2 == 0 { row < 18 } else { row >= 12 };
+        let height_m = if is_hump && col < 800 { 0.3 * (4.0 - from_top).max(0.0) } else { 0.0 };
+        GroundCell { height_m, ..GroundCell::level(FrictionCurve::ASPHALT) }
+    };
+    let ground = GridMap::from_values(geometry, (0..geometry.n_cells()).map(cell).collect()).unwrap();
+    let careless = RouteConfig { pitch_max_rad: 1.2, roll_max_rad: 1.2, ..RouteConfig::default() };
+    let careless = RouteConfig { slope_weight: 0.0, friction_share: 1.0, ..careless };
+    let limits = SpeedLimits { traction_max_mps2: 2.5, ..LIMITS };
+    let planner = Planner::new(ground, careless).unwrap();
+    let route = planner.route(([2.5, 15.5], 0.0), [815.5, 15.5], &limits).unwrap();
+    let climbs_mps2 = route.line.points.iter().map(|RoutePoint { bend, .. }| {
+        9.81 * bend.grade / (1.0 + bend.grade.powi(2) + bend.cross_slope.powi(2)).sqrt()
+    });
+    assert!(climbs_mps2.fold(0.0, f64::max) < 2.5);
+    // Six metres to and fro every twenty: 813 x hypot(20, 6) / 20.
+    assert!((830.0..900.0).contains(&route.line.length_m()), "{}", route.line.length_m());
 }
