@@ -63,8 +63,8 @@ pub use kinodynamics::{
     KinodynamicsLabelArguments, KinodynamicsRows, KinodynamicsSensing, KinodynamicsSpeed,
     TrainKinodynamicsArguments,
 };
-pub use map::MapArguments;
 pub use learned_map::{BenchLearnedMapArguments, NetworkSizes};
+pub use map::MapArguments;
 pub use orders::{AlphaArguments, AskedRun, GoalArguments, PathArguments};
 pub use plant::BenchPlantArguments;
 pub use play::PlayArguments;

@@ -12,17 +12,17 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
+use ::route::MapKeeper;
 use bench::closed_loop::{self, ClosedLoop, Cycle, Drive, DriveError};
 use bicycle::{Decision, StopReason};
-use ::route::MapKeeper;
 use formats::config_hash;
 use report::drive::{DrivePicture, RiskLayer};
 use scenarios::{Episode, EpisodeConfig, Walker};
 use traversability::CvarLevel;
 
 use crate::arguments::{DriveArguments, Goal, MapSource, Pace, StartPose};
-use crate::progress::{DriveProgress, ProgressLine};
 use crate::map::keep::{self, LOOK_PERIOD_S, Merged};
+use crate::progress::{DriveProgress, ProgressLine};
 use crate::route::Guided;
 use crate::route::known::class_friction;
 use crate::summary::{Milliseconds, Outcome, Summary, revision};
@@ -60,7 +60,11 @@ pub(crate) fn run(arguments: &DriveArguments) -> anyhow::Result<()> {
     recording.finish()?;
     let summary = Summary {
         route: guided.as_ref().map(|guided| guided.told().clone()),
-        kept: arguments.keep.as_ref().zip(merged).map(|(folder, report)| Merged::of(folder.display().to_string(), report)),
+        kept: arguments
+            .keep
+            .as_ref()
+            .zip(merged)
+            .map(|(folder, report)| Merged::of(folder.display().to_string(), report)),
         ..summarise(arguments, &scene, &closed, &kept, config_hash)
     };
     results.write_json(SUMMARY, &summary)?;

@@ -6,11 +6,13 @@ mod recording;
 use std::io::Write;
 use std::path::Path;
 
+use ::route::TileMap;
 use serde_json::{Value, json};
 
 use crate::UsageError;
 use crate::arguments::InspectArguments;
 use crate::drive::read_checkpoint;
+use crate::route::tiles::MEMORY_BYTES;
 
 pub(crate) fn run(arguments: &InspectArguments) -> anyhow::Result<()> {
     let found = look(&arguments.file)?;
@@ -27,6 +29,9 @@ fn look(path: &Path) -> Result<Value, UsageError> {
     if formats::Bag::is_at(path) {
         return bag::look(path);
     }
+    if TileMap::is_at(path) {
+        return tiles(path);
+    }
     if path.is_dir() {
         return networks(path);
     }
@@ -37,7 +42,7 @@ fn look(path: &Path) -> Result<Value, UsageError> {
         Some("toml") => vehicle(path),
         None if formats::shipped_vehicle_names().any(|name| Path::new(name) == path) => vehicle(path),
         _ => Err(UsageError(format!(
-            "{}: expected a recording, a bag of ROS 2, elevation, a vehicle or a folder with networks, found another file",
+            "{}: expected a recording, a bag of ROS 2, elevation, a map in tiles, a vehicle or a folder with networks, found another file",
             path.display()
         ))),
     }
@@ -66,6 +71,19 @@ fn elevation(path: &Path) -> Result<Value, UsageError> {
         "lowest_m": (n_known > 0).then_some(lowest_m),
         "highest_m": (n_known > 0).then_some(highest_m),
         "layers": present.iter().filter(|(_, is_there)| *is_there).map(|(name, _)| *name).collect::<Vec<_>>(),
+    }))
+}
+
+fn tiles(folder: &Path) -> Result<Value, UsageError> {
+    let map = TileMap::resume(folder, MEMORY_BYTES).map_err(UsageError::from_input)?;
+    let all = map.extent(0);
+    Ok(json!({
+        "kind": "map in tiles",
+        "tiles": map.n_tiles(),
+        "cell_m": map.cell_m(0),
+        "rows": all.map_or(0, |all| all.n_rows),
+        "columns": all.map_or(0, |all| all.n_cols),
+        "south_west_m": all.map(|all| all.south_west_m()),
     }))
 }
 

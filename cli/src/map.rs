@@ -18,6 +18,8 @@ use keep::Merged;
 
 /// Cells of a picture, at most.
 const SHOWN_CELLS_MAX: usize = 2_000_000;
+/// Nothing lies farther from the map's origin: half the way around the globe [m].
+const FARTHEST_M: f64 = 2e7;
 
 /// What the map holds, and what came to it; the content of `map.json`.
 #[derive(Serialize)]
@@ -36,6 +38,10 @@ pub(crate) fn run(arguments: &MapArguments) -> anyhow::Result<()> {
     if !(0.01..=2.5).contains(&arguments.deviation) {
         let found = arguments.deviation;
         return Err(UsageError(format!("--deviation: expected 0.01 to 2.5 m, found {found}")).into());
+    }
+    let at_m = [arguments.at.x_m, arguments.at.y_m];
+    if at_m.iter().any(|at_m| at_m.abs() > FARTHEST_M) {
+        return Err(UsageError(format!("--at: expected at most {FARTHEST_M:.0} m, found {at_m:?}")).into());
     }
     arguments.results.prepare()?;
     interrupt::catch_interrupts()?;
@@ -66,7 +72,7 @@ fn opened(arguments: &MapArguments) -> Result<TileMap, UsageError> {
     let cell_m = match (arguments.cell, arguments.sources.first()) {
         (Some(cell_m), _) if (0.05..=100.0).contains(&cell_m) => cell_m,
         (Some(found), _) => return Err(UsageError(format!("--cell: expected 0.05 to 100 m, found {found}"))),
-        (None, Some(first)) if !folder.is_dir() => cell_of(first)?,
+        (None, Some(first)) if !TileMap::is_at(folder) => cell_of(first)?,
         (None, _) => return TileMap::resume(folder, MEMORY_BYTES).map_err(UsageError::from_input),
     };
     TileMap::open(folder, cell_m, MEMORY_BYTES).map_err(UsageError::from_input)
@@ -122,8 +128,14 @@ fn show(arguments: &MapArguments, mut map: TileMap, merged: Vec<Merged>) -> anyh
     results.write_json("map.json", &summary)?;
     let shown = (0..=LEVEL_MAX)
         .filter_map(|level| Some((level, map.extent(level)?)))
-        .find(|(level, all)| all.n_cells() <= SHOWN_CELLS_MAX || *level == LEVEL_MAX);
-    let Some((level, all)) = shown else { return Ok(()) };
+        .find(|(_, all)| all.n_cells() <= SHOWN_CELLS_MAX);
+    let Some((level, all)) = shown else {
+        println!(
+            "\n  map.json in {}; there is nothing to draw, or it lies too far apart",
+            results.out.display()
+        );
+        return Ok(());
+    };
     let ground = map.window(level, &all).map_err(UsageError::from_input)?;
     let subtitle = format!("{} tiles, shown in cells of {} m", summary.tiles, all.resolution_m);
     results.write("map.png", &report::route::map(&summary.map, &subtitle, &ground)?)?;

@@ -65,7 +65,9 @@ fn refuse_kinds(kinds: &GroundKinds) -> Result<(), UsageError> {
         (None, Some(_)) => "--friction",
         (None, None) => return Ok(()),
     };
-    Err(UsageError(format!("{found}: expected with a file, or where `surefoot map` merges one, found with a map in tiles")))
+    Err(UsageError(format!(
+        "{found}: expected with a file, or where `surefoot map` merges one, found with a map in tiles"
+    )))
 }
 
 /// Leads the vehicle of a run to the goal, and shows the route that it drove in the end.

@@ -136,14 +136,20 @@ fn files_become_a_map_in_tiles_that_routes_are_searched_on() {
     let told = String::from_utf8(merged.stdout).unwrap();
     assert!(merged.status.success(), "{}", String::from_utf8_lossy(&merged.stderr));
     // 120 m in tiles of 128 m; 100 of them were measured, but for what lies nearest to the border.
-    assert!(told.contains("1 tiles in cells of 0.5 m") && told.contains("from (0, 0) to (128, 128) m"), "{told}");
+    assert!(
+        told.contains("1 tiles in cells of 0.5 m") && told.contains("from (0, 0) to (128, 128) m"),
+        "{told}"
+    );
     let summary: serde_json::Value =
         serde_json::from_slice(&std::fs::read(Path::new(&out).join("map.json")).unwrap()).unwrap();
     let n_new = summary["merged"][0]["new"].as_u64().unwrap();
     assert!((47_000..=48_500).contains(&n_new), "{summary}");
     assert!(std::fs::read(Path::new(&out).join("map.png")).unwrap().starts_with(b"\x89PNG"));
-    // Another robot's, 100 m north of it.
+    let inspected = String::from_utf8(surefoot(&["inspect", &map]).stdout).unwrap();
+    assert!(inspected.contains("map in tiles") && inspected.contains("\"rows\": 256"), "{inspected}");
+    // Another robot's, 100 m north of it, in a folder that is there.
     let other = path("other");
+    std::fs::create_dir(&other).unwrap();
     let north = surefoot(&["map", &other, &world, "--cell", "0.5", "--at", "0,100", "--out", &out]);
     assert!(north.status.success(), "{}", String::from_utf8_lossy(&north.stderr));
     let both = surefoot(&["map", &map, &other, "--out", &out]);
@@ -174,6 +180,10 @@ fn what_makes_no_map_in_tiles_is_told_in_one_line() {
     refused(&["map", tiles, "nowhere.npz"], "nowhere.npz");
     refused(&["map", tiles, &world, "--cell", "0"], "--cell: expected 0.05 to 100 m, found 0");
     refused(&["map", tiles, &world, "--deviation", "nan"], "--deviation: expected 0.01 to 2.5 m, found NaN");
+    refused(
+        &["map", tiles, &world, "--at", "1e300,0"],
+        "--at: expected at most 20000000 m, found [1e300, 0.0]",
+    );
     refused(&["map", tiles, &world, "--listen", "field"], "--listen");
     refused(&["map", tiles, "--listen", "nobody-is-here"], "expected a run that is there, found none named");
     assert!(!map.exists(), "nothing was merged");

@@ -1,7 +1,7 @@
 //! What a line that somebody lays by hand is worth.
 
-use crate::line::{Line, grounded};
-use crate::planner::{Planner, RouteLine, RoutePoint};
+use crate::line::{Line, RouteLine, RoutePoint, grounded};
+use crate::planner::Planner;
 use crate::smooth::Spline;
 use crate::speed::SpeedLimits;
 

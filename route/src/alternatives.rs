@@ -114,7 +114,10 @@ mod tests {
         assert!((10.0..20.0).contains(&north_m(&best)), "{}", north_m(&best));
         let [other] = &others[..] else { panic!("expected one other way, found {}", others.len()) };
         assert!((70.0..80.0).contains(&north_m(other)), "{}", north_m(other));
-        assert!(other.line.duration_s >= best.line.duration_s && other.line.duration_s <= 1.5 * best.line.duration_s);
+        assert!(
+            other.line.duration_s >= best.line.duration_s
+                && other.line.duration_s <= 1.5 * best.line.duration_s
+        );
         assert_eq!(planner.route(([10.5, 40.5], 0.0), [90.5, 40.5], &SpeedLimits::default()).unwrap(), best);
     }
 

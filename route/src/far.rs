@@ -1,7 +1,7 @@
 //! Routes over maps that do not fit into memory: coarsely over the whole way, then finely along it, a leg at a time.
 
-use crate::line::{self, Gate, Line, Undrivable, heading_of};
-use crate::planner::{Planner, PlannerError, RouteError, RouteLine};
+use crate::line::{self, Gate, Line, RouteLine, Undrivable, heading_of};
+use crate::planner::{Planner, PlannerError, RouteError};
 use crate::speed::{Bend, SpeedLimits};
 use crate::tiles::{LEVEL_MAX, TileError, TileMap};
 use crate::{GroundCell, RouteConfig};
@@ -124,7 +124,10 @@ struct Search<'a> {
 
 impl Search<'_> {
     /// The way over so large cells that all of it can be searched at once, and their level.
-    fn coarse(&mut self, (start_m, heading): ([f64; 2], usize)) -> Result<(u8, Vec<[f64; 2]>), FarRouteError> {
+    fn coarse(
+        &mut self,
+        (start_m, heading): ([f64; 2], usize),
+    ) -> Result<(u8, Vec<[f64; 2]>), FarRouteError> {
         let goal_m = self.goal_m;
         let way_m = libm::hypot(goal_m[0] - start_m[0], goal_m[1] - start_m[1]);
         let margin_m = (COARSE_MARGIN.0 * way_m).max(COARSE_MARGIN.1);

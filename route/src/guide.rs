@@ -18,7 +18,8 @@ impl Guide {
     /// Nobody has set out on it yet; a reach of at least two points [m].
     pub fn new(route: &Route, reach_m: f64) -> Self {
         let points_m = route.line.places_m();
-        let reach = (reach_m / route.line.spacing_m).round().clamp(2.0, points_m.len().max(2) as f64) as usize;
+        let reach =
+            (reach_m / route.line.spacing_m).round().clamp(2.0, points_m.len().max(2) as f64) as usize;
         Self { points_m, spacing_m: route.line.spacing_m, reach, abreast: 0, headed: None }
     }
 

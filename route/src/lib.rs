@@ -59,7 +59,8 @@ pub use friction::FrictionCurve;
 pub use ground::{GroundCell, GroundError};
 pub use guide::Guide;
 pub use layers::GroundLayers;
-pub use planner::{Planner, PlannerError, Route, RouteError, RouteLine, RoutePoint};
+pub use line::{RouteLine, RoutePoint};
+pub use planner::{Planner, PlannerError, Route, RouteError};
 pub use speed::{Bend, SpeedError, SpeedLimits, duration_s, fastest_speeds};
 pub use tiles::{
     ClassFriction, LEVEL_MAX, MapKeeper, MeasuredCell, MergeReport, TILE_EDGE, TileError, TileMap,

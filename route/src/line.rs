@@ -2,10 +2,48 @@
 
 use crate::FrictionCurve;
 use crate::ground::GroundCell;
-use crate::planner::{RouteError, RouteLine, RoutePoint};
+use crate::planner::RouteError;
 use crate::smooth::{Spline, SplinePoint};
 use crate::speed::{self, Bend, SpeedError, SpeedLimits, duration_s, fastest_speeds};
 use terrain::GridMap;
+
+/// A smooth line over the ground with the fastest speeds along it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RouteLine {
+    /// Its points, evenly spaced.
+    pub points: Vec<RoutePoint>,
+    /// Between two points along it [m].
+    pub spacing_m: f64,
+    /// Expected time [s].
+    pub duration_s: f64,
+}
+
+impl RouteLine {
+    /// Its places [m].
+    pub fn places_m(&self) -> Vec<[f64; 2]> {
+        self.points.iter().map(|point| point.at_m).collect()
+    }
+
+    /// Its length [m].
+    pub fn length_m(&self) -> f64 {
+        self.spacing_m * self.points.len().saturating_sub(1) as f64
+    }
+}
+
+/// A point of a route's line.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RoutePoint {
+    /// Place in the map frame [m].
+    pub at_m: [f64; 2],
+    /// Direction of the line, counter-clockwise from east [rad].
+    pub yaw_rad: f64,
+    /// Height of the ground [m].
+    pub height_m: f64,
+    /// What the speed depends on.
+    pub bend: Bend,
+    /// Speed [m/s].
+    pub speed_mps: f64,
+}
 
 /// A point that a line passes, to within some metres.
 #[derive(Clone, Copy, Debug)]
@@ -49,11 +87,7 @@ impl Line {
     }
 
     /// The line with the fastest speeds over ground whose bend and height [m] each point has.
-    pub fn driven(
-        &self,
-        grounded: Vec<(Bend, f64)>,
-        limits: &SpeedLimits,
-    ) -> Result<RouteLine, Undrivable> {
+    pub fn driven(&self, grounded: Vec<(Bend, f64)>, limits: &SpeedLimits) -> Result<RouteLine, Undrivable> {
         let bends: Vec<Bend> = grounded.iter().map(|(bend, _)| *bend).collect();
         let speeds_mps = fastest_speeds(&bends, self.spacing_m, limits).map_err(|error| {
             let faults = speed::faults(&bends, self.spacing_m, limits);

@@ -3,7 +3,7 @@
 use crate::RouteConfig;
 use crate::edges::{Barrier, Edges, STEPS, stepped};
 use crate::ground::{self, GroundCell, GroundError};
-use crate::line::{self, Gate, Line, Undrivable, heading_of};
+use crate::line::{self, Gate, Line, RouteLine, RoutePoint, Undrivable, heading_of};
 use crate::search::{self, CellPath, Unreachable};
 use crate::smooth::SplinePoint;
 use crate::speed::{Bend, SpeedError, SpeedLimits};
@@ -36,44 +36,6 @@ pub struct Route {
     pub n_expanded: usize,
     /// The smooth line, and how fast to drive it.
     pub line: RouteLine,
-}
-
-/// A smooth line over the ground with the fastest speeds along it.
-#[derive(Clone, Debug, PartialEq)]
-pub struct RouteLine {
-    /// Its points, evenly spaced.
-    pub points: Vec<RoutePoint>,
-    /// Between two points along it [m].
-    pub spacing_m: f64,
-    /// Expected time [s].
-    pub duration_s: f64,
-}
-
-impl RouteLine {
-    /// Its places [m].
-    pub fn places_m(&self) -> Vec<[f64; 2]> {
-        self.points.iter().map(|point| point.at_m).collect()
-    }
-
-    /// Its length [m].
-    pub fn length_m(&self) -> f64 {
-        self.spacing_m * self.points.len().saturating_sub(1) as f64
-    }
-}
-
-/// A point of a route's line.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct RoutePoint {
-    /// Place in the map frame [m].
-    pub at_m: [f64; 2],
-    /// Direction of the line, counter-clockwise from east [rad].
-    pub yaw_rad: f64,
-    /// Height of the ground [m].
-    pub height_m: f64,
-    /// What the speed depends on.
-    pub bend: Bend,
-    /// Speed [m/s].
-    pub speed_mps: f64,
 }
 
 /// Why there is no planner.
@@ -285,13 +247,9 @@ impl Planner {
         let sliding_mps = self.config.sliding_mps as f32;
         let grounded = line.samples.iter().map(|sample| line::grounded(&self.ground, sliding_mps, sample));
         let driven = line.driven(grounded.collect(), limits);
-        let line = driven.map_err(|Undrivable { error, places_m }| Refusal { error: error.into(), places_m })?;
-        Ok(Route {
-            cost_m: path.cost * resolution_m,
-            cells: path.cells,
-            n_expanded: path.n_expanded,
-            line,
-        })
+        let line =
+            driven.map_err(|Undrivable { error, places_m }| Refusal { error: error.into(), places_m })?;
+        Ok(Route { cost_m: path.cost * resolution_m, cells: path.cells, n_expanded: path.n_expanded, line })
     }
 
     /// Bars the cells within half of the clear width of a place.

@@ -233,8 +233,11 @@ fn creeping_fault(bend: &Bend, at_m: f64, limits: &SpeedLimits) -> Option<SpeedE
         return Some(SpeedError::TooWeak { at_m, traction_mps2, found_mps2: grade_mps2 });
     }
     let braking_mps2 = limits.braking_max_mps2;
-    (-grade_mps2 >= braking_mps2)
-        .then(|| SpeedError::BrakesTooWeak { at_m, braking_mps2, found_mps2: -grade_mps2 })
+    (-grade_mps2 >= braking_mps2).then(|| SpeedError::BrakesTooWeak {
+        at_m,
+        braking_mps2,
+        found_mps2: -grade_mps2,
+    })
 }
 
 #[cfg(test)]

@@ -11,8 +11,8 @@ mod keeper;
 
 use crate::GroundCell;
 pub use cell::MeasuredCell;
-pub use keeper::{ClassFriction, MapKeeper};
 use cell::Packed;
+pub use keeper::{ClassFriction, MapKeeper};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use terrain::{Cell, CellRegion, GridGeometry, GridMap};
@@ -145,6 +145,11 @@ impl TileMap {
             map.make_known(Key { level: 0, place });
         }
         Ok(map)
+    }
+
+    /// Whether there is a map in a folder.
+    pub fn is_at(folder: &Path) -> bool {
+        file::is_at(folder)
     }
 
     /// Opens a map that is there, whatever the size of its cells.

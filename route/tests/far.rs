@@ -45,8 +45,15 @@ fn a_far_route_is_hardly_dearer_than_one_over_the_whole_map_at_once() {
     let geometry = GridGeometry { resolution_m: 1.0, origin: [0, 0], n_rows: 600, n_cols: 600 };
     let whole = map.window(1, &geometry).unwrap();
     let at_once = Planner::new(whole.clone(), config).unwrap().route(start, goal_m, &limits).unwrap();
-    assert!(far.line.duration_s < 1.1 * at_once.line.duration_s, "{} {}", far.line.duration_s, at_once.line.duration_s);
-    for (point, expected_m) in [(far.line.points[0], start.0), (far.line.points[far.line.points.len() - 1], goal_m)] {
+    assert!(
+        far.line.duration_s < 1.1 * at_once.line.duration_s,
+        "{} {}",
+        far.line.duration_s,
+        at_once.line.duration_s
+    );
+    for (point, expected_m) in
+        [(far.line.points[0], start.0), (far.line.points[far.line.points.len() - 1], goal_m)]
+    {
         assert!((0..2).all(|axis| (point.at_m[axis] - expected_m[axis]).abs() < 1e-9), "{point:?}");
         assert!(point.speed_mps.abs() < 1e-9);
     }

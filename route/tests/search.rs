@@ -4,7 +4,7 @@
 
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
-use route::{Barrier, FrictionCurve, GroundCell, Planner, RouteConfig, RoutePoint, RouteError, SpeedLimits};
+use route::{Barrier, FrictionCurve, GroundCell, Planner, RouteConfig, RouteError, RoutePoint, SpeedLimits};
 use std::cmp::Reverse;
 use std::collections::{BinaryHeap, HashMap};
 use std::f64::consts::{FRAC_PI_4, SQRT_2};
@@ -273,7 +273,8 @@ fn a_line_that_no_speed_will_do_on_is_led_around() {
         let limits = SpeedLimits { traction_max_mps2, ..LIMITS };
         Planner::new(hump(rows), careless).unwrap().route(([5.5, 20.5], 0.0), [35.5, 20.5], &limits)
     };
-    let highest_m = |route: route::Route| route.line.points.iter().map(|point| point.height_m).fold(0.0, f64::max);
+    let highest_m =
+        |route: route::Route| route.line.points.iter().map(|point| point.height_m).fold(0.0, f64::max);
     // A climb of 0.3 takes 9.81 x 0.3 / sqrt(1.09) = 2.82 m/s2.
     assert!(highest_m(route(18..23, 3.5).unwrap()) > 1.0);
     let around = route(18..23, 2.5).unwrap();

@@ -152,11 +152,8 @@ fn a_full_disk_leaves_the_old_tile() {
     assert_eq!(window(&mut map, 0, [3, 3], 1).values()[0].height_m, 1.0);
 }
 
-const CLASSES: ClassFriction = ClassFriction {
-    open: FrictionCurve::DIRT,
-    loose: FrictionCurve::SAND,
-    vegetation: FrictionCurve::GRASS,
-};
+const CLASSES: ClassFriction =
+    ClassFriction { open: FrictionCurve::DIRT, loose: FrictionCurve::SAND, vegetation: FrictionCurve::GRASS };
 
 /// What a vehicle at a column sees of a slope of 0.01 a cell: a window of 40 cells.
 fn seen_at(col: i64) -> GridMap<SurfaceCell> {
@@ -198,7 +195,8 @@ fn what_a_rolling_window_saw_is_kept_once() {
     let (mut map, report) = keeper.finish().unwrap();
     assert_eq!((report.n_new, report.n_agreeing), (0, 1600));
     assert!((window(&mut map, 0, [100, 10], 1).values()[0].height_m - 1.025).abs() < 2e-3);
-    let other = GridMap::filled(GridGeometry { resolution_m: 0.3, ..*lifted.geometry() }, SurfaceCell::UNKNOWN);
+    let other =
+        GridMap::filled(GridGeometry { resolution_m: 0.3, ..*lifted.geometry() }, SurfaceCell::UNKNOWN);
     let error = MapKeeper::new(map, CLASSES).look(&other).unwrap_err().to_string();
     assert_eq!(error, "patch: expected cells of 0.2 m, found 0.3 m");
 }
@@ -217,16 +215,18 @@ fn an_obstacle_that_hides_its_ground_is_kept_and_what_was_not_seen_is_not() {
     let (mut map, report) = keeper.finish().unwrap();
     assert_eq!(report.n_new, 1599);
     let trunk = window(&mut map, 0, [20, 10], 1).values()[0];
-    assert!(trunk.is_obstacle && (trunk.height_m - 0.2).abs() < 1e-3, "the mean of what is around: {trunk:?}");
+    assert!(
+        trunk.is_obstacle && (trunk.height_m - 0.2).abs() < 1e-3,
+        "the mean of what is around: {trunk:?}"
+    );
     assert!(!window(&mut map, 0, [5, 5], 1).values()[0].is_known());
 }
 
 #[test]
 fn maps_of_two_robots_become_one() {
     let folders = [tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap()];
-    let mut maps = folders.each_ref().map(|folder| {
-        TileMap::open(folder.path(), RESOLUTION_M, MEMORY_BYTES).unwrap()
-    });
+    let mut maps =
+        folders.each_ref().map(|folder| TileMap::open(folder.path(), RESOLUTION_M, MEMORY_BYTES).unwrap());
     maps[0].merge(&patch([-300, 0], 400, |_, _| 1.0)).unwrap();
     maps[1].merge(&patch([0, 0], 400, |_, _| 1.1)).unwrap();
     let [mut one, mut other] = maps;

@@ -211,7 +211,8 @@ mod tests {
 
     #[test]
     fn the_room_around_a_long_way_takes_no_more_than_a_map_that_is_built_whole() {
-        let room_m = |east_m: f64, north_m: f64| room_m([10.0, 500.0], [10.0 + east_m, 500.0 - north_m], 630.0);
+        let room_m =
+            |east_m: f64, north_m: f64| room_m([10.0, 500.0], [10.0 + east_m, 500.0 - north_m], 630.0);
         assert_eq!(room_m(100.0, 0.0), 30.0);
         assert!((room_m(240.0, 320.0) - 100.0).abs() < 1e-9, "a quarter of 400 m");
         let most_m = room_m(1000.0, 0.0);

@@ -56,7 +56,8 @@ impl ReferencePlanner {
         let bent = begun.into_iter().map(|laid| Bending { of: self, laid }.fastest(ROUNDS_MAX));
         let best = bent.min_by(|one, other| one.line.duration_s.total_cmp(&other.line.duration_s));
         let faster = best.filter(|best| best.line.duration_s < ours.line.duration_s);
-        let RouteLine { points, spacing_m, .. } = faster.map_or_else(|| ours.line.clone(), |faster| faster.line);
+        let RouteLine { points, spacing_m, .. } =
+            faster.map_or_else(|| ours.line.clone(), |faster| faster.line);
         Some(Plan { points, spacing_m })
     }
 
@@ -185,7 +186,11 @@ mod tests {
         let found = Bending { of: &reference, laid }.fastest(ROUNDS_MAX);
         let least_s = 58.0 / 5.0 + 2.0 * 2.0 / 5.0;
         assert!(begun_s > 1.1 * least_s, "{begun_s}");
-        assert!((0.999..1.005).contains(&(found.line.duration_s / least_s)), "{} {least_s}", found.line.duration_s);
+        assert!(
+            (0.999..1.005).contains(&(found.line.duration_s / least_s)),
+            "{} {least_s}",
+            found.line.duration_s
+        );
         assert_eq!(found.n_barred, 0);
     }
 

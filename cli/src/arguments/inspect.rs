@@ -9,7 +9,7 @@ use clap::Args;
 #[command(after_long_help = AFTER_HELP)]
 pub struct InspectArguments {
     /// A recording (.mcap), a bag of ROS 2 (.mcap, .db3 or their folder), elevation (.npz, .tif, .png), a vehicle (.toml, or the name of a shipped one), or a folder
-    /// with networks
+    /// with networks or a map in tiles
     #[arg(value_name = "FILE")]
     pub file: PathBuf,
 
@@ -20,7 +20,7 @@ pub struct InspectArguments {
 
 pub(super) const LONG_ABOUT: &str = "\
 Says what a file holds: topics, times and setup of a recording, also of one that breaks off; topics, types, counts and rates of a bag; size and heights of an \
-elevation map; the figures of a vehicle; method, training and size of networks.";
+elevation map or a map in tiles; the figures of a vehicle; method, training and size of networks.";
 
 const AFTER_HELP: &str = "\
 Examples:

@@ -51,11 +51,7 @@ impl fmt::Display for Merged {
 }
 
 /// A keeper of a map in a folder, which is made if it is missing.
-pub(crate) fn keeper(
-    folder: &Path,
-    cell_m: f64,
-    friction: ClassFriction,
-) -> Result<MapKeeper, UsageError> {
+pub(crate) fn keeper(folder: &Path, cell_m: f64, friction: ClassFriction) -> Result<MapKeeper, UsageError> {
     let map = TileMap::open(folder, cell_m, MEMORY_BYTES).map_err(UsageError::from_input)?;
     Ok(MapKeeper::new(map, friction))
 }

@@ -165,8 +165,7 @@ impl<'a> Answer<'a> {
 
     /// The best way first.
     fn geojson(&self, reference: &MapReference) -> Result<Value, UsageError> {
-        let ways: Vec<&RouteLine> =
-            std::iter::once(self.line).chain(self.others.iter().copied()).collect();
+        let ways: Vec<&RouteLine> = std::iter::once(self.line).chain(self.others.iter().copied()).collect();
         let lines_m: Vec<Vec<[f64; 2]>> = ways.iter().map(|way| way.places_m()).collect();
         let lines: Vec<GeoLine<'_>> = ways
             .iter()

@@ -20,11 +20,7 @@ pub(super) struct Known {
 }
 
 /// The ground of an elevation file, or of a map in tiles what lies around start and goal.
-pub(super) fn known(
-    world: &Path,
-    asked: &RouteGround,
-    ends_m: [[f64; 2]; 2],
-) -> Result<Known, UsageError> {
+pub(super) fn known(world: &Path, asked: &RouteGround, ends_m: [[f64; 2]; 2]) -> Result<Known, UsageError> {
     if world.is_dir() {
         let ground = Tiles::open(world, asked)?.around(ends_m)?;
         return Ok(Known { ground, reference: None });

@@ -55,6 +55,11 @@ pub(super) fn agree_on_resolution(folder: &Path, resolution_m: f64) -> Result<()
     }
 }
 
+/// Whether a folder says that it holds a map.
+pub(super) fn is_at(folder: &Path) -> bool {
+    folder.join(RESOLUTION).is_file()
+}
+
 /// The size of a map's cells [m].
 pub(super) fn resolution_m(folder: &Path) -> Result<f64, TileError> {
     let path = folder.join(RESOLUTION);
@@ -64,11 +69,13 @@ pub(super) fn resolution_m(folder: &Path) -> Result<f64, TileError> {
         Err(error) => return Err(system(&path, "read")(error)),
     };
     let found = text.trim();
-    found.parse().ok().filter(|size_m: &f64| size_m.is_finite() && *size_m > 0.0).ok_or_else(|| TileError::Field {
-        path,
-        field: "map in tiles",
-        expected: "the size of its cells in metres".to_owned(),
-        found: found.to_owned(),
+    found.parse().ok().filter(|size_m: &f64| size_m.is_finite() && *size_m > 0.0).ok_or_else(|| {
+        TileError::Field {
+            path,
+            field: "map in tiles",
+            expected: "the size of its cells in metres".to_owned(),
+            found: found.to_owned(),
+        }
     })
 }
 

@@ -50,9 +50,10 @@ impl MapKeeper {
         for place in within {
             let (in_window, origin) = overlap(&geometry, place);
             let resolution_m = geometry.resolution_m;
-            let tile = self.gathered.entry(place).or_insert_with(|| {
-                GridMap::filled(tile_geometry(place, resolution_m), SurfaceCell::UNKNOWN)
-            });
+            let tile = self
+                .gathered
+                .entry(place)
+                .or_insert_with(|| GridMap::filled(tile_geometry(place, resolution_m), SurfaceCell::UNKNOWN));
             for row in in_window.rows {
                 let to = (geometry.origin[1] + row as i64 - origin[1]) as usize;
                 for col in in_window.cols.clone() {
@@ -102,8 +103,7 @@ impl MapKeeper {
             TerrainClass::Vegetation => self.friction.vegetation,
         };
         let roughness_m = Some(slope_at(seen, at, 1).roughness_m).filter(|rough_m| rough_m.is_finite());
-        let ground =
-            GroundCell { height_m, friction, roughness_m: roughness_m.unwrap_or(0.0), is_obstacle };
+        let ground = GroundCell { height_m, friction, roughness_m: roughness_m.unwrap_or(0.0), is_obstacle };
         MeasuredCell { ground, deviation_m }
     }
 }
