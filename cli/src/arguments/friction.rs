@@ -149,4 +149,5 @@ With --from pictures: friction.png, the network as friction.safetensors, and fri
 
 Examples:
   surefoot bench friction --vehicles sedan --seeds 5 --first-seed 1
-  surefoot bench friction --from pictures";
+  surefoot bench friction --from pictures
+  surefoot bench friction --from pictures --vehicles sedan,pietra_full_size,examples/side_by_side.toml";
