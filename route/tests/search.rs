@@ -239,6 +239,33 @@ fn start_and_goal_that_nobody_can_stand_on_are_refused() {
     assert!(error.starts_with("ground at (4.5, 3.5) m: expected friction coefficients"), "{error}");
 }
 
+/// From a bowl of ice, 0.25 m a metre up on all sides where it holds 0.22, nothing leads out; to a place that nothing known
+/// leads to, nothing in.
+#[test]
+fn a_start_that_nothing_leaves_and_a_goal_in_unknown_ground_are_told() {
+    let away = |cell: Cell, col: f32| (cell.col as f32 - col).hypot(cell.row as f32 - 20.0);
+    let ground = map(60, |cell| {
+        let (from_start, from_goal) = (away(cell, 12.0), away(cell, 45.0));
+        let height_m = match (4.0..8.0).contains(&from_goal) {
+            true => f32::NAN,
+            false => 0.25 * (from_start - 3.0).clamp(0.0, 4.0),
+        };
+        let friction = if from_start < 9.0 { FrictionCurve::ICE } else { FrictionCurve::DIRT };
+        GroundCell { height_m, ..GroundCell::level(friction) }
+    });
+    let planner = Planner::new(ground, RouteConfig::default()).unwrap();
+    let told = |start_m: [f64; 2], goal_m: [f64; 2]| {
+        planner.route((start_m, 0.0), goal_m, &LIMITS).unwrap_err().to_string()
+    };
+    let out = told([12.5, 20.5], [30.5, 50.5]);
+    assert!(
+        out.starts_with("no route: ") && out.ends_with("the ground is too slippery for its slope"),
+        "{out}"
+    );
+    let into = told([30.5, 50.5], [45.5, 20.5]);
+    assert!(into.starts_with("no route: ") && into.ends_with("nothing is known of the ground"), "{into}");
+}
+
 #[test]
 fn a_changed_part_gives_the_routes_of_a_map_that_was_always_so() {
     let mut planner =
