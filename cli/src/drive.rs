@@ -55,8 +55,10 @@ pub(crate) fn run(arguments: &DriveArguments) -> anyhow::Result<()> {
     if let Some(why) = &scene.knowledge.why_not_learned {
         println!("  method physics: {why}");
     }
-    let kept = follow(arguments, &scene, &mut closed, (guided.as_mut(), keeper.as_mut()), &mut recording)?;
+    let driven = follow(arguments, &scene, &mut closed, (guided.as_mut(), keeper.as_mut()), &mut recording);
+    // What was seen is kept, however the drive ended.
     let merged = keeper.map(MapKeeper::finish).transpose()?.map(|(_, report)| report);
+    let kept = driven?;
     recording.finish()?;
     let summary = Summary {
         route: guided.as_ref().map(|guided| guided.told().clone()),

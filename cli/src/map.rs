@@ -13,7 +13,7 @@ use crate::arguments::MapArguments;
 use crate::route::known::{class_friction, ground_of};
 use crate::route::tiles::MEMORY_BYTES;
 use crate::summary::revision;
-use crate::{UsageError, interrupt};
+use crate::{UsageError, WorkFailed, interrupt};
 use keep::Merged;
 
 /// Cells of a picture, at most.
@@ -57,11 +57,12 @@ fn merged(arguments: &MapArguments) -> anyhow::Result<(TileMap, Vec<Merged>)> {
     let mut map = opened(arguments)?;
     let mut merged = Vec::new();
     for source in &arguments.sources {
+        if interrupt::interrupted() {
+            let (n, all) = (merged.len(), arguments.sources.len());
+            return Err(WorkFailed(format!("interrupted by the user; {n} of {all} are merged")).into());
+        }
         let report = merge(arguments, source, &mut map)?;
         merged.push(Merged::of(source.display().to_string(), report));
-        if interrupt::interrupted() {
-            break;
-        }
     }
     Ok((map, merged))
 }
@@ -89,6 +90,11 @@ fn cell_of(source: &Path) -> Result<f64, UsageError> {
 
 fn merge(arguments: &MapArguments, source: &Path, map: &mut TileMap) -> Result<MergeReport, UsageError> {
     if source.is_dir() {
+        let is_itself = source.canonicalize().ok() == arguments.map.canonicalize().ok();
+        if is_itself {
+            let map = source.display();
+            return Err(UsageError(format!("{map}: expected another map to merge, found the map itself")));
+        }
         let mut other = TileMap::resume(source, MEMORY_BYTES).map_err(UsageError::from_input)?;
         return map.merge_map(&mut other).map_err(UsageError::from_input);
     }

@@ -191,6 +191,7 @@ fn what_makes_no_map_in_tiles_is_told_in_one_line() {
     let with = |words: &[&'static str]| [&["route", "--world", folder][..], &ways, words].concat();
     refused(&with(&[]), "map in tiles: expected the size of its cells in metres, found no such file");
     assert!(surefoot(&["map", tiles, &world, "--out", out.to_str().unwrap()]).status.success());
+    refused(&["map", tiles, tiles], "expected another map to merge, found the map itself");
     let with = |words: &[&'static str]| [&["route", "--world", tiles][..], &ways, words].concat();
     refused(&with(&["--bare", "mud"]), "--bare: expected with a file");
     refused(&with(&["--cell", "0.3"]), "--cell: expected 1 to 1024 m, as");

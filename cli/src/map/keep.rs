@@ -81,7 +81,7 @@ pub(super) fn listened(
             };
             keeper.look(&seen).map_err(UsageError::from_input)?;
         }
-        is_there = RunName::alive()?.contains(run);
+        is_there = RunName::alive().is_ok_and(|runs| runs.contains(run));
     }
     let nothing = || WorkFailed(format!("run {run}: expected maps of the ground, found none"));
     let (map, report) = kept.ok_or_else(nothing)?.finish()?;
