@@ -221,7 +221,11 @@ fn dispatch(command: Command) -> anyhow::Result<()> {
 /// Help and version are answers, not errors; everything else that stops the parser is bad usage.
 fn answer(error: &clap::Error) -> anyhow::Result<()> {
     match error.kind() {
-        ErrorKind::DisplayHelp | ErrorKind::DisplayVersion => Ok(error.print()?),
+        // Whoever reads only the first lines has read enough.
+        ErrorKind::DisplayHelp | ErrorKind::DisplayVersion => match error.print() {
+            Err(failure) if failure.kind() != std::io::ErrorKind::BrokenPipe => Err(failure.into()),
+            _ => Ok(()),
+        },
         _ => Err(UsageError::from_parser(error).into()),
     }
 }

@@ -176,13 +176,15 @@ fn folder_that_cannot_be_written_is_told_before_the_drive() {
 #[test]
 fn a_reader_that_goes_away_is_no_failure_to_be_told_of() {
     let binary = assert_cmd::cargo::cargo_bin("surefoot");
-    let mut child = std::process::Command::new(binary)
-        .args(["bench", "prior-map", "--updates", "2"])
-        .stdout(std::process::Stdio::piped())
-        .stderr(std::process::Stdio::piped())
-        .spawn()
-        .expect("the binary starts");
-    drop(child.stdout.take());
-    let told = child.wait_with_output().expect("the command ends");
-    assert_eq!(text(&told.stderr), "");
+    for words in [&["bench", "prior-map", "--updates", "2"][..], &["map", "--help"]] {
+        let mut child = std::process::Command::new(&binary)
+            .args(words)
+            .stdout(std::process::Stdio::piped())
+            .stderr(std::process::Stdio::piped())
+            .spawn()
+            .expect("the binary starts");
+        drop(child.stdout.take());
+        let told = child.wait_with_output().expect("the command ends");
+        assert_eq!(text(&told.stderr), "", "{words:?}");
+    }
 }
