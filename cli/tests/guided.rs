@@ -5,6 +5,7 @@
 
 mod ground;
 
+use std::io::{BufRead as _, BufReader};
 use std::path::Path;
 use std::process::{Child, Command, Output, Stdio};
 use std::time::{Duration, Instant};
@@ -129,12 +130,13 @@ fn a_run_is_led_around_what_its_map_did_not_show() {
 /// Keeps what the vehicle of a run sees for a few seconds, until Ctrl-C.
 fn listen(run: &str, kept: &Path) {
     let mut map = surefoot(&["map", kept.to_str().unwrap(), "--listen", run, "--out"]);
-    let listening = map.arg(kept.with_extension("out")).stdout(Stdio::piped()).spawn().unwrap();
+    let mut listening = map.arg(kept.with_extension("out")).stdout(Stdio::piped()).spawn().unwrap();
+    let mut told = BufReader::new(listening.stdout.take().unwrap());
+    told.read_line(&mut String::new()).unwrap();
     std::thread::sleep(Duration::from_secs(4));
     let interrupted = Command::new("kill").args(["-INT", &listening.id().to_string()]).status().unwrap();
-    let output = listening.wait_with_output().unwrap();
-    let told = String::from_utf8(output.stdout).unwrap();
-    assert!(interrupted.success() && output.status.success(), "{told}");
+    let told = std::io::read_to_string(told).unwrap();
+    assert!(interrupted.success() && listening.wait().unwrap().success(), "{told}");
     assert!(told.contains(&format!("run {run}: ")) && told.contains(" cells new, 0 agree"), "{told}");
     assert!(std::fs::read(kept.with_extension("out").join("map.png")).unwrap().starts_with(b"\x89PNG"));
 }

@@ -126,7 +126,7 @@ fn surefoot(words: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_surefoot")).args(words).output().unwrap()
 }
 
-/// The ford in two files, west and east of 60 m, as of two surveys.
+/// The ford as of two robots, one of which measured it 100 m farther north.
 #[test]
 fn files_become_a_map_in_tiles_that_routes_are_searched_on() {
     let (folder, world) = ford();
@@ -154,8 +154,12 @@ fn files_become_a_map_in_tiles_that_routes_are_searched_on() {
     assert!(north.status.success(), "{}", String::from_utf8_lossy(&north.stderr));
     let both = surefoot(&["map", &map, &other, "--out", &out]);
     let told = String::from_utf8(both.stdout).unwrap();
-    // Of the 20 m that they share, the northern says there is a pond where the southern has ground, at one height.
     assert!(told.contains("2 tiles") && told.contains("agree, 0 contradict"), "{told}");
+    let summary: serde_json::Value =
+        serde_json::from_slice(&std::fs::read(Path::new(&out).join("map.json")).unwrap()).unwrap();
+    // They share 20 m north of 100 m, of one height: 200 x 40 cells.
+    let n_agreeing = summary["merged"][0]["agreeing"].as_u64().unwrap();
+    assert!((7_800..=8_100).contains(&n_agreeing), "{summary}");
     let found = route(&map, Path::new(&out), &["--start", "20,20,0", "--goal", "80,180", "--speed", "3"]);
     let told = String::from_utf8(found.stdout).unwrap();
     assert!(found.status.success(), "{}", String::from_utf8_lossy(&found.stderr));
