@@ -42,11 +42,11 @@ pub(crate) fn run(arguments: &DriveArguments) -> anyhow::Result<()> {
     arguments.bush_height_m()?;
     let scene = scene::prepare(arguments)?;
     let mut guided = guided::plan(arguments, &scene)?;
-    let mut keeper = keeper(arguments, &scene)?;
     let mut closed = ClosedLoop::new(drive(arguments, &scene)?).map_err(|error| refused(arguments, error))?;
     closed.follow(scene::route(arguments, &scene.task)?)?;
     let results = &arguments.results;
     results.prepare()?;
+    let mut keeper = keeper(arguments, &scene)?;
     let config_hash = config_hash(&(&scene.config, &scene.model, &scene.vehicle))?;
     let about = about(arguments, &scene, &config_hash);
     let mut recording = Recording::create(&results.file(RECORDING), about).map_err(UsageError::from_input)?;

@@ -4,7 +4,7 @@ pub(crate) mod keep;
 
 use std::path::Path;
 
-use ::route::{LEVEL_MAX, MeasuredCell, MergeReport, TileMap};
+use ::route::{ClassFriction, LEVEL_MAX, MeasuredCell, MergeReport, TileMap};
 use formats::read_elevation;
 use serde::Serialize;
 use terrain::{GridGeometry, GridMap};
@@ -47,13 +47,13 @@ pub(crate) fn run(arguments: &MapArguments) -> anyhow::Result<()> {
     interrupt::catch_interrupts()?;
     let (map, merged) = match &arguments.listen {
         Some(run) => keep::listened(&arguments.map, run, friction)?,
-        None => merged(arguments)?,
+        None => merged(arguments, &friction)?,
     };
     show(arguments, map, merged)
 }
 
 /// The map with all sources in it.
-fn merged(arguments: &MapArguments) -> anyhow::Result<(TileMap, Vec<Merged>)> {
+fn merged(arguments: &MapArguments, friction: &ClassFriction) -> anyhow::Result<(TileMap, Vec<Merged>)> {
     let mut map = opened(arguments)?;
     let mut merged = Vec::new();
     for source in &arguments.sources {
@@ -61,7 +61,7 @@ fn merged(arguments: &MapArguments) -> anyhow::Result<(TileMap, Vec<Merged>)> {
             let (n, all) = (merged.len(), arguments.sources.len());
             return Err(WorkFailed(format!("interrupted by the user; {n} of {all} are merged")).into());
         }
-        let report = merge(arguments, source, &mut map)?;
+        let report = merge(arguments, friction, source, &mut map)?;
         merged.push(Merged::of(source.display().to_string(), report));
     }
     Ok((map, merged))
@@ -70,11 +70,15 @@ fn merged(arguments: &MapArguments) -> anyhow::Result<(TileMap, Vec<Merged>)> {
 /// The map that is there, or a new one in the cells that were asked for or of what is merged first.
 fn opened(arguments: &MapArguments) -> Result<TileMap, UsageError> {
     let folder = &arguments.map;
-    let cell_m = match (arguments.cell, arguments.sources.first()) {
-        (Some(cell_m), _) if (0.05..=100.0).contains(&cell_m) => cell_m,
-        (Some(found), _) => return Err(UsageError(format!("--cell: expected 0.05 to 100 m, found {found}"))),
-        (None, Some(first)) if !TileMap::is_at(folder) => cell_of(first)?,
-        (None, _) => return TileMap::resume(folder, MEMORY_BYTES).map_err(UsageError::from_input),
+    // No folder is made for what cannot be read.
+    let first_m = match arguments.sources.first() {
+        Some(first) if !TileMap::is_at(folder) => Some(cell_of(first)?),
+        _ => None,
+    };
+    let cell_m = match arguments.cell.or(first_m) {
+        Some(cell_m) if (0.05..=100.0).contains(&cell_m) => cell_m,
+        Some(found) => return Err(UsageError(format!("--cell: expected 0.05 to 100 m, found {found}"))),
+        None => return TileMap::resume(folder, MEMORY_BYTES).map_err(UsageError::from_input),
     };
     TileMap::open(folder, cell_m, MEMORY_BYTES).map_err(UsageError::from_input)
 }
@@ -88,7 +92,12 @@ fn cell_of(source: &Path) -> Result<f64, UsageError> {
     Ok(file.elevation.geometry().resolution_m)
 }
 
-fn merge(arguments: &MapArguments, source: &Path, map: &mut TileMap) -> Result<MergeReport, UsageError> {
+fn merge(
+    arguments: &MapArguments,
+    friction: &ClassFriction,
+    source: &Path,
+    map: &mut TileMap,
+) -> Result<MergeReport, UsageError> {
     if source.is_dir() {
         let is_itself = source.canonicalize().ok() == arguments.map.canonicalize().ok();
         if is_itself {
@@ -100,7 +109,7 @@ fn merge(arguments: &MapArguments, source: &Path, map: &mut TileMap) -> Result<M
     }
     let file = read_elevation(source).map_err(UsageError::from_input)?;
     let cell_m = map.cell_m(0);
-    let ground = ground_of(&file, &arguments.kinds, cell_m)?;
+    let ground = ground_of(&file, friction, cell_m)?;
     let at_m = [arguments.at.x_m, arguments.at.y_m];
     let from = *ground.geometry();
     let moved = [0, 1].map(|axis| from.origin[axis] + (at_m[axis] / cell_m).round() as i64);

@@ -20,7 +20,7 @@ use answer::Answer;
 pub use guided::GuidedSummary;
 use guided::SearchedMap;
 pub(crate) use guided::{Guided, Place};
-use known::{Known, known};
+use known::{Known, known, of_file};
 use lead::Led;
 use tiles::Tiles;
 
@@ -40,15 +40,18 @@ pub(crate) fn run(arguments: &RouteArguments) -> anyhow::Result<()> {
     let from = ([start.x_m, start.y_m], start.yaw_rad);
     let limits = speed_limits(&vehicle, arguments.speed)?;
     let config = config(&vehicle, vehicle.geometry.width_m + MARGIN_M);
-    if arguments.world.is_dir() {
-        refuse_kinds(&arguments.ground.kinds)?;
-        let tiles = Tiles::open(&arguments.world, &arguments.ground)?;
-        if !tiles.fits([from.0, goal_m]) {
+    let (world, asked, ends_m) = (&arguments.world, &arguments.ground, [from.0, goal_m]);
+    let Known { ground, reference } = if world.is_dir() {
+        refuse_kinds(&asked.kinds)?;
+        let tiles = Tiles::open(world, asked)?;
+        if !tiles.fits(ends_m) {
             arguments.results.prepare()?;
             return tiles.far((&vehicle, &config, &limits), from, goal_m, arguments);
         }
-    }
-    let Known { ground, reference } = known(&arguments.world, &arguments.ground, [from.0, goal_m])?;
+        tiles.known(ends_m)?
+    } else {
+        of_file(world, asked)?
+    };
     let planner = Planner::new(ground, config).map_err(UsageError::from_input)?;
     arguments.results.prepare()?;
     let route = planner.route(from, goal_m, &limits).map_err(failed)?;

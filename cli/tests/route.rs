@@ -5,7 +5,8 @@
 mod ground;
 
 use std::path::Path;
-use std::process::{Command, Output};
+use std::process::{Command, Output, Stdio};
+use std::time::{Duration, Instant};
 
 use tempfile::TempDir;
 use tiff::encoder::TiffEncoder;
@@ -182,6 +183,7 @@ fn what_makes_no_map_in_tiles_is_told_in_one_line() {
     let tiles = map.to_str().unwrap();
     refused(&["map", tiles], "resolution_m: map in tiles: expected the size of its cells in metres");
     refused(&["map", tiles, "nowhere.npz"], "nowhere.npz");
+    refused(&["map", tiles, "nowhere.npz", "--cell", "1"], "nowhere.npz");
     refused(&["map", tiles, &world, "--cell", "0"], "--cell: expected 0.05 to 100 m, found 0");
     refused(&["map", tiles, &world, "--deviation", "nan"], "--deviation: expected 0.01 to 2.5 m, found NaN");
     refused(
@@ -201,4 +203,30 @@ fn what_makes_no_map_in_tiles_is_told_in_one_line() {
     refused(&with(&["--cell", "0.3"]), "--cell: expected 1 to 1024 m, as");
     std::fs::write(map.join("0_0_0.tile"), "torn").unwrap();
     refused(&with(&[]), "0_0_0.tile: bytes: expected 45 or 786465, found 4");
+}
+
+#[test]
+fn an_interrupted_merge_keeps_what_it_has_and_says_how_much() {
+    let (folder, world) = ford();
+    let map = folder.path().join("map");
+    let out = folder.path().join("out");
+    let (tiles, out) = (map.to_str().unwrap(), out.to_str().unwrap());
+    let mut words = vec!["map", tiles, "--cell", "0.5", "--out", out];
+    words.extend([world.as_str(); 2000]);
+    let mut command = Command::new(env!("CARGO_BIN_EXE_surefoot"));
+    let merging = command.args(words).stderr(Stdio::piped()).stdout(Stdio::null()).spawn().unwrap();
+    let is_tile = |path: &Path| path.extension().is_some_and(|ending| ending == "tile");
+    let has_tiles =
+        || std::fs::read_dir(&map).is_ok_and(|mut files| files.any(|file| is_tile(&file.unwrap().path())));
+    let patience = Instant::now() + Duration::from_secs(60);
+    while !has_tiles() && Instant::now() < patience {
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    let interrupted = Command::new("kill").args(["-INT", &merging.id().to_string()]).status().unwrap();
+    let ended = merging.wait_with_output().unwrap();
+    let told = String::from_utf8(ended.stderr).unwrap();
+    assert!(interrupted.success() && ended.status.code() == Some(1), "{told}");
+    assert!(told.contains("interrupted by the user; ") && told.ends_with(" of 2000 are merged\n"), "{told}");
+    let again = String::from_utf8(surefoot(&["map", tiles, &world, "--out", out]).stdout).unwrap();
+    assert!(again.contains(": 0 cells new, ") && again.contains(" agree, 0 contradict"), "{again}");
 }

@@ -9,8 +9,6 @@ use terrain::{Cell, CellRegion, GridMap};
 
 /// Cells that the coarse search may have: with its edges and states less than half a gigabyte.
 const COARSE_CELLS_MAX: f64 = 2e6;
-/// Room around start and goal that the coarse search sees, as a share of the way between them, and at least [m].
-const COARSE_MARGIN: (f64, f64) = (0.25, 50.0);
 /// Levels between the cells that were asked for and those between them and the coarse ones.
 const MIDDLE_LEVELS: u8 = 2;
 /// Room around a leg is twice, four and eight times as much where there is no way.
@@ -129,17 +127,10 @@ impl Search<'_> {
         (start_m, heading): ([f64; 2], usize),
     ) -> Result<(u8, Vec<[f64; 2]>), FarRouteError> {
         let goal_m = self.goal_m;
-        let way_m = libm::hypot(goal_m[0] - start_m[0], goal_m[1] - start_m[1]);
-        let margin_m = (COARSE_MARGIN.0 * way_m).max(COARSE_MARGIN.1);
-        let n_cells = |level: u8| {
-            let edge = |axis: usize| {
-                ((goal_m[axis] - start_m[axis]).abs() + 2.0 * margin_m) / self.map.cell_m(level)
-            };
-            edge(0) * edge(1)
-        };
-        let level = (self.level..=LEVEL_MAX).find(|level| n_cells(*level) <= COARSE_CELLS_MAX);
+        let ends_m = [start_m, goal_m];
+        let level = self.map.level_within(self.level, ends_m, COARSE_CELLS_MAX);
         let level = level.ok_or(RouteError::Outside { name: "goal", found_m: goal_m })?;
-        let ground = self.map.around(level, &[start_m, goal_m], margin_m)?;
+        let ground = self.map.around(level, &ends_m, TileMap::room_m(ends_m))?;
         let planner = self.planner(level, ground)?;
         let (start, goal) = (planner.open_cell("start", start_m)?, planner.open_cell("goal", goal_m)?);
         let path = planner.search((start, heading), goal, goal_m)?;

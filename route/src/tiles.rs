@@ -8,6 +8,7 @@
 mod cell;
 mod file;
 mod keeper;
+mod room;
 
 use crate::GroundCell;
 pub use cell::MeasuredCell;
@@ -277,26 +278,6 @@ impl TileMap {
             }
         }
         Ok(window)
-    }
-
-    /// A window of a level around some points, with room beyond the outermost [m].
-    ///
-    /// # Errors
-    /// As [`TileMap::window`].
-    pub fn around(
-        &mut self,
-        level: u8,
-        points_m: &[[f64; 2]],
-        margin_m: f64,
-    ) -> Result<GridMap<GroundCell>, TileError> {
-        let cell_m = self.cell_m(level);
-        let along = |axis: usize| points_m.iter().map(move |point| point[axis]);
-        let low = [0, 1]
-            .map(|axis| ((along(axis).fold(f64::INFINITY, f64::min) - margin_m) / cell_m).floor() as i64);
-        let high = [0, 1]
-            .map(|axis| ((along(axis).fold(f64::NEG_INFINITY, f64::max) + margin_m) / cell_m).ceil() as i64);
-        let [n_cols, n_rows] = [0, 1].map(|axis| (high[axis] - low[axis]).max(1) as usize);
-        self.window(level, &GridGeometry { resolution_m: cell_m, origin: low, n_rows, n_cols })
     }
 
     /// The cells of a tile; `None` where nothing is known.

@@ -21,30 +21,30 @@ pub(super) struct Known {
 
 /// The ground of an elevation file, or of a map in tiles what lies around start and goal.
 pub(super) fn known(world: &Path, asked: &RouteGround, ends_m: [[f64; 2]; 2]) -> Result<Known, UsageError> {
-    if world.is_dir() {
-        let ground = Tiles::open(world, asked)?.around(ends_m)?;
-        return Ok(Known { ground, reference: None });
-    }
+    if world.is_dir() { Tiles::open(world, asked)?.known(ends_m) } else { of_file(world, asked) }
+}
+
+/// The ground of an elevation file.
+pub(super) fn of_file(world: &Path, asked: &RouteGround) -> Result<Known, UsageError> {
     let file = read_elevation(world).map_err(UsageError::from_input)?;
     let cell_m = asked.cell.unwrap_or_else(|| file.elevation.geometry().resolution_m.clamp(0.5, 2.0));
-    let ground = ground_of(&file, &asked.kinds, cell_m)?;
+    let ground = ground_of(&file, &class_friction(&asked.kinds)?, cell_m)?;
     Ok(Known { ground, reference: file.reference() })
 }
 
 /// The ground of an elevation file in cells of a size [m].
 pub(crate) fn ground_of(
     file: &ElevationFile,
-    kinds: &GroundKinds,
+    friction: &ClassFriction,
     cell_m: f64,
 ) -> Result<GridMap<GroundCell>, UsageError> {
-    let ClassFriction { open, vegetation, .. } = class_friction(kinds)?;
     let layers = GroundLayers {
         elevation_m: &file.elevation,
         low_vegetation_fraction: file.layers.low_vegetation_fraction.as_ref(),
         water: file.layers.water.as_ref(),
         ground_gap_m: file.layers.ground_gap_m.as_ref(),
-        bare: open,
-        grass: vegetation,
+        bare: friction.open,
+        grass: friction.vegetation,
     };
     layers.ground(cell_m).map_err(UsageError::from_input)
 }

@@ -10,13 +10,12 @@ use terrain::GridMap;
 
 use super::answer::Answer;
 use super::failed;
+use super::known::Known;
 use crate::UsageError;
 use crate::arguments::{RouteArguments, RouteGround};
 
 /// Memory that the tiles may take.
 pub(crate) const MEMORY_BYTES: usize = 256 << 20;
-/// Room around start and goal, as a share of the way between them, and at least [m].
-const MARGIN: (f64, f64) = (0.25, 50.0);
 /// Cells that are searched at once, at most: with their edges and states half a gigabyte.
 const CELLS_MAX: f64 = 4e6;
 /// Cells of a picture, at most.
@@ -48,22 +47,17 @@ impl Tiles {
 
     /// Whether the cells between start and goal can be searched at once.
     pub fn fits(&self, ends_m: [[f64; 2]; 2]) -> bool {
-        self.n_cells(self.level, ends_m) <= CELLS_MAX
-    }
-
-    fn n_cells(&self, level: u8, ends_m: [[f64; 2]; 2]) -> f64 {
-        let edge = |axis: usize| {
-            ((ends_m[1][axis] - ends_m[0][axis]).abs() + 2.0 * margin_m(ends_m)) / self.map.cell_m(level)
-        };
-        edge(0) * edge(1)
+        self.map.level_within(self.level, ends_m, CELLS_MAX) == Some(self.level)
     }
 
     /// What lies around start and goal, in larger cells where they are far apart.
-    pub fn around(&mut self, ends_m: [[f64; 2]; 2]) -> Result<GridMap<GroundCell>, UsageError> {
-        let level = (self.level..=LEVEL_MAX).find(|level| self.n_cells(*level, ends_m) <= CELLS_MAX);
+    pub fn known(mut self, ends_m: [[f64; 2]; 2]) -> Result<Known, UsageError> {
+        let level = self.map.level_within(self.level, ends_m, CELLS_MAX);
         let outside = RouteError::Outside { name: "goal", found_m: ends_m[1] };
         let level = level.ok_or_else(|| UsageError::from_input(outside))?;
-        self.map.around(level, &ends_m, margin_m(ends_m)).map_err(UsageError::from_input)
+        let ground =
+            self.map.around(level, &ends_m, TileMap::room_m(ends_m)).map_err(UsageError::from_input)?;
+        Ok(Known { ground, reference: None })
     }
 
     /// Finds a way over more cells than are searched at once, and shows it.
@@ -97,13 +91,8 @@ impl Tiles {
         let along = |axis: usize| places_m.iter().map(move |place| place[axis]);
         let corner = |pick: fn(f64, f64) -> f64, from: f64| [0, 1].map(|axis| along(axis).fold(from, pick));
         let ends_m = [corner(f64::min, f64::INFINITY), corner(f64::max, f64::NEG_INFINITY)];
-        let level = (self.level..LEVEL_MAX).find(|level| self.n_cells(*level, ends_m) <= SHOWN_CELLS_MAX);
-        let shown = self.map.around(level.unwrap_or(LEVEL_MAX), &ends_m, margin_m(ends_m));
+        let level = self.map.level_within(self.level, ends_m, SHOWN_CELLS_MAX);
+        let shown = self.map.around(level.unwrap_or(LEVEL_MAX), &ends_m, TileMap::room_m(ends_m));
         shown.map_err(UsageError::from_input)
     }
-}
-
-fn margin_m(ends_m: [[f64; 2]; 2]) -> f64 {
-    let [start_m, goal_m] = ends_m;
-    (MARGIN.0 * (goal_m[0] - start_m[0]).hypot(goal_m[1] - start_m[1])).max(MARGIN.1)
 }
