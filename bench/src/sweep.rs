@@ -3,7 +3,7 @@
 use std::fmt::Display;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
-use scenarios::{RockFieldError, WorldError};
+use scenarios::{ArenaError, RockFieldError, WorldError};
 
 use crate::closed_loop::DriveError;
 
@@ -53,6 +53,9 @@ pub enum BrokenDrive {
     /// There is no such rock field.
     #[error(transparent)]
     Field(#[from] RockFieldError),
+    /// There is no such hall.
+    #[error(transparent)]
+    Arena(#[from] ArenaError),
     /// There is no such world.
     #[error(transparent)]
     World(#[from] WorldError),

@@ -1,6 +1,7 @@
 //! The command line: what can be asked, in which units, and what each word must look like.
 
 mod bench;
+mod bench_arena;
 mod bench_gap;
 mod bench_route;
 mod bench_route_speed;
@@ -40,6 +41,7 @@ pub use bench::{
     BenchCommand, BenchControlArguments, BenchLearningArguments, BenchNavigationArguments,
     BenchPriorMapArguments, BenchWork,
 };
+pub use bench_arena::BenchArenaArguments;
 pub use bench_gap::BenchGapArguments;
 pub use bench_route::BenchRouteArguments;
 pub use bench_route_speed::BenchRouteSpeedArguments;

@@ -1,5 +1,6 @@
 //! `surefoot bench`: what was asked, handed to the benchmarks, and their result shown and written.
 
+mod arena;
 mod correction;
 mod crossings;
 mod friction;
@@ -22,6 +23,7 @@ use serde::Serialize;
 
 use crate::UsageError;
 use crate::arguments::{BenchControlArguments, BenchPriorMapArguments, BenchWork, JsonArguments};
+pub(crate) use arena::run_arena;
 pub(crate) use correction::run_correction;
 pub(crate) use crossings::run_crossings;
 pub(crate) use friction::run_friction;

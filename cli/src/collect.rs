@@ -73,6 +73,7 @@ fn request(arguments: &CollectArguments, vehicle: &Vehicle) -> Result<Request, U
         CollectWorld::Testbed => rocks(RockFieldConfig::testbed(), arguments, split),
         CollectWorld::Rocks => rocks(RockFieldConfig::default(), arguments, split),
         CollectWorld::Arena => Place::Arena { split },
+        CollectWorld::Floor => Place::Floor { split },
     };
     let is_scaled = matches!(place, Place::Rocks { split: Split::Test, .. });
     let asked = [

@@ -202,6 +202,7 @@ fn dispatch(command: Command) -> anyhow::Result<()> {
             bench::run_kinodynamics(&kinodynamics)
         }
         Command::Bench { command: BenchCommand::Crossings(crossings) } => bench::run_crossings(&crossings),
+        Command::Bench { command: BenchCommand::Arena(arena) } => bench::run_arena(&arena),
         Command::Bench { command: BenchCommand::Slippery(slippery) } => bench::run_slippery(&slippery),
         Command::Bench { command: BenchCommand::Risk(risk) } => bench::run_risk(&risk),
         Command::Bench { command: BenchCommand::Correction(correction) } => {

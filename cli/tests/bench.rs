@@ -362,3 +362,34 @@ fn navigation_refuses_what_cannot_be_driven() {
         assert!(told.contains(part) && told.lines().count() == 1, "{told}");
     }
 }
+
+#[test]
+fn arena_writes_table_page_and_picture_and_refuses_what_cannot_be_driven() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let out = folder.path().join("out");
+    let words = ["bench", "arena", "--runs", "1", "--methods", "physics,nominal", "--time-limit", "1"];
+    let output = surefoot(&[&words[..], &["--out", out.to_str().expect("UTF-8")]].concat());
+    assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+    let told = String::from_utf8_lossy(&output.stdout);
+    assert!(told.contains("1 time limit passed") && told.contains("FAILS"), "{told}");
+    let table: Value = serde_json::from_slice(&read(&out, "arena.json")).expect("JSON");
+    assert_eq!((table["rows"].as_array().map(Vec::len), &table["training"]), (Some(4), &Value::Null));
+    let (one, other) = (&table["runs"][0], &table["runs"][1]);
+    assert_eq!((&one["method"], &other["method"]), (&"physics".into(), &"nominal".into()));
+    assert_eq!((&one["bush_height_m"], &one["path_m"][0]), (&other["bush_height_m"], &other["path_m"][0]));
+    assert!(table["runs"][2]["bush_height_m"].as_f64() > one["bush_height_m"].as_f64(), "{table}");
+    assert!(read(&out, "arena.png").starts_with(b"\x89PNG"));
+    let page = String::from_utf8(read(&out, "arena.html")).expect("a page");
+    assert!(page.contains("nominal") && page.contains("data:image/png;base64,"));
+
+    for (words, part) in [
+        (["--runs", "0"], "runs"),
+        (["--alpha", "2"], "alpha"),
+        (["--methods", "physics,physics"], "--methods: expected each method once, found physics again"),
+    ] {
+        let output = surefoot(&[["bench", "arena"].as_slice(), &words].concat());
+        let told = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{told}");
+        assert!(told.contains(part), "{told}");
+    }
+}

@@ -79,6 +79,7 @@ fn every_command_has_help() {
         &["bench", "control", "--help"],
         &["bench", "prior-map", "--help"],
         &["bench", "crossings", "--help"],
+        &["bench", "arena", "--help"],
         &["bench", "slippery", "--help"],
         &["bench", "scaling", "--help"],
         &["bench", "risk", "--help"],

@@ -59,8 +59,8 @@ impl Dataset {
     /// Of simulated drives over generated ground, with steering that swings from side to side, until the vehicle rolls over,
     /// is stuck or leaves the map, as `surefoot collect` does it.
     ///
-    /// world: "testbed" or "rocks", rock fields, or "arena". split: "train", "validation" or "test". On all cores; the result
-    /// does not depend on how many.
+    /// world: "testbed" or "rocks", rock fields, "arena", or "floor", which is level. split: "train", "validation" or "test".
+    /// On all cores; the result does not depend on how many.
     #[staticmethod]
     #[pyo3(signature = (vehicle, world="testbed", split="train", *, n_maps=10, n_trials=20, time_limit_s=40.0, seed=1))]
     #[expect(clippy::too_many_arguments, reason = "keywords in Python")]
@@ -240,7 +240,10 @@ fn place(world: &str, split: &str) -> PyResult<Place> {
         "testbed" => Ok(Place::Rocks { field: RockFieldConfig::testbed(), split }),
         "rocks" => Ok(Place::Rocks { field: RockFieldConfig::default(), split }),
         "arena" => Ok(Place::Arena { split }),
-        other => Err(refused("world", "\"testbed\", \"rocks\" or \"arena\"", format!("{other:?}"))),
+        "floor" => Ok(Place::Floor { split }),
+        other => {
+            Err(refused("world", "\"testbed\", \"rocks\", \"arena\" or \"floor\"", format!("{other:?}")))
+        }
     }
 }
 

@@ -62,8 +62,8 @@ class Dataset:
         """Of simulated drives over generated ground, with steering that swings from side to side, until the vehicle rolls over,
         is stuck or leaves the map, as `surefoot collect` does it.
 
-        world: "testbed" or "rocks", rock fields, or "arena". split: "train", "validation" or "test". On all cores; the result
-        does not depend on how many.
+        world: "testbed" or "rocks", rock fields, "arena", or "floor", which is level. split: "train", "validation" or "test".
+        On all cores; the result does not depend on how many.
         """
 
     def even(self, unevenness_max_m: SupportsFloat | SupportsIndex) -> Dataset:

@@ -15,8 +15,9 @@
 //! | a belief about the ground | `surefoot gap ground` | [text](ground::text()), [picture](ground::picture()), [page](ground::page()) |
 //! | the score of diagnoses | `surefoot gap score` | [text](gap_score::text()), [pictures](gap_score::pictures), [page](gap_score::page()) |
 //! | the catalogue of effects | `surefoot gap effects` | [text](effects::text()), [picture](effects::picture), [Markdown](effects::page()) |
-//! | benchmarks | `surefoot bench` | [`correction`], [`crossings`], [`mod@friction`], [`gap_closed_loop`], [`ground_score`], [`kinodynamics`], [`learning`], [`navigation`], [`plant`], [`risk`], [`scaling`], [`slippery`], [`traction_map`] |
+//! | benchmarks | `surefoot bench` | [`mod@arena`], [`correction`], [`crossings`], [`mod@friction`], [`gap_closed_loop`], [`ground_score`], [`kinodynamics`], [`learning`], [`navigation`], [`plant`], [`risk`], [`scaling`], [`slippery`], [`traction_map`] |
 
+pub mod arena;
 mod axes;
 mod canvas;
 pub mod collection;

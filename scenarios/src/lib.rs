@@ -34,7 +34,10 @@ mod walker;
 mod waves;
 mod world;
 
-pub use arena::{ARENA_GOAL_M, ARENA_START, ArenaConfig, ArenaError, arena};
+pub use arena::{
+    ARENA_GOAL_M, ARENA_SIZE_M, ARENA_START, ArenaConfig, ArenaError, ArenaPart, ArenaWay, arena,
+    arena_floor, arena_parts, arena_way,
+};
 pub use deviation::{Deviation, DeviationError};
 pub use episode::{
     Episode, EpisodeConfig, EpisodeError, Fault, Observation, Outcome, Rules, SensorFault, Strike, TraceRow,

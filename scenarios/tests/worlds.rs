@@ -6,7 +6,7 @@ use std::f64::consts::{FRAC_PI_2, TAU};
 use bicycle::Geometry;
 use scenarios::{
     ARENA_GOAL_M, ARENA_START, ArenaConfig, MAPS_PER_SPLIT, Patch, RockFieldConfig, RockMap, RockPopulation,
-    Split, Stribeck, World, WorldError, arena, rock_field,
+    Split, Stribeck, World, WorldError, arena, arena_floor, arena_parts, arena_way, rock_field,
 };
 use terrain::{Cell, GridGeometry, GridMap, TerrainClass};
 
@@ -269,4 +269,46 @@ fn the_arena_has_a_ramp_bushes_crates_and_a_clear_start_and_goal() {
     let open = (0..800).filter(|k| !closed(f64::from(*k) * 0.01 + 0.005)).count() as f64 * 0.01;
     assert!((open - 1.15).abs() < 0.03, "{open} m open");
     assert!(arena(&ArenaConfig { bush_height_m: -0.1, ..ArenaConfig::default() }).is_err());
+}
+
+#[test]
+fn ways_through_the_arena_are_told_apart_in_its_middle() {
+    let along =
+        |y_m: f64| arena_way(&[[4.0, 4.0], [4.8, y_m], [4.9, y_m], [5.6, 4.0], [4.0, 0.5], [5.0, 0.5]]);
+    assert_eq!(
+        [0.5, 3.0, 4.5, 4.7, 6.1].map(along),
+        [ArenaWay::Floor, ArenaWay::Bushes, ArenaWay::Bushes, ArenaWay::Ramp, ArenaWay::Ramp].map(Some)
+    );
+    assert_eq!(arena_way(&[[1.2, 4.0], [4.8, 4.0]]), None);
+    // What is drawn of the hall is what is driven on.
+    let world = arena(&ArenaConfig { bush_height_m: 0.3, ..ArenaConfig::default() }).unwrap();
+    for (part, [west, south, east, north]) in arena_parts() {
+        let (x_m, y_m) = (0.5 * (west + east), 0.5 * (south + north));
+        let there = match part {
+            ArenaPart::Turf => world.patch(3.7, 3.0).vegetation_height_m == 0.01,
+            ArenaPart::Bushes => world.patch(x_m, y_m).vegetation_height_m == 0.3,
+            ArenaPart::Ramp => (world.height_m(x_m, y_m) - 0.2).abs() < 1e-6,
+            ArenaPart::Rail | ArenaPart::Crates => world.patch(x_m, y_m).class == TerrainClass::Obstacle,
+        };
+        assert!(there, "{part:?}");
+    }
+}
+
+#[test]
+fn the_floor_to_learn_on_is_level_concrete_and_turf() {
+    for seed in 1..6 {
+        let world = arena_floor(seed).unwrap();
+        let places =
+            (0..60).flat_map(|i| (0..60).map(move |j| [0.1 + 0.2 * f64::from(i), 0.1 + 0.2 * f64::from(j)]));
+        let (mut n_turf, mut n) = (0, 0);
+        for [x_m, y_m] in places {
+            let patch = world.patch(x_m, y_m);
+            assert_eq!(world.height_m(x_m, y_m), 0.0);
+            assert!(patch.vegetation_height_m <= 0.01 && patch.class != TerrainClass::Obstacle);
+            n_turf += i32::from(patch.class == TerrainClass::Vegetation);
+            n += 1;
+        }
+        let share = f64::from(n_turf) / f64::from(n);
+        assert!((0.1..0.75).contains(&share), "{share} of floor {seed} is turf");
+    }
 }

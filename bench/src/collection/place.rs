@@ -4,8 +4,8 @@ use std::fmt;
 
 use rand::RngExt;
 use scenarios::{
-    ArenaConfig, ArenaError, RockFieldConfig, RockFieldError, RockMap, Split, World, arena, rock_field,
-    stream,
+    ArenaConfig, ArenaError, RockFieldConfig, RockFieldError, RockMap, Split, World, WorldError, arena,
+    arena_floor, rock_field, seed_of, stream,
 };
 
 /// A family of worlds.
@@ -24,6 +24,11 @@ pub enum Place {
         /// Which third of the heights.
         split: Split,
     },
+    /// Level concrete and turf.
+    Floor {
+        /// Which third of the floors.
+        split: Split,
+    },
 }
 
 /// Why a world cannot be made.
@@ -35,6 +40,9 @@ pub enum PlaceError {
     /// The hall.
     #[error(transparent)]
     Arena(#[from] ArenaError),
+    /// The floor.
+    #[error(transparent)]
+    Floor(#[from] WorldError),
 }
 
 /// Lowest and highest bushes of the hall [m].
@@ -52,6 +60,9 @@ impl Place {
                 let bush_height_m = stream(seed, &key).random_range(BUSH_HEIGHTS_M[0]..BUSH_HEIGHTS_M[1]);
                 Ok(arena(&ArenaConfig { bush_height_m, ..ArenaConfig::default() })?)
             }
+            Self::Floor { split } => {
+                Ok(arena_floor(seed_of(seed, &[0xF100, *split as u64, u64::from(index)]))?)
+            }
         }
     }
 }
@@ -64,6 +75,7 @@ impl fmt::Display for Place {
             }
             Self::Rocks { split, .. } => write!(formatter, "rock fields, {split:?}"),
             Self::Arena { split } => write!(formatter, "arena, {split:?}"),
+            Self::Floor { split } => write!(formatter, "level concrete and turf, {split:?}"),
         }
     }
 }

@@ -135,7 +135,7 @@ pub(super) fn drive(
 
 fn split(place: &Place) -> Split {
     match place {
-        Place::Rocks { split, .. } | Place::Arena { split } => *split,
+        Place::Rocks { split, .. } | Place::Arena { split } | Place::Floor { split } => *split,
     }
 }
 

@@ -25,6 +25,9 @@ pub enum BenchCommand {
     /// Drives over the same rock fields with every method and risk tolerance
     #[command(long_about = NAVIGATION_ABOUT)]
     Navigation(BenchNavigationArguments),
+    /// A car among bushes and a ramp that it never drove on: PIETRA's hall
+    #[command(long_about = super::bench_arena::LONG_ABOUT)]
+    Arena(super::BenchArenaArguments),
     /// How the risk tolerance decides between a way through bushes and one around them: EVORA's grid
     #[command(long_about = super::risk::LONG_ABOUT)]
     Risk(super::BenchRiskArguments),

@@ -134,7 +134,7 @@ impl CollectArguments {
     pub fn vehicle_name_or_path(&self) -> &str {
         let fitting = match self.world {
             _ if self.teleop_random => "ut_automata",
-            CollectWorld::Arena => "rc_car",
+            CollectWorld::Arena | CollectWorld::Floor => "rc_car",
             CollectWorld::Testbed | CollectWorld::Rocks => "pietra_full_size",
         };
         self.vehicle.as_deref().unwrap_or(fitting)
@@ -150,6 +150,8 @@ pub enum CollectWorld {
     Rocks,
     /// Halls of 9.6 x 8 m with a ramp, and bushes of many heights
     Arena,
+    /// Level concrete and turf, 12 x 12 m
+    Floor,
 }
 
 /// Thirds of the worlds.
