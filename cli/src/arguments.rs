@@ -38,7 +38,7 @@ use clap::{Parser, Subcommand};
 
 pub use bench::{
     BenchCommand, BenchControlArguments, BenchLearningArguments, BenchNavigationArguments,
-    BenchPriorMapArguments, BenchWork,
+    BenchPriorMapArguments, BenchWork, PlannerArgument,
 };
 pub use bench_gap::BenchGapArguments;
 pub use bench_route::BenchRouteArguments;
