@@ -9,6 +9,8 @@
 
 mod comparison;
 mod drive;
+mod entrant;
+mod external;
 mod plan;
 mod row;
 mod rules;
@@ -19,6 +21,8 @@ use traversability::CvarLevel;
 use crate::Verdict;
 pub use comparison::Comparison;
 pub use drive::{DriveResult, name_of_outcome};
+pub use entrant::{Entrant, PlannerName, PlannerNameError};
+pub use external::{Answers, ComputeTime, External, ExternalError, nobody};
 pub use plan::{Plan, Request, Shard, ShardError, VEHICLE};
 pub use row::Row;
 
@@ -49,7 +53,7 @@ impl Plan {
         let mut report = Report {
             plan: self.clone(),
             n_missing: self.n_drives(Shard::WHOLE) - drives.len(),
-            rows: self.rows().filter_map(|row| Row::of(of_row(&drives, row))).collect(),
+            rows: self.rows().filter_map(|(who, level)| Row::of(of_row(&drives, &who, level))).collect(),
             comparisons: Vec::new(),
             verdicts: Vec::new(),
             drives,
@@ -72,12 +76,9 @@ impl Report {
     }
 }
 
-/// The stretch of sorted drives that belongs to a method and level.
-fn of_row(
-    drives: &[DriveResult],
-    (method, level): (crate::closed_loop::Method, Option<CvarLevel>),
-) -> &[DriveResult] {
-    let is_of = |drive: &DriveResult| (drive.method, drive.alpha) == (method, level.map(CvarLevel::get));
+/// The stretch of sorted drives that belongs to an entrant and level.
+fn of_row<'a>(drives: &'a [DriveResult], who: &Entrant, level: Option<CvarLevel>) -> &'a [DriveResult] {
+    let is_of = |drive: &DriveResult| (&drive.method, drive.alpha) == (who, level.map(CvarLevel::get));
     let first = drives.iter().position(is_of).unwrap_or(0);
     let n = drives[first..].iter().take_while(|drive| is_of(drive)).count();
     &drives[first..first + n]
@@ -96,6 +97,7 @@ mod tests {
     fn plan(time_limit_s: f64) -> Plan {
         let request = Request {
             methods: vec![Method::Nominal, Method::Physics],
+            planners: Vec::new(),
             levels: vec![CvarLevel::new(0.5).unwrap()],
             field: RockFieldConfig::default(),
             seed: 1,
@@ -115,7 +117,7 @@ mod tests {
     fn table_depends_on_neither_threads_nor_parts_nor_breaks() {
         let plan = plan(1.0);
         let seen = Mutex::new(Vec::new());
-        let alone = plan.drive(Shard::WHOLE, &[], 1, |drive| {
+        let alone = plan.drive(Shard::WHOLE, &[], 1, &nobody, |drive| {
             seen.lock().unwrap().push(drive.clone());
             Ok(())
         });
@@ -131,14 +133,15 @@ mod tests {
             assert!(drive.path_length_m < 1.5, "{}", drive.path_length_m);
         }
 
-        let halves = ["2/2", "1/2"].map(|half| plan.drive(half.parse().unwrap(), &[], 2, nothing).unwrap());
+        let halves =
+            ["2/2", "1/2"].map(|half| plan.drive(half.parse().unwrap(), &[], 2, &nobody, nothing).unwrap());
         assert_eq!(halves[0].len(), 2);
         let half = plan.report(&halves[0]);
         assert_eq!((half.n_missing, half.rows[0].n, half.rows[1].n), (2, 1, 1));
         assert_eq!(plan.report(&halves.concat()), report);
 
         // Broken off after three drives, and taken up again.
-        let rest = plan.drive(Shard::WHOLE, &alone[..3], 1, nothing).unwrap();
+        let rest = plan.drive(Shard::WHOLE, &alone[..3], 1, &nobody, nothing).unwrap();
         assert_eq!(rest, alone[3..]);
         let twice = [rest, alone].concat();
         assert_eq!(plan.report(&twice), report);
@@ -146,7 +149,7 @@ mod tests {
 
     #[test]
     fn drive_that_cannot_be_is_told_by_name() {
-        let told = plan(-1.0).drive(Shard::WHOLE, &[], 1, nothing).unwrap_err().to_string();
+        let told = plan(-1.0).drive(Shard::WHOLE, &[], 1, &nobody, nothing).unwrap_err().to_string();
         assert!(told.starts_with("nominal, map 1, pair 1: ") && told.contains("time_limit_s"), "{told}");
     }
 }

@@ -6,6 +6,7 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use scenarios::{ArenaError, RockFieldError, WorldError};
 
 use crate::closed_loop::DriveError;
+use crate::navigation::ExternalError;
 
 /// Why there is no table.
 #[derive(Debug, thiserror::Error)]
@@ -62,6 +63,9 @@ pub enum BrokenDrive {
     /// The plant or the planner gave up.
     #[error(transparent)]
     Loop(#[from] DriveError),
+    /// A planner of other people's gave up, or what it answered cannot be.
+    #[error("{0}")]
+    External(ExternalError),
 }
 
 /// Drives all that is to be driven; `after` sees what comes of each as it ends, in any order and on any thread, and ends

@@ -40,7 +40,7 @@ impl Watchdog {
     /// A command to drive is as old as the odometry and the scan that it was decided on, however late it comes: whoever
     /// paused between deciding and sending revives nothing. To stand is never wrong, and is as old as its message.
     pub fn admit(&mut self, command: &CommandRecord, sent_at_ns: u64) {
-        let Some(decision) = command.decision().filter(|decision| self.is_possible(decision)) else {
+        let Some(decision) = command.decision().filter(|decision| is_possible(&self.limits, decision)) else {
             self.n_refused += 1;
             self.has_refused = true;
             return;
@@ -93,16 +93,17 @@ impl Watchdog {
     pub fn n_refused(&self) -> u64 {
         self.n_refused
     }
+}
 
-    fn is_possible(&self, decision: &Decision) -> bool {
-        let Decision::Drive(command) = decision else { return true };
-        let (speed_mps, steering_rad) = (f64::from(command.speed_mps), f64::from(command.steering_rad));
-        // Single precision may round a command at the limit just beyond it; what is no number is never within.
-        let slack = 1.0 + 1e-6;
-        speed_mps <= slack * self.limits.speed_max_mps
-            && speed_mps >= -slack * self.limits.reverse_speed_max_mps
-            && steering_rad.abs() <= slack * self.limits.steering_max_rad
-    }
+/// Whether a vehicle of these limits can carry out a decision. To stand it always can.
+pub fn is_possible(limits: &Limits, decision: &Decision) -> bool {
+    let Decision::Drive(command) = decision else { return true };
+    let (speed_mps, steering_rad) = (f64::from(command.speed_mps), f64::from(command.steering_rad));
+    // Single precision may round a command at the limit just beyond it; what is no number is never within.
+    let slack = 1.0 + 1e-6;
+    speed_mps <= slack * limits.speed_max_mps
+        && speed_mps >= -slack * limits.reverse_speed_max_mps
+        && steering_rad.abs() <= slack * limits.steering_max_rad
 }
 
 #[cfg(test)]

@@ -100,6 +100,7 @@ pub mod interrupt;
 mod map;
 mod orders;
 pub mod output;
+mod own_process;
 mod play;
 mod program;
 pub mod progress;

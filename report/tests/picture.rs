@@ -226,7 +226,7 @@ fn made_up_table(n_maps: u32) -> Report {
         let draw = (map * 7 + row as u32 * 3) % 11;
         let outcome = if draw < 1 + 2 * row as u32 { failures[(draw % 6) as usize] } else { Outcome::Goal };
         DriveResult {
-            method: rows[row].0,
+            method: rows[row].0.into(),
             alpha: rows[row].1,
             map,
             pair: 0,
@@ -238,11 +238,13 @@ fn made_up_table(n_maps: u32) -> Report {
             largest_pitch_deg: 15.0,
             failed_at_m: (outcome != Outcome::Goal).then_some([20.0, 30.0]),
             stops: BTreeMap::new(),
+            compute: None,
         }
     };
     let drives: Vec<_> = (0..5).flat_map(|row| (0..n_maps).map(move |map| drive(row, map))).collect();
     let request = Request {
         methods: vec![Method::Truth, Method::Physics, Method::Nominal],
+        planners: Vec::new(),
         levels: [0.4, 0.6, 0.8].map(|level| CvarLevel::new(level).expect("a level")).into(),
         field: scenarios::RockFieldConfig::default(),
         seed: 1,

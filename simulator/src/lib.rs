@@ -2,25 +2,25 @@
 //! [Surefoot](../cli/index.html).
 //!
 //! It is a driver like that of any vehicle: what it knows of the processes that command it is in [`bus`].
-//! `examples/command_the_plant.rs` commands it from outside.
+//! `examples/command_the_plant.rs` commands it from outside. In [`LockStep`] it waits for whoever commands it.
 
-use bicycle::{Decision, ImuSample, Vehicle};
-use scenarios::{Episode, EpisodeConfig, Observation, Outcome, Task};
+mod lock_step;
+mod sensors;
+
+use bicycle::{Decision, Vehicle};
+use scenarios::{Episode, EpisodeConfig, Outcome, Task};
 
 use bus::ages::{AgeLimits, Periods};
-use bus::channel::{Bus, COMMAND, IMU, Inlet, MISSION, ODOMETRY, Outlet, SCAN};
+use bus::channel::{Bus, COMMAND, Inlet, MISSION};
 use bus::clock::{self, Cycle, SECOND_NS};
 use bus::message::mission::REACHED;
-use bus::message::{
-    CommandRecord, ImuRecord, MissionRecord, OdometryRecord, PointRecord, ScanHeader, Stamp, StatusRecord,
-};
+use bus::message::{CommandRecord, MissionRecord, Stamp, StatusRecord};
 use bus::status::{Health, Meter, Role};
 use bus::watchdog::Watchdog;
+pub use lock_step::{Answer, LockStep, LockStepError, Patience};
+pub use sensors::POINTS_MAX;
+use sensors::Sensors;
 
-/// Returns of a sweep at the most.
-pub const POINTS_MAX: usize = 1 << 16;
-/// Inertial samples between two odometry messages at the most.
-const SAMPLES_MAX: usize = 256;
 /// The world does not wait: a plant that is late catches up, from no further back than this [ns].
 const BEHIND_MAX_NS: u64 = SECOND_NS / 4;
 
@@ -128,9 +128,7 @@ struct Plant {
     /// The mission says that its last goal is reached.
     has_arrived: bool,
     commands: Inlet<Stamp, CommandRecord>,
-    odometry: Outlet<Stamp, OdometryRecord>,
-    imu: Outlet<Stamp, ImuRecord>,
-    scans: Outlet<ScanHeader, PointRecord>,
+    sensors: Sensors,
     missions: Inlet<Stamp, MissionRecord>,
     mapping: Inlet<Stamp, StatusRecord>,
     jumps: Jumps,
@@ -147,7 +145,7 @@ impl Plant {
         let episode = Episode::new(task, vehicle, episode, seed)?;
         let cycle_ns = clock::nanoseconds(episode.cycle_s());
         let (commands, meter) = (bus.inlet(&COMMAND)?, Meter::new(bus, Role::Plant)?);
-        let (odometry, scans) = (bus.outlet(&ODOMETRY, 1)?, bus.outlet(&SCAN, POINTS_MAX)?);
+        let sensors = Sensors::open(bus)?;
         let began_ns = clock::now_ns();
         Ok(Self {
             episode,
@@ -159,9 +157,7 @@ impl Plant {
             is_driving: false,
             has_arrived: false,
             commands,
-            odometry,
-            imu: bus.outlet(&IMU, SAMPLES_MAX)?,
-            scans,
+            sensors,
             missions: bus.inlet(&MISSION)?,
             mapping: bus.inlet(&Role::Mapping.status())?,
             jumps: Jumps::default(),
@@ -217,25 +213,9 @@ impl Plant {
 
     fn measure(&mut self) -> Result<(), SimulatorError> {
         let at_ns = self.at_ns();
-        let Observation { odometry, imu, scan, .. } = self.episode.observe();
-        let record = OdometryRecord::from(odometry).with_applied(self.watchdog.applied());
-        self.odometry.send_one(Stamp::default(), record, at_ns)?;
-        let samples = &imu[imu.len().saturating_sub(SAMPLES_MAX)..];
-        if !samples.is_empty() {
-            // The episode's clock and this one began at different times.
-            let of = |sample: &ImuSample| ImuRecord {
-                valid_at_ns: self.began_ns + sample.valid_at_ns,
-                ..ImuRecord::from(sample)
-            };
-            let loan = self.imu.write(samples.len(), |place| of(&samples[place]))?;
-            self.imu.send(loan, at_ns)?;
-        }
-        let Some(scan) = scan else { return Ok(()) };
-        let n_points = scan.points.len().min(self.scans.n_max());
-        let mut loan = self.scans.write(n_points, |place| PointRecord::from(&scan.points[place]))?;
-        loan.header_mut().origin_m = scan.origin_m;
-        self.scans.send(loan, at_ns)?;
-        Ok(())
+        let observation = self.episode.observe();
+        self.sensors.tell_odometry(observation, self.watchdog.applied(), at_ns)?;
+        Ok(self.sensors.tell_surroundings(observation, self.began_ns, at_ns)?)
     }
 
     /// Whoever is meant to stand is not stuck; the last goal is where the drive ends, whatever the vehicle believes.

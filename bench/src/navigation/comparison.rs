@@ -3,11 +3,12 @@
 use scenarios::Outcome;
 use serde::Serialize;
 
-use super::{DriveResult, Row};
+use super::{DriveResult, Entrant, Row};
 use crate::closed_loop::Method;
 use crate::statistics::{Mean, mcnemar_p_value};
 
-/// What is compared, where both are in the table: at every alpha, or once where neither knows one.
+/// Which methods are compared, where both are in the table: at every alpha, or once where neither knows one. With planners
+/// of other people's `pietra` is.
 const COMPARED: [[Method; 2]; 8] = [
     [Method::Pietra, Method::PietraAvoid],
     [Method::PietraAvoid, Method::Evora],
@@ -22,12 +23,12 @@ const COMPARED: [[Method; 2]; 8] = [
 /// Two rows, paired by map, start and goal.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Comparison {
-    /// What the controller of the one row knew.
-    pub method: Method,
+    /// Who drove the one row.
+    pub method: Entrant,
     /// Its risk tolerance.
     pub alpha: Option<f64>,
-    /// What the controller of the other knew.
-    pub other: Method,
+    /// Who drove the other.
+    pub other: Entrant,
     /// Its risk tolerance.
     pub other_alpha: Option<f64>,
     /// Pairs that both drove.
@@ -59,9 +60,9 @@ impl Comparison {
         let both = pairs.iter().filter(|(one, other)| arrived(one) && arrived(other));
         let differences_s: Vec<f64> = both.map(|(one, other)| one.time_s - other.time_s).collect();
         Self {
-            method: row.method,
+            method: row.method.clone(),
             alpha: row.alpha,
-            other: other.method,
+            other: other.method.clone(),
             other_alpha: other.alpha,
             n: pairs.len(),
             n_only_one,
@@ -73,15 +74,18 @@ impl Comparison {
 
     /// Of all rows that are compared.
     pub(super) fn all(rows: &[(&Row, &[DriveResult])]) -> Vec<Self> {
-        let with = |method: Method| rows.iter().filter(move |(row, _)| row.method == method);
+        let with = |who: Entrant| rows.iter().filter(move |(row, _)| row.method == who);
         let at_one_level = |one: &Row, other: &Row| match (one.alpha, other.alpha) {
             (Some(one), Some(other)) => one == other,
             _ => true,
         };
         let mut all = Vec::new();
-        for [method, other] in COMPARED {
-            for &one in with(method) {
-                let others = with(other).filter(|(row, _)| at_one_level(one.0, row));
+        let ours = COMPARED.map(|pair| pair.map(Entrant::from));
+        let external = rows.iter().map(|(row, _)| &row.method).filter(|who| who.method().is_none());
+        let with_pietra = external.map(|who| [Method::Pietra.into(), who.clone()]);
+        for [who, other] in ours.into_iter().chain(with_pietra) {
+            for &one in with(who) {
+                let others = with(other.clone()).filter(|(row, _)| at_one_level(one.0, row));
                 all.extend(others.map(|&other| Self::of(one, other)));
             }
         }
@@ -94,9 +98,10 @@ mod tests {
     use super::super::drive::driven;
     use super::*;
 
-    fn drives(method: Method, alpha: Option<f64>, ended: &[(Outcome, f64)]) -> Vec<DriveResult> {
-        let drives = ended.iter().zip(0..);
-        let drives = drives.map(|(&(outcome, time_s), pair)| driven(method, alpha, pair, outcome, time_s));
+    fn drives(who: impl Into<Entrant>, alpha: Option<f64>, ended: &[(Outcome, f64)]) -> Vec<DriveResult> {
+        let (who, drives) = (who.into(), ended.iter().zip(0..));
+        let drives =
+            drives.map(|(&(outcome, time_s), pair)| driven(who.clone(), alpha, pair, outcome, time_s));
         drives.collect()
     }
 
@@ -115,8 +120,8 @@ mod tests {
         let all = Comparison::all(&[(&rows[0], &one), (&rows[1], &other)]);
         assert_eq!(all.len(), 1);
         let found = &all[0];
-        assert_eq!((found.method, found.alpha), (Method::Pietra, Some(0.6)));
-        assert_eq!((found.other, found.other_alpha), (Method::Nominal, None));
+        assert_eq!((&found.method, found.alpha), (&Method::Pietra.into(), Some(0.6)));
+        assert_eq!((&found.other, found.other_alpha), (&Method::Nominal.into(), None));
         // The fifth start was driven by one of them alone.
         assert_eq!((found.n, found.n_only_one, found.n_only_other), (4, 1, 1));
         assert_eq!(found.p_value, 1.0);
@@ -134,5 +139,22 @@ mod tests {
         let compared = Comparison::all(&rows);
         let levels: Vec<_> = compared.iter().map(|found| [found.alpha, found.other_alpha]).collect();
         assert_eq!(levels, [[Some(0.4); 2], [Some(0.8); 2]]);
+    }
+    #[test]
+    fn planners_of_others_are_compared_with_pietra_at_every_level() {
+        let goal: &[(Outcome, f64)] = &[(Outcome::Goal, 40.0)];
+        let mine = Entrant::External("mine".parse().unwrap());
+        let all = [
+            drives(Method::Pietra, Some(0.4), goal),
+            drives(Method::Pietra, Some(0.8), goal),
+            drives(Method::Evora, Some(0.4), goal),
+            drives(mine.clone(), None, goal),
+        ];
+        let rows = all.each_ref().map(|drives| Row::of(drives).unwrap());
+        let rows: Vec<(&Row, &[DriveResult])> = rows.iter().zip(all.iter().map(Vec::as_slice)).collect();
+        let compared = Comparison::all(&rows);
+        let told: Vec<_> = compared.iter().map(|found| (&found.method, found.alpha, &found.other)).collect();
+        let pietra = Entrant::from(Method::Pietra);
+        assert_eq!(told, [(&pietra, Some(0.4), &mine), (&pietra, Some(0.8), &mine)]);
     }
 }

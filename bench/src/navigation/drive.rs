@@ -4,19 +4,21 @@ use std::collections::BTreeMap;
 use std::fmt;
 
 use bicycle::{Decision, Model, StopReason};
-use scenarios::{Outcome, RockMap, Split, Task, seed_of};
+use scenarios::{Episode, Outcome, RockMap, Split, Task, seed_of};
 use serde::{Deserialize, Serialize};
 use traversability::CvarLevel;
 
+use super::external::{Answers, ComputeTime, External};
 use super::plan::Settings;
-use crate::closed_loop::{ClosedLoop, Drive, MapSource, Method};
+use super::{Entrant, PlannerName};
+use crate::closed_loop::{ClosedLoop, Drive, DriveError, MapSource, Method};
 use crate::sweep::BrokenDrive;
 
 /// One drive in numbers. Positions are those of the rear axle's centre in the map frame.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct DriveResult {
-    /// What the controller knew of the ground.
-    pub method: Method,
+    /// Who drove.
+    pub method: Entrant,
     /// Risk tolerance (CVaR level); null where the method knows no distribution.
     pub alpha: Option<f64>,
     /// Map, from 0.
@@ -39,16 +41,26 @@ pub struct DriveResult {
     pub failed_at_m: Option<[f64; 2]>,
     /// Cycles in which the controller asked for a stop, by reason.
     pub stops: BTreeMap<StopReason, u64>,
+    /// How long a planner of other people's took for its commands.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub compute: Option<ComputeTime>,
 }
 
 /// A drive to be done.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub(super) struct Job {
-    pub method: Method,
+    pub who: Entrant,
     /// `None` where the method knows no distribution.
     pub level: Option<CvarLevel>,
     pub map: u32,
     pub pair: u32,
+}
+
+impl DriveResult {
+    /// Whether both ended the same way; how long a planner took for its commands is another time each time.
+    pub fn ended_like(&self, other: &Self) -> bool {
+        Self { compute: None, ..self.clone() } == Self { compute: None, ..other.clone() }
+    }
 }
 
 /// How a drive ended, in a word or two.
@@ -69,7 +81,7 @@ pub fn name_of_outcome(outcome: Outcome) -> &'static str {
 
 impl fmt::Display for Job {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        formatter.write_str(self.method.name())?;
+        formatter.write_str(self.who.name())?;
         if let Some(level) = self.level {
             write!(formatter, ", alpha {}", level.get())?;
         }
@@ -80,51 +92,77 @@ impl fmt::Display for Job {
 impl Job {
     /// Whether this drive gave that result.
     pub(super) fn is_of(&self, drive: &DriveResult) -> bool {
-        (self.method, self.level.map(CvarLevel::get), self.map, self.pair)
-            == (drive.method, drive.alpha, drive.map, drive.pair)
+        (&self.who, self.level.map(CvarLevel::get), self.map, self.pair)
+            == (&drive.method, drive.alpha, drive.map, drive.pair)
     }
 
-    pub(super) fn drive(&self, settings: &Settings) -> Result<DriveResult, BrokenDrive> {
-        let mut closed_loop = self.begin(settings)?;
+    pub(super) fn drive(
+        &self,
+        settings: &Settings,
+        external: &External<'_>,
+    ) -> Result<DriveResult, BrokenDrive> {
+        match &self.who {
+            Entrant::Ours(method) => self.drive_ours(*method, settings),
+            Entrant::External(name) => self.drive_external(name, settings, external),
+        }
+    }
+
+    fn drive_ours(&self, method: Method, settings: &Settings) -> Result<DriveResult, BrokenDrive> {
+        let mut closed_loop = self.begin(method, settings)?;
         let mut stops = BTreeMap::new();
-        let outcome = loop {
-            if let Some(outcome) = closed_loop.episode.outcome() {
-                break outcome;
-            }
+        while closed_loop.episode.outcome().is_none() {
             if let Decision::Stop(reason) = closed_loop.cycle()?.decision {
                 *stops.entry(reason).or_default() += 1;
             }
-        };
-        Ok(self.result(&closed_loop, outcome, stops))
+        }
+        Ok(self.result(&closed_loop.episode, Answers { stops, ..Answers::default() }))
     }
 
-    fn begin(&self, settings: &Settings) -> Result<ClosedLoop, BrokenDrive> {
+    fn drive_external(
+        &self,
+        name: &PlannerName,
+        settings: &Settings,
+        external: &External<'_>,
+    ) -> Result<DriveResult, BrokenDrive> {
+        let Settings { vehicle, episode, .. } = settings;
+        let episode = Episode::new(self.task(settings)?, vehicle, episode.clone(), self.seed(settings))
+            .map_err(DriveError::from)?;
+        let (episode, answers) = external(name, episode).map_err(BrokenDrive::External)?;
+        Ok(self.result(&episode, answers))
+    }
+
+    fn task(&self, settings: &Settings) -> Result<Task, BrokenDrive> {
         let map = RockMap { seed: settings.seed, split: Split::Test, index: self.map };
+        Ok(Task::on_rock_map(&settings.field, map, self.pair)?)
+    }
+
+    /// Of the sensors' noise, the same whoever drives.
+    fn seed(&self, settings: &Settings) -> u64 {
+        seed_of(settings.seed, &[0xD21E, self.map.into(), self.pair.into()])
+    }
+
+    fn begin(&self, method: Method, settings: &Settings) -> Result<ClosedLoop, BrokenDrive> {
         Ok(ClosedLoop::new(Drive {
-            task: Task::on_rock_map(&settings.field, map, self.pair)?,
+            task: self.task(settings)?,
             vehicle: &settings.vehicle,
             model: Model::of(&settings.vehicle),
             config: settings.config.clone(),
             episode: settings.episode.clone(),
-            method: self.method,
+            method,
             networks: None,
             corrector: None,
             map_source: MapSource::Sensed,
             level: self.level.unwrap_or(CvarLevel::MEAN),
-            seed: seed_of(settings.seed, &[0xD21E, self.map.into(), self.pair.into()]),
+            seed: self.seed(settings),
         })?)
     }
 
-    fn result(
-        &self,
-        closed_loop: &ClosedLoop,
-        outcome: Outcome,
-        stops: BTreeMap<StopReason, u64>,
-    ) -> DriveResult {
-        let episode = &closed_loop.episode;
+    /// Of an episode that has ended; one that has not was broken off.
+    fn result(&self, episode: &Episode, answers: Answers) -> DriveResult {
+        let outcome = episode.outcome().unwrap_or(Outcome::Stopped);
         let pose = episode.motion().pose;
         DriveResult {
-            method: self.method,
+            method: self.who.clone(),
             alpha: self.level.map(CvarLevel::get),
             map: self.map,
             pair: self.pair,
@@ -135,7 +173,8 @@ impl Job {
             largest_roll_deg: episode.largest_roll_rad().to_degrees(),
             largest_pitch_deg: episode.largest_pitch_rad().to_degrees(),
             failed_at_m: (outcome != Outcome::Goal).then_some([pose.x_m, pose.y_m]),
-            stops,
+            stops: answers.stops,
+            compute: ComputeTime::of(&answers.cycles_ms),
         }
     }
 }
@@ -143,14 +182,14 @@ impl Job {
 /// A drive that ended so, for tests of what is made of drives.
 #[cfg(test)]
 pub(super) fn driven(
-    method: Method,
+    method: impl Into<Entrant>,
     alpha: Option<f64>,
     pair: u32,
     outcome: Outcome,
     time_s: f64,
 ) -> DriveResult {
     DriveResult {
-        method,
+        method: method.into(),
         alpha,
         map: 0,
         pair,
@@ -162,5 +201,6 @@ pub(super) fn driven(
         largest_pitch_deg: 12.0,
         failed_at_m: (outcome != Outcome::Goal).then_some([20.0, 31.26]),
         stops: BTreeMap::new(),
+        compute: None,
     }
 }

@@ -12,6 +12,8 @@ use serde::{Deserialize, Serialize};
 use traversability::CvarLevel;
 
 use super::drive::{DriveResult, Job};
+use super::external::External;
+use super::{Entrant, PlannerName};
 use crate::closed_loop::Method;
 use crate::sweep::{SweepError, hash_of, sweep};
 
@@ -23,6 +25,8 @@ pub const VEHICLE: &str = "pietra_full_size";
 pub struct Request {
     /// What the controller knows of the ground; a row each, for every level where there are levels.
     pub methods: Vec<Method>,
+    /// Planners of other people's; a row each.
+    pub planners: Vec<PlannerName>,
     /// Risk tolerances of the methods that know distributions, see [`Method::has_level`].
     pub levels: Vec<CvarLevel>,
     /// What the ground looks like.
@@ -46,6 +50,9 @@ pub struct Plan {
     pub vehicle: String,
     /// What the controller knows of the ground.
     pub methods: Vec<Method>,
+    /// Planners of other people's.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub planners: Vec<PlannerName>,
     /// Risk tolerances of the methods that know distributions.
     pub levels: Vec<CvarLevel>,
     /// What the ground looks like.
@@ -115,13 +122,25 @@ impl Plan {
     /// # Errors
     /// Nothing to drive, a field that cannot be, or an instruction set that the machine lacks.
     pub fn new(request: &Request) -> Result<Self, SweepError> {
-        let Request { methods, levels, field, seed, n_maps, n_pairs, time_limit_s, isa } = request.clone();
+        let Request { methods, planners, levels, field, seed, n_maps, n_pairs, time_limit_s, isa } =
+            request.clone();
         field.validate()?;
         let isa = Instructions::find(isa)?.isa();
         let vehicle = VEHICLE.to_owned();
         let config_hash = hash_of(&config_for(&formats::read_vehicle(VEHICLE)?, Isa::Auto))?;
-        let plan =
-            Self { vehicle, methods, levels, field, seed, n_maps, n_pairs, time_limit_s, isa, config_hash };
+        let plan = Self {
+            vehicle,
+            methods,
+            planners,
+            levels,
+            field,
+            seed,
+            n_maps,
+            n_pairs,
+            time_limit_s,
+            isa,
+            config_hash,
+        };
         if plan.jobs(Shard::WHOLE).next().is_none() {
             return Err(SweepError::NoDrives {
                 expected: "at least one map, one pair, one method and, for methods with a level, one alpha",
@@ -135,8 +154,8 @@ impl Plan {
         self.jobs(shard).count()
     }
 
-    /// Does the drives of a part that are not among `known`; `after_drive` sees each one as it ends, in any order and
-    /// on any thread, and an error of its ends the work.
+    /// Does the drives of a part that are not among `known`, those of planners of other people's by way of `external`;
+    /// `after_drive` sees each one as it ends, in any order and on any thread, and an error of its ends the work.
     ///
     /// # Errors
     /// No threads to be had, a drive that could not begin or go on, or an error of `after_drive`.
@@ -145,28 +164,30 @@ impl Plan {
         shard: Shard,
         known: &[DriveResult],
         n_threads: usize,
+        external: &External<'_>,
         after_drive: impl Fn(&DriveResult) -> Result<(), SweepError> + Sync,
     ) -> Result<Vec<DriveResult>, SweepError> {
         let is_known = |job: &Job| known.iter().any(|drive| job.is_of(drive));
         let jobs: Vec<Job> = self.jobs(shard).filter(|job| !is_known(job)).collect();
         let settings = self.settings()?;
-        sweep(&jobs, n_threads, |job| job.drive(&settings), after_drive)
+        sweep(&jobs, n_threads, |job| job.drive(&settings, external), after_drive)
     }
 
-    /// Methods with their levels, in the order of the rows.
-    pub(super) fn rows(&self) -> impl Iterator<Item = (Method, Option<CvarLevel>)> {
-        self.methods.iter().flat_map(|&method| match method.has_level() {
-            true => self.levels.iter().map(|&level| (method, Some(level))).collect(),
-            false => vec![(method, None)],
-        })
+    /// Who drives at which level, in the order of the rows.
+    pub(super) fn rows(&self) -> impl Iterator<Item = (Entrant, Option<CvarLevel>)> {
+        let ours = self.methods.iter().flat_map(|&method| match method.has_level() {
+            true => self.levels.iter().map(|&level| (method.into(), Some(level))).collect(),
+            false => vec![(method.into(), None)],
+        });
+        ours.chain(self.planners.iter().map(|name| (Entrant::External(name.clone()), None)))
     }
 
     /// Row by row, each row by ascending map and pair.
     pub(super) fn jobs(&self, shard: Shard) -> impl Iterator<Item = Job> {
         let (n_maps, n_pairs) = (self.n_maps, self.n_pairs);
-        self.rows().flat_map(move |(method, level)| {
+        self.rows().flat_map(move |(who, level)| {
             let pairs = (0..n_maps * n_pairs).filter(move |&pair| shard.holds(pair));
-            pairs.map(move |pair| Job { method, level, map: pair / n_pairs, pair: pair % n_pairs })
+            pairs.map(move |pair| Job { who: who.clone(), level, map: pair / n_pairs, pair: pair % n_pairs })
         })
     }
 
@@ -199,6 +220,7 @@ mod tests {
     fn plan(methods: &[Method], levels: &[f64], n_maps: u32, n_pairs: u32) -> Result<Plan, SweepError> {
         Plan::new(&Request {
             methods: methods.to_vec(),
+            planners: Vec::new(),
             levels: levels.iter().map(|&level| CvarLevel::new(level).unwrap()).collect(),
             field: RockFieldConfig::default(),
             seed: 1,

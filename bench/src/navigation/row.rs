@@ -1,19 +1,18 @@
-//! What the drives of one method and level add up to.
+//! What the drives of one entrant and level add up to.
 
 use std::collections::BTreeMap;
 
 use scenarios::Outcome;
 use serde::Serialize;
 
-use super::DriveResult;
-use crate::closed_loop::Method;
+use super::{ComputeTime, DriveResult, Entrant};
 use crate::statistics::{Mean, wilson_interval};
 
 /// One row of the table.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Row {
-    /// What the controller knew of the ground.
-    pub method: Method,
+    /// Who drove.
+    pub method: Entrant,
     /// Risk tolerance (CVaR level); null where the method knows no distribution and one row holds for every level.
     pub alpha: Option<f64>,
     /// Drives.
@@ -33,10 +32,13 @@ pub struct Row {
     pub largest_tilt_deg: Mean,
     /// Drives by how they ended.
     pub outcomes: BTreeMap<Outcome, usize>,
+    /// How long a planner of other people's took for its commands.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub compute: Option<ComputeTime>,
 }
 
 impl Row {
-    /// Of the drives of one method and level; `None` of no drive.
+    /// Of the drives of one entrant and level; `None` of no drive.
     pub fn of(drives: &[DriveResult]) -> Option<Self> {
         let first = drives.first()?;
         let mut outcomes = BTreeMap::new();
@@ -50,7 +52,7 @@ impl Row {
         let (n, n_goal) = (drives.len(), times_s.len());
         let [wilson_low, wilson_high] = wilson_interval(n_goal, n);
         Some(Self {
-            method: first.method,
+            method: first.method.clone(),
             alpha: first.alpha,
             n,
             n_goal,
@@ -60,12 +62,13 @@ impl Row {
             median_time_to_goal_s: median(times_s),
             largest_tilt_deg: Mean::of(&tilts_deg)?,
             outcomes,
+            compute: ComputeTime::over(drives),
         })
     }
 }
 
 /// The middle value, or the mean of the two in the middle.
-fn median(mut values: Vec<f64>) -> Option<f64> {
+pub(super) fn median(mut values: Vec<f64>) -> Option<f64> {
     values.sort_by(f64::total_cmp);
     let upper = values.get(values.len() / 2)?;
     let lower = values.get((values.len() - 1) / 2)?;
@@ -76,6 +79,7 @@ fn median(mut values: Vec<f64>) -> Option<f64> {
 mod tests {
     use super::super::drive::driven;
     use super::*;
+    use crate::closed_loop::Method;
 
     #[test]
     fn median_is_the_middle() {

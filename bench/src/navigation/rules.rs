@@ -4,7 +4,7 @@
 use scenarios::Outcome;
 
 use super::comparison::Comparison;
-use super::{DriveResult, Row};
+use super::{DriveResult, Entrant, Row};
 use crate::Verdict;
 use crate::closed_loop::Method;
 use crate::statistics::{Mean, wilson_interval};
@@ -28,8 +28,11 @@ const ORDER: [(Method, Method, bool); 5] = [
 /// A row with its drives.
 type Driven<'a> = (&'a Row, &'a [DriveResult]);
 
-/// All rules that the rows allow to judge.
+/// All rules that the rows allow to judge. They are of the methods: planners of other people's were not thought of.
 pub(super) fn verdicts(rows: &[Driven<'_>]) -> Vec<Verdict> {
+    let rows: Vec<Driven<'_>> =
+        rows.iter().filter(|(row, _)| row.method.method().is_some()).copied().collect();
+    let rows = &rows[..];
     let mut verdicts: Vec<Verdict> = field(rows).into_iter().collect();
     verdicts.extend(ORDER.iter().filter_map(|&rule| order(rows, rule)));
     if let Some(best) = best(rows) {
@@ -111,11 +114,12 @@ fn best_success(best: &Row) -> Verdict {
 /// Nothing where there is none to be compared with.
 fn shortest(rows: &[Driven<'_>], best: Driven<'_>) -> Option<Verdict> {
     let is_rival = |row: &Row| {
-        !matches!(row.method, Method::Pietra | Method::Truth) && row.success >= best.0.success - POINTS_BELOW
+        !matches!(row.method.method(), Some(Method::Pietra | Method::Truth))
+            && row.success >= best.0.success - POINTS_BELOW
     };
     let rivals = rows.iter().filter(|(row, _)| is_rival(row));
-    let compared: Vec<(Method, Mean)> = rivals
-        .filter_map(|&rival| Some((rival.0.method, Comparison::of(best, rival).time_difference_s?)))
+    let compared: Vec<(&Entrant, Mean)> = rivals
+        .filter_map(|&rival| Some((&rival.0.method, Comparison::of(best, rival).time_difference_s?)))
         .collect();
     let faster = compared.iter().filter(|(_, difference_s)| difference_s.value > 0.0);
     let behind: Vec<String> = faster

@@ -6,7 +6,7 @@ use std::os::unix::fs::MetadataExt;
 use std::str::FromStr;
 
 use iceoryx2::config::Config;
-use iceoryx2::node::{Node, NodeBuilder, NodeState};
+use iceoryx2::node::{Node, NodeBuilder, NodeState, NodeView};
 use iceoryx2::port::publisher::PublisherCreateError;
 use iceoryx2::port::subscriber::SubscriberCreateError;
 use iceoryx2::prelude::{
@@ -238,6 +238,18 @@ impl Bus {
                 },
             )?;
         Ok(Inlet::new(channel, service, subscriber, failures, self.clock.clone()))
+    }
+
+    /// Whether another process of the run is alive.
+    pub fn has_company(&self) -> bool {
+        let mut has_company = false;
+        // Who cannot be listed cannot be talked to.
+        Node::<ipc::Service>::list(self.node.config(), |state| {
+            has_company |= matches!(&state, NodeState::Alive(other) if other.id() != self.node.id());
+            if has_company { CallbackProgression::Stop } else { CallbackProgression::Continue }
+        })
+        .ok();
+        has_company
     }
 
     /// Clears away what dead processes of the run have left behind. What fails may be another process that does the same

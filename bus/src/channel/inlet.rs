@@ -160,6 +160,11 @@ impl<H: Header, T: Element> Inlet<H, T> {
         }
     }
 
+    /// Whether somebody has the way into the channel, or had it and died without anybody's clearing that away.
+    pub fn has_publisher(&self) -> bool {
+        self.service.dynamic_config().number_of_publishers() > 0
+    }
+
     /// What became of the messages so far.
     pub fn counts(&self) -> &Counts {
         &self.counts

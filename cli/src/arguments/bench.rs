@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use ::bench::navigation::Shard;
+use ::bench::navigation::{PlannerName, PlannerNameError, Shard};
 use clap::{Args, Subcommand, ValueEnum};
 
 use super::{Method, values};
@@ -130,7 +130,17 @@ pub struct BenchNavigationArguments {
     )]
     pub methods: Vec<Method>,
 
-    /// Risk tolerances in (0, 1], separated by commas; truth and nominal know none and are driven once
+    /// Have a planner of your own drive, too, as often as there are planners: this command, which joins the run that
+    /// SUREFOOT_RUN names and answers every odometry with a command, see docs/navigation.md
+    #[arg(long = "planner", value_name = "NAME=COMMAND", value_parser = planner, help_heading = "Your own planner")]
+    pub planners: Vec<PlannerArgument>,
+
+    /// Longest time that a planner may take to join and for one command [s]
+    #[arg(long, value_name = "SECONDS", default_value = "60", value_parser = values::timeout_s,
+          allow_hyphen_values = true, requires = "planners", help_heading = "Your own planner")]
+    pub planner_timeout: f64,
+
+    /// Risk tolerances in (0, 1], separated by commas; truth, nominal and planners of your own know none and are driven once
     #[arg(long, value_name = "LEVEL,..", value_delimiter = ',', value_parser = values::cvar_level,
           default_value = "0.4,0.6,0.8", allow_hyphen_values = true)]
     pub alpha: Vec<f64>,
@@ -168,7 +178,7 @@ pub struct BenchNavigationArguments {
 
     /// Drive nothing and make the table of the drives in these folders, separated by commas
     #[arg(long, value_name = "DIR,..", value_delimiter = ',', help_heading = "Long work",
-          conflicts_with_all = ["methods", "alpha", "maps", "pairs", "seed", "field", "time_limit", "shard", "resume",
+          conflicts_with_all = ["methods", "planners", "alpha", "maps", "pairs", "seed", "field", "time_limit", "shard", "resume",
                                 "threads", "isa"])]
     pub merge: Vec<PathBuf>,
 
@@ -179,6 +189,15 @@ pub struct BenchNavigationArguments {
     /// Where the results go.
     #[command(flatten)]
     pub results: super::ResultArguments,
+}
+
+/// A planner of the user's own.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct PlannerArgument {
+    /// Under which name it drives.
+    pub name: PlannerName,
+    /// What starts it.
+    pub command: String,
 }
 
 /// What to train and judge.
@@ -224,6 +243,12 @@ pub struct BenchLearningArguments {
     pub results: super::ResultArguments,
 }
 
+fn planner(word: &str) -> Result<PlannerArgument, String> {
+    let (name, command) = word.split_once('=').unwrap_or((word, ""));
+    let name = name.parse().map_err(|error: PlannerNameError| error.to_string())?;
+    Ok(PlannerArgument { name, command: values::command(command)? })
+}
+
 fn pair_count(word: &str) -> Result<u32, String> {
     values::count(word, 1000, "pairs").map(|n| n as u32)
 }
@@ -257,6 +282,8 @@ navigation_alpha.png (success, time and tilt over alpha), and navigation.json wi
   verdicts     rule, found, is_passed
   drives       of each map and pair, from 0: outcome, time_s, path_length_m, distance_to_goal_m, largest_roll_deg,
                largest_pitch_deg, failed_at_m, stops
+Rows and drives of a planner of your own also have compute: n_cycles, median_ms and p99_ms of its commands by the
+machine's clock. It is compared with pietra on the same starts; the rules are of the methods alone.
 What is broken off goes on with --resume. Parts that --shard did on several machines become one table with --merge; it
 is the table of one run to the byte, for any number of threads.
 
@@ -268,7 +295,9 @@ Example, days in pieces:
   surefoot bench navigation --out table; surefoot bench navigation --out table --resume
 Example, one of 40 jobs of an array, and what its last one does:
   surefoot bench navigation --shard 7/40 --out part7
-  surefoot bench navigation --merge part1,part2,part3 --out table";
+  surefoot bench navigation --merge part1,part2,part3 --out table
+Example, a planner of your own beside two methods on the first pair of every map:
+  surefoot bench navigation --planner \"mine=python my_planner.py\" --methods pietra,nominal --alpha 0.6 --pairs 1";
 
 const LEARNING_ABOUT: &str = "\
 Repeats PIETRA's learning benchmark: drives a testbed of rock fields, trains six methods on its even ground with every \

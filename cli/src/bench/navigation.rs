@@ -1,6 +1,7 @@
 //! `surefoot bench navigation`: the drives, a bar meanwhile, and the table as text, JSON, picture and page.
 
 mod kept;
+mod planners;
 
 use std::sync::{Mutex, PoisonError};
 
@@ -16,6 +17,7 @@ use crate::arguments::BenchNavigationArguments;
 use crate::output::WithRevision;
 use crate::{UsageError, progress, summary};
 use kept::{Header, JOURNAL};
+use planners::Planners;
 
 pub(crate) fn run_navigation(arguments: &BenchNavigationArguments) -> anyhow::Result<()> {
     if !arguments.merge.is_empty() {
@@ -24,6 +26,8 @@ pub(crate) fn run_navigation(arguments: &BenchNavigationArguments) -> anyhow::Re
         return finish(&plan.report(&drives), arguments);
     }
     let plan = Plan::new(&request(arguments)?).map_err(told_request)?;
+    // Before anything is written: a planner that does not start is to cost nobody a folder or a drive.
+    let planners = Planners::start(arguments)?;
     arguments.results.prepare()?;
     let header = Header::of(&plan);
     let path = arguments.results.file(JOURNAL);
@@ -31,12 +35,12 @@ pub(crate) fn run_navigation(arguments: &BenchNavigationArguments) -> anyhow::Re
         true => kept::resumed(&path, &header)?,
         false => (Journal::create(&path, &header)?, Vec::new()),
     };
-    drives.extend(drive(&plan, &drives, journal, arguments)?);
+    drives.extend(drive((&plan, &planners), &drives, journal, arguments)?);
     finish(&plan.report(&drives), arguments)
 }
 
 fn drive(
-    plan: &Plan,
+    (plan, planners): (&Plan, &Planners),
     known: &[DriveResult],
     journal: Journal,
     arguments: &BenchNavigationArguments,
@@ -46,13 +50,19 @@ fn drive(
     bar.inc(known.len() as u64);
     let journal = Mutex::new(journal);
     let began_s = cpu_s();
-    let driven = plan.drive(shard, known, arguments.kernels.threads.count(), |drive| {
-        bar.set_message(report::navigation::drive_text(drive));
-        bar.inc(1);
-        // What a panic elsewhere left is still a file open for more.
-        let mut journal = journal.lock().unwrap_or_else(PoisonError::into_inner);
-        journal.append(drive).map_err(SweepError::from)
-    });
+    let driven = plan.drive(
+        shard,
+        known,
+        arguments.kernels.threads.count(),
+        &|name, episode| planners.drive(name, episode),
+        |drive| {
+            bar.set_message(report::navigation::drive_text(drive));
+            bar.inc(1);
+            // What a panic elsewhere left is still a file open for more.
+            let mut journal = journal.lock().unwrap_or_else(PoisonError::into_inner);
+            journal.append(drive).map_err(SweepError::from)
+        },
+    );
     bar.finish_and_clear();
     let driven = driven.map_err(told)?;
     if !driven.is_empty() {
@@ -76,6 +86,7 @@ fn request(arguments: &BenchNavigationArguments) -> Result<Request, UsageError> 
     }
     Ok(Request {
         methods: arguments.methods.iter().map(|&method| method.into()).collect(),
+        planners: arguments.planners.iter().map(|planner| planner.name.clone()).collect(),
         levels: levels.collect::<Result<_, _>>().map_err(UsageError::from_input)?,
         field,
         seed: arguments.seed,

@@ -1,7 +1,7 @@
 //! What the risk tolerance does: success, time to the goal and tilt over alpha, a line for every method.
 
 use bench::closed_loop::Method;
-use bench::navigation::{Report, Row};
+use bench::navigation::{Entrant, Report, Row};
 use bench::statistics::Mean;
 
 use crate::Picture;
@@ -17,6 +17,12 @@ const BELOW: f64 = 90.0;
 /// Marks of the same tolerance stand so far apart, method by method.
 const ASIDE: f64 = 0.012;
 const TEXT: TextStyle = TextStyle::new(18, Anchor::Start);
+
+/// Of planners of other people's, in the order of their rows and then anew.
+const OTHERS: [Rgb; 4] = [Rgb::INK_SOFT, Rgb(0xb0, 0x7a, 0x3c), Rgb(0x5e, 0x9e, 0x9a), Rgb(0xc2, 0x6f, 0xa8)];
+
+/// Who is drawn, and in which colour.
+type Line<'a> = (&'a Entrant, Rgb);
 
 /// A value with the ends of its interval, if it has one.
 type Mark = (f64, Option<[f64; 2]>);
@@ -34,25 +40,29 @@ struct Quantity {
 /// # Errors
 /// The encoder refuses.
 pub fn picture(report: &Report) -> Result<Option<Picture>, EncodeError> {
-    let methods = methods(report);
-    let is_swept = methods.iter().any(|method| levels_of(report, *method).len() > 1);
+    let lines = lines(report);
+    let is_swept = lines.iter().any(|(who, _)| levels_of(report, who).len() > 1);
     if !is_swept {
         return Ok(None);
     }
     let caption = "Success, time to the goal and tilt over the risk tolerance".to_owned();
-    Ok(Some(Picture { file: "navigation_alpha.png", caption, png: drawn(report, &methods).png()? }))
+    Ok(Some(Picture { file: "navigation_alpha.png", caption, png: drawn(report, &lines).png()? }))
 }
 
 /// In the order of their rows.
-fn methods(report: &Report) -> Vec<Method> {
-    let mut methods: Vec<Method> = report.rows.iter().map(|row| row.method).collect();
-    methods.dedup();
-    methods
+fn lines(report: &Report) -> Vec<Line<'_>> {
+    let mut entrants: Vec<&Entrant> = report.rows.iter().map(|row| &row.method).collect();
+    entrants.dedup();
+    let mut others = OTHERS.iter().cycle();
+    let coloured = entrants
+        .into_iter()
+        .filter_map(|who| Some((who, who.method().map(colour).or_else(|| others.next().copied())?)));
+    coloured.collect()
 }
 
 /// A method's rows by ascending tolerance, without those that know none.
-fn levels_of(report: &Report, method: Method) -> Vec<(f64, &Row)> {
-    let rows = report.rows.iter().filter(|row| row.method == method);
+fn levels_of<'a>(report: &'a Report, who: &Entrant) -> Vec<(f64, &'a Row)> {
+    let rows = report.rows.iter().filter(|row| row.method == *who);
     let mut levels: Vec<(f64, &Row)> = rows.filter_map(|row| Some((row.alpha?, row))).collect();
     levels.sort_by(|a, b| a.0.total_cmp(&b.0));
     levels
@@ -100,65 +110,71 @@ fn quantities(report: &Report) -> [Quantity; 3] {
     ]
 }
 
-fn drawn(report: &Report, methods: &[Method]) -> Canvas {
+fn drawn(report: &Report, lines: &[Line<'_>]) -> Canvas {
     let n = report.plan.n_maps * report.plan.n_pairs;
     let told = format!(
         "{}, seed {}, {n} starts and goals a point; bars are 95 % intervals; who knows no tolerance is a dashed line",
         report.plan.vehicle, report.plan.seed
     );
     let mut canvas = Canvas::titled(TOP + HEIGHT + BELOW, "What the risk tolerance does", &[&told]);
-    draw_legend(methods, &mut canvas);
+    draw_legend(lines, &mut canvas);
     let width = (PAGE_WIDTH - LEFT - MARGIN - 2.0 * GAP) / 3.0;
     for (place, quantity) in quantities(report).into_iter().enumerate() {
         let frame = Rect { x: LEFT + (width + GAP) * place as f64, y: TOP, width, height: HEIGHT };
         let (x, y) = (Range { low: 0.0, high: 1.05 }, Range { low: quantity.low, high: quantity.high });
-        draw_panel(report, methods, &quantity, &Axes { frame, x, y }, &mut canvas);
+        draw_panel(report, lines, &quantity, &Axes { frame, x, y }, &mut canvas);
     }
     canvas
 }
 
-fn draw_legend(methods: &[Method], canvas: &mut Canvas) {
+fn draw_legend(lines: &[Line<'_>], canvas: &mut Canvas) {
     let mut x = LEFT;
-    for &method in methods {
-        draw_mark((x, 132.0), colour(method), canvas);
-        canvas.text((x + 16.0, 138.0), method.name(), TEXT);
-        x += 56.0 + 10.0 * method.name().len() as f64;
+    for (who, colour) in lines {
+        draw_mark((x, 132.0), *colour, canvas);
+        canvas.text((x + 16.0, 138.0), who.name(), TEXT);
+        x += 56.0 + 10.0 * who.name().len() as f64;
     }
 }
 
-fn draw_panel(report: &Report, methods: &[Method], quantity: &Quantity, axes: &Axes, canvas: &mut Canvas) {
+fn draw_panel(report: &Report, lines: &[Line<'_>], quantity: &Quantity, axes: &Axes, canvas: &mut Canvas) {
     axes.draw_rules(canvas);
     axes.draw_frame(canvas);
     axes.draw_x_ticks(canvas);
     axes.draw_y_ticks(canvas);
     axes.draw_x_label(canvas, "risk tolerance alpha [-]");
     canvas.text((axes.frame.x, axes.frame.y - 14.0), quantity.heading, TEXT.bold());
-    for (place, &method) in methods.iter().enumerate() {
-        let aside = ASIDE * (place as f64 - 0.5 * (methods.len() - 1) as f64);
-        let levels = levels_of(report, method);
+    for (place, &(who, colour)) in lines.iter().enumerate() {
+        let aside = ASIDE * (place as f64 - 0.5 * (lines.len() - 1) as f64);
+        let levels = levels_of(report, who);
         if levels.is_empty() {
-            draw_level_line(report, method, quantity, axes, canvas);
+            draw_level_line(report, (who, colour), quantity, axes, canvas);
         }
         let marks = levels.iter().filter_map(|(alpha, row)| Some((alpha + aside, (quantity.of)(row)?)));
         let marks: Vec<(f64, Mark)> = marks.collect();
         let line: Vec<Point> = marks.iter().map(|(alpha, (value, _))| axes.place(*alpha, *value)).collect();
-        canvas.polyline(&line, Stroke::solid(colour(method), 2.0));
+        canvas.polyline(&line, Stroke::solid(colour, 2.0));
         for (alpha, (value, interval)) in marks {
             if let Some([low, high]) = interval {
                 let ends = [low, high].map(|end| axes.place(alpha, end));
-                canvas.line(ends[0], ends[1], Stroke::solid(colour(method), 2.0));
+                canvas.line(ends[0], ends[1], Stroke::solid(colour, 2.0));
             }
-            draw_mark(axes.place(alpha, value), colour(method), canvas);
+            draw_mark(axes.place(alpha, value), colour, canvas);
         }
     }
 }
 
 /// Who knows no tolerance does the same at any.
-fn draw_level_line(report: &Report, method: Method, quantity: &Quantity, axes: &Axes, canvas: &mut Canvas) {
-    let row = report.rows.iter().find(|row| row.method == method);
+fn draw_level_line(
+    report: &Report,
+    (who, colour): Line<'_>,
+    quantity: &Quantity,
+    axes: &Axes,
+    canvas: &mut Canvas,
+) {
+    let row = report.rows.iter().find(|row| row.method == *who);
     if let Some((value, _)) = row.and_then(quantity.of) {
         let [from, to] = [axes.x.low, axes.x.high].map(|alpha| axes.place(alpha, value));
-        canvas.line(from, to, Stroke { dash: "9 6", ..Stroke::solid(colour(method), 2.0) });
+        canvas.line(from, to, Stroke { dash: "9 6", ..Stroke::solid(colour, 2.0) });
     }
 }
 

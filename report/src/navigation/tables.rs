@@ -1,7 +1,6 @@
 //! The numbers of the navigation benchmark as tables.
 
-use bench::closed_loop::Method;
-use bench::navigation::{Comparison, Report, Row, name_of_outcome};
+use bench::navigation::{Comparison, Entrant, Report, Row, name_of_outcome};
 use scenarios::Outcome;
 
 use crate::table::Table;
@@ -9,18 +8,24 @@ use crate::table::Table;
 /// How often every row arrives, how long it takes, and how it fails.
 pub(super) fn rows(report: &Report) -> Table {
     let n_all = report.n_missing + report.drives.len();
-    let note = match report.n_missing {
-        0 => String::new(),
-        n => format!("{n} of {n_all} drives are missing"),
-    };
-    Table {
-        title: "Goals reached".to_owned(),
-        note,
-        header: ["method", "alpha", "goal", "success [95 % Wilson]", "median time", "failures"]
-            .map(str::to_owned)
-            .into(),
-        rows: report.rows.iter().map(row).collect(),
+    let mut notes = Vec::new();
+    if report.n_missing > 0 {
+        notes.push(format!("{} of {n_all} drives are missing", report.n_missing));
     }
+    let mut header: Vec<String> =
+        ["method", "alpha", "goal", "success [95 % Wilson]", "median time", "failures"]
+            .map(str::to_owned)
+            .into();
+    let has_compute = report.rows.iter().any(|row| row.compute.is_some());
+    if has_compute {
+        header.push("a command [ms]".to_owned());
+        notes.push("a command: median and, of the worst drive, 99 of 100, by the machine's clock; no simulated time passes".to_owned());
+    }
+    let mut rows: Vec<Vec<String>> = report.rows.iter().map(row).collect();
+    if has_compute {
+        rows.iter_mut().zip(&report.rows).for_each(|(cells, row)| cells.push(compute(row)));
+    }
+    Table { title: "Goals reached".to_owned(), note: notes.join("\n"), header, rows }
 }
 
 fn row(row: &Row) -> Vec<String> {
@@ -36,6 +41,11 @@ fn row(row: &Row) -> Vec<String> {
         row.median_time_to_goal_s.map_or("-".to_owned(), |time_s| format!("{time_s:.1} s")),
         if failures.is_empty() { "-".to_owned() } else { failures.join(", ") },
     ]
+}
+
+/// How long a planner of other people's took for a command.
+fn compute(row: &Row) -> String {
+    row.compute.map_or("-".to_owned(), |compute| format!("{:.1}, {:.1}", compute.median_ms, compute.p99_ms))
 }
 
 /// Alpha as it was asked for, "any" where the method knows none.
@@ -56,13 +66,13 @@ pub(super) fn comparisons(report: &Report) -> Table {
 }
 
 fn comparison(compared: &Comparison) -> Vec<String> {
-    let name = |method: Method, alpha: Option<f64>| match alpha {
-        Some(alpha) => format!("{} {alpha}", method.name()),
-        None => method.name().to_owned(),
+    let name = |who: &Entrant, alpha: Option<f64>| match alpha {
+        Some(alpha) => format!("{} {alpha}", who.name()),
+        None => who.name().to_owned(),
     };
     vec![
-        name(compared.method, compared.alpha),
-        name(compared.other, compared.other_alpha),
+        name(&compared.method, compared.alpha),
+        name(&compared.other, compared.other_alpha),
         compared.n.to_string(),
         compared.n_only_one.to_string(),
         compared.n_only_other.to_string(),

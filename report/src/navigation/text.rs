@@ -53,13 +53,14 @@ mod tests {
     use std::collections::BTreeMap;
 
     use super::*;
-    use bench::navigation::{Plan, Request};
+    use bench::navigation::{ComputeTime, Entrant, Plan, PlannerName, Request};
     use bicycle::StopReason;
     use scenarios::{Outcome, RockFieldConfig};
 
     fn report(outcomes: &[Outcome]) -> Report {
         let request = Request {
             methods: vec![bench::closed_loop::Method::Physics],
+            planners: Vec::new(),
             levels: vec![traversability::CvarLevel::new(0.6).expect("a level")],
             field: RockFieldConfig::default(),
             seed: 1,
@@ -69,7 +70,7 @@ mod tests {
             isa: mppi::Isa::Portable,
         };
         let drives = outcomes.iter().zip(0..).map(|(&outcome, k)| DriveResult {
-            method: bench::closed_loop::Method::Physics,
+            method: bench::closed_loop::Method::Physics.into(),
             alpha: Some(0.6),
             map: k / 5,
             pair: k % 5,
@@ -81,6 +82,7 @@ mod tests {
             largest_pitch_deg: 12.0,
             failed_at_m: (outcome != Outcome::Goal).then_some([20.0, 31.26]),
             stops: BTreeMap::from([(StopReason::StaleScan, 1), (StopReason::NoFeasibleRollout, 41)]),
+            compute: None,
         });
         Plan::new(&request).expect("a plan").report(&drives.collect::<Vec<_>>())
     }
@@ -100,6 +102,24 @@ mod tests {
             assert!(line.contains(place) && line.contains("stopped after 48.0 s at (20.0, 31.3)"), "{line}");
             assert!(line.ends_with("12.3 m left, no feasible rollout 41x"), "{line}");
         }
+    }
+
+    #[test]
+    fn what_a_command_took_is_told_where_there_are_planners_of_others() {
+        let ours = report(&[Outcome::Goal]);
+        assert!(!text(&ours).contains("a command"));
+        let name: PlannerName = "mine".parse().expect("a name");
+        let mut drives = ours.drives.clone();
+        drives.push(DriveResult {
+            method: Entrant::External(name.clone()),
+            alpha: None,
+            compute: Some(ComputeTime { n_cycles: 480, median_ms: 12.34, p99_ms: 45.67 }),
+            ..drives[0].clone()
+        });
+        let told = text(&Plan { planners: vec![name], ..ours.plan }.report(&drives));
+        let line =
+            |who: &str| told.lines().find(|line| line.trim().starts_with(who)).expect("a row").trim_end();
+        assert!(line("mine").ends_with("12.3, 45.7") && line("physics").ends_with('-'), "{told}");
     }
 
     #[test]

@@ -8,7 +8,7 @@ use crate::harness::{Fate, Reader, Rng};
 use crate::mutate::{self, once_in, one_of};
 
 /// Calls that hold every kind of value, options and values apart.
-const CALLS: [&str; 15] = [
+const CALLS: [&str; 16] = [
     "drive --world rocks --start -3,4.5,0.7 --goal 10,-2 --alpha 0.6 --seed 3 --time-limit 60 --threads 2",
     "drive --world arena --bush-height 0.2 --deviation steering_delay=0.2 --deviation slope_pull=0.8,-0.1",
     "drive --world hill.npz --deviation flat_tyre=2,0.9,0.5,0.02 --deviation motor_droop --isa portable",
@@ -18,6 +18,7 @@ const CALLS: [&str; 15] = [
     "bench learned-map --threads 2 --updates 50 --networks 32-32:8,64-64:8,96-64:16",
     "bench navigation --alpha 0.3,0.6,1 --maps 2 --pairs 3 --seed 4 --field f.toml --shard 1/3 --resume --methods physics,pietra --time-limit 120 --out o",
     "bench navigation --merge a,b --out o",
+    "bench navigation --planner mine=true --planner-timeout 5 --methods nominal --maps 1 --pairs 1 --time-limit 0.1 --out o",
     "bench risk --densities 0,0.4,1 --alpha 0.2,1 --runs 200 --seed 1 --isa avx2 --out o",
     "bench correction --methods plain,corrected-blind,adapted --runs 50 --minutes 30 --epochs 50 --seed 1 --out o",
     "collect --world rocks --maps 10 --trials 20 --test-height-scale 1.5 --elevation-origin 3,-4 --out a",

@@ -56,7 +56,7 @@ pub(super) fn merged(folders: &[PathBuf]) -> anyhow::Result<(Plan, Vec<DriveResu
         for drive in content.results {
             match drives.iter().find(|known| of_same_job(known, &drive)) {
                 None => drives.push(drive),
-                Some(known) if *known == drive => {}
+                Some(known) if known.ended_like(&drive) => {}
                 Some(_) => {
                     let name = report::navigation::drive_text(&drive);
                     return Err(WorkFailed(told(format!("another folder has another end of {name}"))).into());
@@ -75,7 +75,7 @@ fn read(path: &Path) -> Result<Option<JournalContent<Header, DriveResult>>, Usag
 }
 
 fn of_same_job(one: &DriveResult, other: &DriveResult) -> bool {
-    (one.method, one.alpha, one.map, one.pair) == (other.method, other.alpha, other.map, other.pair)
+    (&one.method, one.alpha, one.map, one.pair) == (&other.method, other.alpha, other.map, other.pair)
 }
 
 /// What the first entry is in which drives were made under other terms.
