@@ -1,22 +1,25 @@
-"""Planners of your own on the starts and goals of `surefoot bench navigation`, beside surefoot's.
+"""A planner of your own on the starts and goals of `surefoot bench navigation`: pure pursuit on a costmap.
+
+    surefoot bench navigation --planner "pursuit=python navigation_peers.py" --methods pietra --alpha 0.6 --pairs 1
+
+starts this program and drives it over the channels of a run, in lock-step with the simulation. By itself
 
     python navigation_peers.py [picture.png] [maps] [pairs]
 
-Every planner drives the same pairs in lock-step with the simulation, however long it thinks; its time is counted apart. What it
-may know is what the vehicle knows: the measured state and the elevation map of the simulated lidar.
+does that beside surefoot's planner by the physics prior, and leaves the picture. The planner may know what the vehicle
+knows: the measured state and the elevation map of the simulated lidar.
 """
 
 import heapq
-import itertools
 import math
+import os
+import pathlib
+import shlex
+import subprocess
 import sys
-import time
-from collections.abc import Callable, Iterator
+import tempfile
+from collections.abc import Callable
 
-import matplotlib
-
-matplotlib.use("agg")
-import matplotlib.pyplot as plt
 import numpy as np
 import surefoot
 from numpy.typing import NDArray
@@ -25,8 +28,6 @@ State = tuple[float, float, float, float, float]
 Point = tuple[float, float]
 #: Speed and steering angle.
 Command = tuple[float, float]
-#: What a planner makes of state, ground and goal.
-Planner = Callable[[State, surefoot.Surface, Point], Command]
 #: Cells of the costmap have so many of the elevation map along their edge.
 COARSE = 2
 #: Cost of a metre that nobody has seen, beside 1 on level ground.
@@ -46,10 +47,10 @@ class Pursuit:
         self.step_max_m = geometry["ground_clearance_m"]
         self.n_cycles, self.way_m = 0, np.zeros((0, 2))
 
-    def __call__(self, state: State, ground: surefoot.Surface, goal_m: Point) -> Command:
+    def __call__(self, state: State, ground: Callable[[], surefoot.Surface], goal_m: Point) -> Command:
         at_m = np.array(state[:2])
         if self.n_cycles % CYCLES == 0:
-            self.way_m = self.cheapest(ground, at_m, np.array(goal_m))
+            self.way_m = self.cheapest(ground(), at_m, np.array(goal_m))
         self.n_cycles += 1
         away_m = np.hypot(*(self.way_m - at_m).T)
         ahead = np.flatnonzero((away_m > 3.0) & (np.arange(len(away_m)) > np.argmin(away_m)))
@@ -110,64 +111,28 @@ def dijkstra(costs: NDArray[np.float64], start: tuple[int, int], goal: tuple[int
     return cells[::-1]
 
 
-def ours(vehicle: surefoot.Vehicle) -> Planner:
-    """Surefoot's planner by the physics prior."""
-    planner, cycles = surefoot.Planner(vehicle), itertools.count()
-
-    def command(state: State, ground: surefoot.Surface, goal_m: Point) -> Command:
-        # A scan comes every other cycle; in between the map stays as it is.
-        return planner.decide(state, ground if next(cycles) % 2 == 0 else None, goal_m).command
-
-    return command
-
-
-PLANNERS: dict[str, Callable[[surefoot.Vehicle], Planner]] = {"pursuit on a costmap": Pursuit, "surefoot": ours}
+def plan() -> None:
+    """Commands the vehicle of the run that this was started for, drive after drive."""
+    vehicle = surefoot.Vehicle("pietra_full_size")
+    pilot, pursuit = surefoot.Pilot(vehicle), Pursuit(vehicle)
+    for cycle in pilot:
+        if cycle.is_new_drive:
+            pursuit = Pursuit(vehicle)
+        pilot.command(*pursuit(cycle.state, pilot.surface, cycle.goal_m))
 
 
-def drive(name: str, vehicle: surefoot.Vehicle, task: surefoot.Task, seed: int) -> tuple[surefoot.Simulation, float]:
-    """A drive to its end, and the mean time that the planner took for a cycle [ms]."""
-    simulation = surefoot.Simulation(vehicle, task, seed=seed)
-    planner, thought_s, n_cycles = PLANNERS[name](vehicle), 0.0, 0
-    while simulation.outcome is None:
-        began_s = time.perf_counter()
-        command = planner(simulation.state, simulation.surface(), task.goal_m)
-        thought_s, n_cycles = thought_s + time.perf_counter() - began_s, n_cycles + 1
-        surefoot.step_together([simulation], np.array([command], np.float32))
-    return simulation, 1e3 * thought_s / max(n_cycles, 1)
-
-
-def wilson(n_goal: int, n: int) -> tuple[float, float]:
-    """Interval of 95 % of a share (Wilson 1927)."""
-    z2 = 1.96**2
-    middle, half = n_goal + z2 / 2, 1.96 * math.sqrt(n_goal * (n - n_goal) / n + z2 / 4)
-    return (middle - half) / (n + z2), (middle + half) / (n + z2)
-
-
-def pairs(n_maps: int, n_pairs: int) -> Iterator[tuple[int, int]]:
-    return ((map_index, pair) for map_index in range(n_maps) for pair in range(n_pairs))
-
-
-def main(picture: str = "navigation_peers.png", maps: str = "1", pairs_of_a_map: str = "1") -> None:
-    vehicle, drives = surefoot.Vehicle("pietra_full_size"), list(pairs(int(maps), int(pairs_of_a_map)))
-    figure, axes = plt.subplots(1, len(PLANNERS), figsize=(5.2 * len(PLANNERS), 5.4), layout="constrained")
-    for axis, name in zip(axes, PLANNERS):
-        outcomes, milliseconds = [], []
-        for map_index, pair in drives:
-            task = surefoot.Task.navigation(map_index, pair)
-            simulation, cycle_ms = drive(name, vehicle, task, seed=1000 * map_index + pair)
-            outcomes.append(simulation.outcome)
-            milliseconds.append(cycle_ms)
-            print(f"{name}, map {map_index + 1}, pair {pair + 1}: {simulation.outcome} after {simulation.time_s:.1f} s")
-            if (map_index, pair) == drives[0]:
-                axis.imshow(simulation.frame(512))
-                axis.set_title(f"{name}: {simulation.outcome}, {simulation.time_s:.0f} s")
-                axis.set_axis_off()
-        n_goal, n = outcomes.count("goal"), len(outcomes)
-        low, high = wilson(n_goal, n)
-        print(f"{name}: {n_goal} of {n} at the goal [{low:.0%} to {high:.0%}], "
-              f"{np.mean(milliseconds):.1f} ms a cycle")  # fmt: skip
-    figure.savefig(picture, dpi=100)
+def bench(picture: str = "navigation_peers.png", maps: str = "1", pairs: str = "1") -> None:
+    """The benchmark with this planner in it."""
+    planner = f"pursuit={shlex.join([sys.executable, os.path.abspath(__file__)])}"
+    methods = ["--methods", "physics", "--alpha", "0.6", "--maps", maps, "--pairs", pairs]
+    with tempfile.TemporaryDirectory() as out:
+        words = ["bench", "navigation", "--planner", planner, *methods, "--out", out]
+        subprocess.run([sys.executable, "-P", "-m", "surefoot", *words], check=True)
+        pathlib.Path(picture).write_bytes((pathlib.Path(out) / "navigation.png").read_bytes())
 
 
 if __name__ == "__main__":
-    main(*sys.argv[1:])
+    if "SUREFOOT_RUN" in os.environ:
+        plan()
+    else:
+        bench(*sys.argv[1:])

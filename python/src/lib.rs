@@ -11,7 +11,7 @@
 //! - `frames`, `recording`: recordings as tables, maps and clouds.
 //! - `drives`, `gap`, `own_simulator`: the diagnosis over drives of Python's; `ground_gap`: of beliefs about the ground.
 //! - `command_line`: the command `surefoot` of the wheel.
-//! - `running`, `driver`, `keeper`: processes of a run, listened to, directed, and given a vehicle.
+//! - `running`, `driver`, `pilot`, `keeper`: processes of a run, listened to, directed, given a vehicle and given a planner.
 //! - `task`, `simulation`: worlds of `scenarios`, stepped many at a time; `surefoot/environments.py` makes environments of them.
 //! - `plug_in`: costs and models that are functions of Python's, behind the traits of `mppi` and `bicycle`.
 //! - `failure`: errors as Python's exceptions, with the text that the command line prints.
@@ -34,6 +34,7 @@ mod ground_gap;
 mod keeper;
 mod model;
 mod own_simulator;
+mod pilot;
 mod planner;
 mod plug_in;
 mod recording;
@@ -76,6 +77,8 @@ mod _native {
     use crate::ground_gap::{GroundReport, ground};
     #[pymodule_export]
     use crate::model::{Model, SkidSteerModel};
+    #[pymodule_export]
+    use crate::pilot::{Cycle, Pilot};
     #[pymodule_export]
     use crate::plug_in::{PythonModel, SampledRollouts};
     #[pymodule_export]

@@ -180,19 +180,7 @@ impl Run {
     /// "applied_speed_mps", "applied_steering_rad".
     fn odometry<'py>(&self, py: Python<'py>) -> PyResult<Option<(u64, Fields<'py>)>> {
         let found = self.heard(py, |ears| Ears::newest(&ears.bus, &ODOMETRY, &mut ears.odometry))?;
-        let told = |(at_ns, record): (u64, OdometryRecord)| -> PyResult<_> {
-            let dict = PyDict::new(py);
-            dict.set_item("position_m", record.position_m.to_vec())?;
-            dict.set_item("attitude_rad", record.attitude_rad.to_vec())?;
-            dict.set_item("velocity_mps", record.velocity_mps.to_vec())?;
-            dict.set_item("yaw_rate_radps", record.yaw_rate_radps)?;
-            dict.set_item("wheel_speed_mps", record.wheel_speed_mps)?;
-            dict.set_item("steering_rad", record.steering_rad)?;
-            dict.set_item("applied_speed_mps", record.applied_speed_mps)?;
-            dict.set_item("applied_steering_rad", record.applied_steering_rad)?;
-            Ok((at_ns, Fields(dict)))
-        };
-        found.map(told).transpose()
+        found.map(|(at_ns, record)| Ok((at_ns, odometry_dict(py, &record)?))).transpose()
     }
 
     /// A sweep of the range sensor: a dict with "points", float32 (point, 3) [m], "terrain_class", uint8 (point,), and
@@ -341,6 +329,20 @@ impl Run {
     fn __repr__(&self) -> String {
         format!("<surefoot.Run {}>", self.name)
     }
+}
+
+/// Where a vehicle is, as Python is told.
+pub fn odometry_dict<'py>(py: Python<'py>, record: &OdometryRecord) -> PyResult<Fields<'py>> {
+    let dict = PyDict::new(py);
+    dict.set_item("position_m", record.position_m.to_vec())?;
+    dict.set_item("attitude_rad", record.attitude_rad.to_vec())?;
+    dict.set_item("velocity_mps", record.velocity_mps.to_vec())?;
+    dict.set_item("yaw_rate_radps", record.yaw_rate_radps)?;
+    dict.set_item("wheel_speed_mps", record.wheel_speed_mps)?;
+    dict.set_item("steering_rad", record.steering_rad)?;
+    dict.set_item("applied_speed_mps", record.applied_speed_mps)?;
+    dict.set_item("applied_steering_rad", record.applied_steering_rad)?;
+    Ok(Fields(dict))
 }
 
 fn mission_dict<'py>(py: Python<'py>, record: &MissionRecord) -> PyResult<Fields<'py>> {

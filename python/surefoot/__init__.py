@@ -10,6 +10,7 @@ import os as _os
 from surefoot import _native, gap
 from surefoot._native import (
     CostToGo,
+    Cycle,
     Dataset,
     Decision,
     Defect,
@@ -21,6 +22,7 @@ from surefoot._native import (
     Mppi,
     Observations,
     PhysicsPrior,
+    Pilot,
     PythonModel,
     Recording,
     RiskMap,
@@ -45,6 +47,7 @@ from surefoot.planner import Planner
 
 __all__ = [
     "CostToGo",
+    "Cycle",
     "Dataset",
     "Decision",
     "Defect",
@@ -56,6 +59,7 @@ __all__ = [
     "Mppi",
     "Observations",
     "PhysicsPrior",
+    "Pilot",
     "Planner",
     "PythonModel",
     "Recording",

@@ -45,6 +45,49 @@ class CostToGo:
         """
 
 @final
+class Cycle:
+    """What a vehicle says in one cycle, and where it is to go."""
+
+    def __repr__(self) -> str:
+        ...
+
+    @property
+    def goal_m(self) -> tuple[float, float]:
+        """Where to go, x and y in the map frame [m]."""
+
+    @property
+    def imu(self) -> dict[str, Any]:
+        """What the inertial unit felt since the last cycle: a dict with "acceleration_mps2" and "angular_rate_radps", float32
+        (sample, 3) in the body frame.
+        """
+
+    @property
+    def is_new_drive(self) -> bool:
+        """Whether a drive begins with this cycle, the first one too: what was learned of the ground before is of another place."""
+
+    @property
+    def odometry(self) -> dict[str, Any]:
+        """All that is measured of the motion: a dict as `Run.odometry` gives it."""
+
+    @property
+    def scan(self) -> dict[str, Any] | None:
+        """A sweep of the range sensor, where one was finished: a dict with "points", float32 (point, 3) [m] in the body frame,
+        and "terrain_class", uint8 (point,).
+        """
+
+    @property
+    def state(self) -> tuple[float, float, float, float, float]:
+        """The measured state as `Mppi.decide` takes it: x_m, y_m, yaw_rad, speed_mps, steering_rad."""
+
+    @property
+    def time_s(self) -> float:
+        """Simulated time of the drive [s]."""
+
+    @property
+    def tolerance_m(self) -> float:
+        """How near to the goal counts as there [m]."""
+
+@final
 class Dataset:
     """Footprints of a vehicle's drives, with what was measured on them: what networks learn from.
 
@@ -500,6 +543,36 @@ class PhysicsPrior:
         `settings["risk_map"]` lies; without them the map covers all of the ground. Maps are made from scratch, on all cores
         and without Python's lock. Raises `ValueError` where cells of map and ground cannot line up.
         """
+
+@final
+class Pilot:
+    """A planner's place in a run: it hears a vehicle cycle by cycle and commands it.
+
+    Pilot(vehicle, run=None): joins the processes of that name, without one those that `SUREFOOT_RUN` names, as it does where
+    `surefoot bench navigation --planner` has started the planner. Iterating over it gives a `Cycle` whenever the vehicle has
+    measured while its mission says to drive, and ends when everybody else has left the run. A drive in lock-step goes on
+    with `command`. Raises `RuntimeError` while another process commands the vehicle.
+    """
+
+    def __iter__(self) -> Pilot:
+        ...
+
+    def __new__(cls, vehicle: Vehicle, run: str | None=None) -> Pilot:
+        ...
+
+    def __next__(self) -> Cycle:
+        ...
+
+    def __repr__(self) -> str:
+        ...
+
+    def command(self, speed_mps: SupportsFloat | SupportsIndex, steering_rad: SupportsFloat | SupportsIndex) -> None:
+        """Commands a speed [m/s], negative in reverse, and an angle of the front wheels [rad], left positive, decided on the
+        last cycle. A benchmark goes on by the first command of a cycle. Raises `ValueError` for what is no number.
+        """
+
+    def surface(self) -> Surface:
+        """The ground as the scans of this drive have shown it, fused as `surefoot drive` does it: a copy."""
 
 @final
 class PythonModel:

@@ -7,8 +7,8 @@ import sys
 import pytest
 
 FOLDER = pathlib.Path(__file__).resolve().parent.parent / "examples"
-#: What takes a minute and a learner that is not installed here.
-BY_HAND = {"ppo_smoke"}
+#: What takes a learner or a controller that is not installed here.
+BY_HAND = {"ppo_smoke", "navigation_pytorch_mppi"}
 EXAMPLES = sorted(path for path in FOLDER.glob("*.py") if path.stem not in BY_HAND)
 
 

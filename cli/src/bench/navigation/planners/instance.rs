@@ -4,12 +4,13 @@
 use std::cell::RefCell;
 use std::process::ChildStdin;
 use std::sync::mpsc::{Receiver, Sender, channel};
-use std::thread::{Builder, JoinHandle, sleep};
-use std::time::{Duration, Instant};
+use std::thread::{Builder, JoinHandle};
+use std::time::Duration;
 
 use ::bench::navigation::PlannerName;
 use bicycle::Limits;
 use bus::channel::{Bus, RunName};
+use bus::clock::{self, SECOND_NS};
 use scenarios::Episode;
 use simulator::{Answer, LockStep, LockStepError, Patience};
 
@@ -19,8 +20,8 @@ use crate::own_process::OwnProcess;
 
 /// The variable that names the run to a planner.
 const RUN: &str = "SUREFOOT_RUN";
-/// Time between two looks whether a planner has joined.
-const LOOK: Duration = Duration::from_millis(10);
+/// Time between two looks whether a planner has joined [ns].
+const LOOK_NS: u64 = SECOND_NS / 100;
 
 /// An episode that was driven to its end.
 type Driven = (Episode, Vec<Answer>);
@@ -123,19 +124,19 @@ impl Seat {
     }
 
     fn await_planner(&self) -> Result<(), WorkFailed> {
-        let began = Instant::now();
+        let until_ns = clock::now_ns() + clock::nanoseconds(self.timeout.as_secs_f64());
         while !self.vehicle.has_planner() {
             if self.has_ended() {
                 let told =
                     format!("expected it to join run {}, found that it ended{}", self.run, self.ending());
                 return Err(failed(&self.planner, &told));
             }
-            if began.elapsed() > self.timeout {
+            if clock::now_ns() > until_ns {
                 let (run, limit_s) = (&self.run, self.timeout.as_secs_f64());
                 let told = format!("expected it to join run {run} within {limit_s} s, found nobody");
                 return Err(failed(&self.planner, &told));
             }
-            sleep(LOOK);
+            clock::sleep_until(clock::now_ns() + LOOK_NS);
         }
         Ok(())
     }
