@@ -3,7 +3,7 @@
 use crate::line::{self, Gate, Line, RouteLine, Undrivable, heading_of};
 use crate::planner::{Planner, PlannerError, RouteError};
 use crate::speed::{Bend, SpeedLimits};
-use crate::tiles::{LEVEL_MAX, TileError, TileMap};
+use crate::tiles::{TileError, TileMap};
 use crate::{GroundCell, RouteConfig};
 use terrain::{Cell, CellRegion, GridMap};
 
