@@ -55,7 +55,8 @@ class Belief:
         """The cell of each place; beyond the map its outermost ring, where nothing moves."""
         col = ((x_m - self.corner_m[0]) / self.resolution_m).clamp(0, self.n_cols - 1).int()
         row = ((y_m - self.corner_m[1]) / self.resolution_m).clamp(0, self.n_rows - 1).int()
-        return row * self.n_cols + col
+        cell: torch.Tensor = row * self.n_cols + col
+        return cell
 
     def risks_at(self, x_m: torch.Tensor, y_m: torch.Tensor, yaw_rad: torch.Tensor) -> tuple[torch.Tensor, ...]:
         turns = yaw_rad / (2 * torch.pi)
