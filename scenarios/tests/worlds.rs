@@ -5,8 +5,9 @@ use std::f64::consts::{FRAC_PI_2, TAU};
 
 use bicycle::Geometry;
 use scenarios::{
-    ARENA_GOAL_M, ARENA_START, ArenaConfig, MAPS_PER_SPLIT, Patch, RockFieldConfig, RockMap, RockPopulation,
-    Split, Stribeck, World, WorldError, arena, arena_floor, arena_parts, arena_way, rock_field,
+    ARENA_GOAL_M, ARENA_START, ArenaConfig, ArenaPart, ArenaWay, MAPS_PER_SPLIT, Patch, RockFieldConfig,
+    RockMap, RockPopulation, Split, Stribeck, World, WorldError, arena, arena_floor, arena_parts, arena_way,
+    rock_field,
 };
 use terrain::{Cell, GridGeometry, GridMap, TerrainClass};
 
