@@ -20,7 +20,7 @@ use traversability::CvarLevel;
 use crate::Verdict;
 use crate::closed_loop::Method;
 use crate::collection::CollectionError;
-use crate::statistics::{Mean, mcnemar_p_value, wilson_interval};
+use crate::statistics::{Mean, Paired, wilson_interval};
 use crate::sweep::{SweepError, hash_of, sweep};
 use run::Job;
 pub use run::{Mission, Run};
@@ -74,16 +74,9 @@ pub struct Row {
 pub struct Comparison {
     /// The other method.
     pub other: Method,
-    /// Runs.
-    pub n: usize,
-    /// Runs in which only `pietra` reached the goal.
-    pub n_only_pietra: usize,
-    /// Runs in which only the other did.
-    pub n_only_other: usize,
-    /// Probability of so uneven a split by chance (McNemar, exact).
-    pub p_value: f64,
-    /// Time of `pietra` less that of the other, where both arrived [s].
-    pub time_difference_s: Option<Mean>,
+    /// Over the runs, `pietra` being the one.
+    #[serde(flatten)]
+    pub paired: Paired,
 }
 
 /// All drives and what they add up to.
@@ -253,21 +246,14 @@ impl Row {
 impl Comparison {
     /// Over the runs that both drove; `None` where there is none.
     fn of(other: Method, runs: &[Run]) -> Option<Self> {
-        let of = |method: Method| runs.iter().filter(move |run| run.method == method);
-        let pairs: Vec<(&Run, &Run)> = of(Method::Pietra).zip(of(other)).collect();
-        let n_arrived = |pietra: bool, other: bool| {
-            pairs.iter().filter(|(a, b)| (a.arrived(), b.arrived()) == (pietra, other)).count()
+        let arrivals_s = |method: Method| {
+            let of_method = runs.iter().filter(move |run| run.method == method);
+            of_method.map(|run| run.arrived().then_some(run.time_s))
         };
-        let (n_only_pietra, n_only_other) = (n_arrived(true, false), n_arrived(false, true));
-        let both = pairs.iter().filter(|(a, b)| a.arrived() && b.arrived());
-        let differences_s: Vec<f64> = both.map(|(a, b)| a.time_s - b.time_s).collect();
-        (!pairs.is_empty()).then(|| Self {
-            other,
-            n: pairs.len(),
-            n_only_pietra,
-            n_only_other,
-            p_value: mcnemar_p_value(n_only_pietra, n_only_other),
-            time_difference_s: Mean::of(&differences_s),
-        })
+        let pairs_s: Vec<[Option<f64>; 2]> = arrivals_s(Method::Pietra)
+            .zip(arrivals_s(other))
+            .map(|(one_s, other_s)| [one_s, other_s])
+            .collect();
+        (!pairs_s.is_empty()).then(|| Self { other, paired: Paired::of(&pairs_s) })
     }
 }

@@ -78,6 +78,41 @@ pub fn mcnemar_p_value(n_more: usize, n_less: usize) -> f64 {
     (2.0 * tail).min(1.0)
 }
 
+/// The same cases driven twice, by one and by another.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Paired {
+    /// Cases.
+    pub n: usize,
+    /// Cases in which only the one reached the goal.
+    pub n_only_one: usize,
+    /// Cases in which only the other did.
+    pub n_only_other: usize,
+    /// Probability of a split at least as uneven by chance, two-sided and exact (McNemar).
+    pub p_value: f64,
+    /// Time to the goal of the one less that of the other, over the cases in which both reached it [s]; bootstrap over
+    /// those cases.
+    pub time_difference_s: Option<Mean>,
+}
+
+impl Paired {
+    /// Of the times in which the one and the other reached the goal [s]; `None` for one that did not.
+    pub(crate) fn of(cases_s: &[[Option<f64>; 2]]) -> Self {
+        let count = |has_arrived: [bool; 2]| {
+            cases_s.iter().filter(|case_s| case_s.map(|time_s| time_s.is_some()) == has_arrived).count()
+        };
+        let (n_only_one, n_only_other) = (count([true, false]), count([false, true]));
+        let differences_s: Vec<f64> =
+            cases_s.iter().filter_map(|[one_s, other_s]| Some((*one_s)? - (*other_s)?)).collect();
+        Self {
+            n: cases_s.len(),
+            n_only_one,
+            n_only_other,
+            p_value: mcnemar_p_value(n_only_one, n_only_other),
+            time_difference_s: Mean::of(&differences_s),
+        }
+    }
+}
+
 /// Tables whose probability is the observed one up to rounding count as equally rare.
 const ROUNDING: f64 = 1.0 + 1e-9;
 

@@ -5,7 +5,7 @@ use serde::Serialize;
 
 use super::{DriveResult, Entrant, Row};
 use crate::closed_loop::Method;
-use crate::statistics::{Mean, mcnemar_p_value};
+use crate::statistics::Paired;
 
 /// Which methods are compared, where both are in the table: at every alpha, or once where neither knows one. With planners
 /// of other people's `pietra` is.
@@ -31,44 +31,26 @@ pub struct Comparison {
     pub other: Entrant,
     /// Its risk tolerance.
     pub other_alpha: Option<f64>,
-    /// Pairs that both drove.
-    pub n: usize,
-    /// Pairs in which only the one reached the goal.
-    pub n_only_one: usize,
-    /// Pairs in which only the other did.
-    pub n_only_other: usize,
-    /// Probability of a split at least as uneven by chance, two-sided and exact (McNemar).
-    pub p_value: f64,
-    /// Time to the goal of the one less that of the other, over the pairs in which both reached it [s]; bootstrap over
-    /// those pairs.
-    pub time_difference_s: Option<Mean>,
+    /// Over the pairs that both drove.
+    #[serde(flatten)]
+    pub paired: Paired,
 }
 
 impl Comparison {
     /// Of two rows' drives.
     pub(super) fn of((row, drives): (&Row, &[DriveResult]), (other, others): (&Row, &[DriveResult])) -> Self {
-        let of_same_pair = |drive: &DriveResult| {
-            others.iter().find(|other| (other.map, other.pair) == (drive.map, drive.pair))
+        let arrival_s = |drive: &DriveResult| (drive.outcome == Outcome::Goal).then_some(drive.time_s);
+        let pair_s = |drive: &DriveResult| {
+            let other = others.iter().find(|other| (other.map, other.pair) == (drive.map, drive.pair))?;
+            Some([arrival_s(drive), arrival_s(other)])
         };
-        let pairs: Vec<(&DriveResult, &DriveResult)> =
-            drives.iter().filter_map(|drive| Some((drive, of_same_pair(drive)?))).collect();
-        let arrived = |drive: &DriveResult| drive.outcome == Outcome::Goal;
-        let n_arrived = |one: bool, other: bool| {
-            pairs.iter().filter(|(a, b)| (arrived(a), arrived(b)) == (one, other)).count()
-        };
-        let (n_only_one, n_only_other) = (n_arrived(true, false), n_arrived(false, true));
-        let both = pairs.iter().filter(|(one, other)| arrived(one) && arrived(other));
-        let differences_s: Vec<f64> = both.map(|(one, other)| one.time_s - other.time_s).collect();
+        let pairs_s: Vec<[Option<f64>; 2]> = drives.iter().filter_map(pair_s).collect();
         Self {
             method: row.method.clone(),
             alpha: row.alpha,
             other: other.method.clone(),
             other_alpha: other.alpha,
-            n: pairs.len(),
-            n_only_one,
-            n_only_other,
-            p_value: mcnemar_p_value(n_only_one, n_only_other),
-            time_difference_s: Mean::of(&differences_s),
+            paired: Paired::of(&pairs_s),
         }
     }
 
@@ -97,6 +79,7 @@ impl Comparison {
 mod tests {
     use super::super::drive::driven;
     use super::*;
+    use crate::statistics::Mean;
 
     fn drives(who: impl Into<Entrant>, alpha: Option<f64>, ended: &[(Outcome, f64)]) -> Vec<DriveResult> {
         let (who, drives) = (who.into(), ended.iter().zip(0..));
@@ -119,13 +102,13 @@ mod tests {
         let rows = [Row::of(&one).unwrap(), Row::of(&other).unwrap()];
         let all = Comparison::all(&[(&rows[0], &one), (&rows[1], &other)]);
         assert_eq!(all.len(), 1);
-        let found = &all[0];
+        let (found, paired) = (&all[0], all[0].paired);
         assert_eq!((&found.method, found.alpha), (&Method::Pietra.into(), Some(0.6)));
         assert_eq!((&found.other, found.other_alpha), (&Method::Nominal.into(), None));
         // The fifth start was driven by one of them alone.
-        assert_eq!((found.n, found.n_only_one, found.n_only_other), (4, 1, 1));
-        assert_eq!(found.p_value, 1.0);
-        assert_eq!(found.time_difference_s, Some(Mean { value: -3.0, low: -3.0, high: -3.0 }));
+        assert_eq!((paired.n, paired.n_only_one, paired.n_only_other), (4, 1, 1));
+        assert_eq!(paired.p_value, 1.0);
+        assert_eq!(paired.time_difference_s, Some(Mean { value: -3.0, low: -3.0, high: -3.0 }));
     }
 
     #[test]

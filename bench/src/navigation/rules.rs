@@ -119,7 +119,7 @@ fn shortest(rows: &[Driven<'_>], best: Driven<'_>) -> Option<Verdict> {
     };
     let rivals = rows.iter().filter(|(row, _)| is_rival(row));
     let compared: Vec<(&Entrant, Mean)> = rivals
-        .filter_map(|&rival| Some((&rival.0.method, Comparison::of(best, rival).time_difference_s?)))
+        .filter_map(|&rival| Some((&rival.0.method, Comparison::of(best, rival).paired.time_difference_s?)))
         .collect();
     let faster = compared.iter().filter(|(_, difference_s)| difference_s.value > 0.0);
     let behind: Vec<String> = faster
@@ -142,7 +142,7 @@ fn alpha_matters(rows: &[Driven<'_>]) -> Option<Verdict> {
         pietra.iter().enumerate().flat_map(|(k, one)| pietra[k + 1..].iter().map(move |two| (*one, *two)));
     let found: Vec<(bool, String)> = pairs
         .map(|(one, two)| {
-            let compared = Comparison::of(one, two);
+            let compared = Comparison::of(one, two).paired;
             let apart = one.0.wilson_high < two.0.wilson_low || two.0.wilson_high < one.0.wilson_low;
             let differs = compared.time_difference_s.is_some_and(|time| time.low > 0.0 || time.high < 0.0);
             let time = compared.time_difference_s.map_or("no common success".to_owned(), |time| {

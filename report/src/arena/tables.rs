@@ -81,9 +81,9 @@ pub(super) fn comparisons(report: &Report) -> Table {
 fn comparison(beside: &Comparison) -> Vec<String> {
     vec![
         beside.other.name().to_owned(),
-        beside.n.to_string(),
-        format!("{} / {}", beside.n_only_pietra, beside.n_only_other),
-        probability(beside.p_value),
-        mean(beside.time_difference_s),
+        beside.paired.n.to_string(),
+        format!("{} / {}", beside.paired.n_only_one, beside.paired.n_only_other),
+        probability(beside.paired.p_value),
+        mean(beside.paired.time_difference_s),
     ]
 }

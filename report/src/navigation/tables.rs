@@ -73,11 +73,11 @@ fn comparison(compared: &Comparison) -> Vec<String> {
     vec![
         name(&compared.method, compared.alpha),
         name(&compared.other, compared.other_alpha),
-        compared.n.to_string(),
-        compared.n_only_one.to_string(),
-        compared.n_only_other.to_string(),
-        format!("{:.4}", compared.p_value),
-        compared.time_difference_s.map_or("-".to_owned(), |time| {
+        compared.paired.n.to_string(),
+        compared.paired.n_only_one.to_string(),
+        compared.paired.n_only_other.to_string(),
+        format!("{:.4}", compared.paired.p_value),
+        compared.paired.time_difference_s.map_or("-".to_owned(), |time| {
             format!("{:+.1} s [{:+.1}, {:+.1}]", time.value, time.low, time.high)
         }),
     ]
