@@ -174,16 +174,20 @@ pub struct Pilot {
     seat: Keeper<Seat>,
 }
 
+/// The run that whoever started the program names, by Python's own view of its variables.
+fn named(py: Python<'_>) -> PyResult<Option<String>> {
+    py.import("os")?.getattr("environ")?.call_method1("get", (RUN,))?.extract()
+}
+
 #[pymethods]
 impl Pilot {
     #[new]
     #[pyo3(signature = (vehicle, run=None))]
     fn new(py: Python<'_>, vehicle: &Vehicle, run: Option<&str>) -> PyResult<Self> {
-        let named = std::env::var(RUN);
-        let name = match (run, &named) {
+        let name = match (run, named(py)?) {
             (Some(run), _) => run_name(run)?,
-            (None, Ok(run)) => run_name(run)?,
-            (None, Err(_)) => return Err(refused("run", format!("a name, here or in {RUN}"), "none")),
+            (None, Some(run)) => run_name(&run)?,
+            (None, None) => return Err(refused("run", format!("a name, here or in {RUN}"), "none")),
         };
         let (own, vehicle) = (name.clone(), vehicle.0.clone());
         let seat = Keeper::start(py, "pilot", move || Seat::take(&own, vehicle), told)?;
