@@ -61,7 +61,8 @@ class Belief:
     def risks_at(self, x_m: torch.Tensor, y_m: torch.Tensor, yaw_rad: torch.Tensor) -> tuple[torch.Tensor, ...]:
         turns = yaw_rad / (2 * torch.pi)
         yaw_bin = ((turns - turns.floor()) * self.n_yaws).clamp(max=self.n_yaws - 1).int()
-        return self.risks.index_select(0, self.cells(x_m, y_m) * self.n_yaws + yaw_bin).unbind(1)
+        risks: tuple[torch.Tensor, ...] = self.risks.index_select(0, self.cells(x_m, y_m) * self.n_yaws + yaw_bin).unbind(1)
+        return risks
 
     def seconds_at(self, x_m: torch.Tensor, y_m: torch.Tensor) -> torch.Tensor:
         return self.seconds.index_select(0, self.cells(x_m, y_m).reshape(-1)).reshape(x_m.shape)
