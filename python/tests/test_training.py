@@ -51,7 +51,7 @@ def test_even_ground_is_what_is_less_uneven():
 def test_what_cannot_be_learned_from_is_told(datasets, tmp_path):
     with pytest.raises(ValueError, match="expected at least one example"):
         datasets[0].even(-1.0)
-    with pytest.raises(ValueError, match='world: expected "testbed", "rocks" or "arena", found "moon"'):
+    with pytest.raises(ValueError, match='world: expected "testbed", "rocks", "arena" or "floor", found "moon"'):
         surefoot.Dataset.collect(CAR, "moon")
     with pytest.raises(ValueError, match="method: expected one of"):
         surefoot.train(*datasets, "magic")
