@@ -60,7 +60,7 @@ pub(super) fn draw(report: &Report, (mission, method): (Mission, Method), frame:
     axes.draw_frame(canvas);
     axes.draw_x_ticks(canvas);
     axes.draw_y_ticks(canvas);
-    axes.draw_x_label(canvas, "east x [m]");
+    axes.draw_x_label(canvas, "east x, north y [m]");
     let told = format!("{}, {} bushes", method.name(), mission.name());
     canvas.text((frame.x, frame.y - 10.0), &told, TextStyle::new(17, Anchor::Start).bold());
 }
