@@ -32,6 +32,15 @@ impl StepCost for KeepOut {
     }
 }
 
+/// Both prices of a step and the disc add up. One type for all tests: the rollouts are compiled once for a type of cost and
+/// an instruction set.
+type Steps = (PerStep, PerStep, KeepOut);
+
+/// Seconds of a step, and no disc.
+fn per_step(price_s: f64) -> Steps {
+    (PerStep(price_s), PerStep(0.0), KeepOut { centre_m: [0.0; 2], radius_m: 0.0 })
+}
+
 /// Seconds per metre of how far north a rollout ends.
 struct NotNorth(f32);
 
@@ -73,7 +82,7 @@ fn a_cost_of_nothing_changes_no_bit() {
     let decisions = |mut decide: Box<dyn FnMut(&Input<'_>) -> Decision>| -> Vec<Decision> {
         (0..5).map(|cycle| decide(&input(&map, cycle))).collect()
     };
-    let (mut none, mut nothing) = (controller(((), ())), controller((PerStep(0.0), NotNorth(0.0))));
+    let (mut none, mut nothing) = (controller(((), ())), controller((per_step(0.0), NotNorth(0.0))));
     let mut new = Controller::new(Config::default(), model(), 3).unwrap();
     let expected = decisions(Box::new(move |input| new.decide(input)));
     assert_eq!(decisions(Box::new(move |input| none.decide(input))), expected);
@@ -87,7 +96,7 @@ fn costs_of_steps_add_up() {
     let map = level();
     for isa in Isa::SETS {
         let config = Config { isa, ..Config::default() };
-        let costs = (PerStep(0.01), PerStep(0.02), KeepOut { centre_m: [0.0, 0.0], radius_m: 100.0 });
+        let costs: Steps = (PerStep(0.01), PerStep(0.02), KeepOut { centre_m: [0.0, 0.0], radius_m: 100.0 });
         let Ok(mut controller) = Controller::with_costs(config, model(), (costs, ()), 3) else { continue };
         for cycle in 0..3 {
             assert!(matches!(controller.decide(&input(&map, cycle)), Decision::Drive(_)));
@@ -103,7 +112,7 @@ fn costs_of_steps_add_up() {
 #[test]
 fn costs_end_at_the_goal() {
     let map = level();
-    let mut controller = controller((PerStep(1.0), ()));
+    let mut controller = controller((per_step(1.0), ()));
     let state = State { speed_mps: 2.0, ..State::default() };
     controller.decide(&Input { state, objective: goal([2.0, 0.0]), ..input(&map, 0) });
     let best = controller.diagnostics().best_terms_s[CostTerm::Added as usize];
@@ -157,7 +166,8 @@ fn a_disc_to_keep_out_of_is_driven_around() {
     };
     let mut without = controller(((), ()));
     assert!(nearest_m(Box::new(move |input| without.decide(input))) < 0.8);
-    let mut with = controller((KeepOut { centre_m: [6.0, 0.2], radius_m: 1.5 }, ()));
+    let disc = KeepOut { centre_m: [6.0, 0.2], radius_m: 1.5 };
+    let mut with = controller(((PerStep(0.0), PerStep(0.0), disc), ()));
     let kept_m = nearest_m(Box::new(move |input| with.decide(input)));
     assert!(kept_m > 1.4, "{kept_m} m");
 }
