@@ -105,6 +105,7 @@ mod tests {
             n_pairs: 1,
             time_limit_s,
             isa: Isa::Portable,
+            plant: scenarios::Engine::Rapier,
         };
         Plan::new(&request).unwrap()
     }

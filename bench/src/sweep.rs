@@ -3,7 +3,7 @@
 use std::fmt::Display;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
-use scenarios::{ArenaError, RockFieldError, WorldError};
+use scenarios::{ArenaError, PlantError, RockFieldError, WorldError};
 
 use crate::closed_loop::DriveError;
 use crate::navigation::ExternalError;
@@ -29,6 +29,9 @@ pub enum SweepError {
     /// There is no such rock field.
     #[error(transparent)]
     Field(#[from] RockFieldError),
+    /// This build has no such plant.
+    #[error(transparent)]
+    Plant(#[from] PlantError),
     /// The machine lacks the instructions that were asked for.
     #[error(transparent)]
     Isa(#[from] bicycle::lanes::IsaAbsent),

@@ -252,6 +252,7 @@ fn made_up_table(n_maps: u32) -> Report {
         n_pairs: 1,
         time_limit_s: 120.0,
         isa: mppi::Isa::Portable,
+        plant: scenarios::Engine::Rapier,
     };
     Plan::new(&request).expect("a plan").report(&drives)
 }

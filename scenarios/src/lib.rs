@@ -49,7 +49,7 @@ pub use layers::{LayerConfig, LayersError, WorldLayers, world_from_layers};
 pub use motion::Motion;
 pub use painted::{Looks, PAINTED_GROUNDS, PaintedConfig, PaintedWorld, painted_world};
 pub use pair::{End, Pair, PairError, PairWish, check_pair, feasible_pair};
-pub use plant::{Collision, CommandError, Plant, PlantError, WheelState, steady_friction};
+pub use plant::{Collision, CommandError, Engine, Plant, PlantError, WheelState, steady_friction};
 pub use random::{seed_of, stream};
 pub use rock_field::{
     MAPS_PER_SPLIT, RockFieldConfig, RockFieldError, RockMap, RockPopulation, Split, rock_field,

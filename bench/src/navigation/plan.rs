@@ -7,7 +7,7 @@ use bicycle::Vehicle;
 use bicycle::lanes::Instructions;
 use mppi::Isa;
 use navigator::Config;
-use scenarios::{EpisodeConfig, RockFieldConfig};
+use scenarios::{Engine, EpisodeConfig, RockFieldConfig};
 use serde::{Deserialize, Serialize};
 use traversability::CvarLevel;
 
@@ -41,6 +41,8 @@ pub struct Request {
     pub time_limit_s: f64,
     /// Instruction set of the controller.
     pub isa: Isa,
+    /// What simulates the vehicle.
+    pub plant: Engine,
 }
 
 /// All drives of a table, and what they have in common: results of two plans that are equal belong into one table.
@@ -69,6 +71,9 @@ pub struct Plan {
     pub isa: Isa,
     /// [`formats::config_hash`] of the pipeline's configuration.
     pub config_hash: String,
+    /// What simulates the vehicle.
+    #[serde(default)]
+    pub plant: Engine,
 }
 
 /// One of `n` equal parts of the work, by start and goal: a pair is driven with every method in the same part.
@@ -122,9 +127,10 @@ impl Plan {
     /// # Errors
     /// Nothing to drive, a field that cannot be, or an instruction set that the machine lacks.
     pub fn new(request: &Request) -> Result<Self, SweepError> {
-        let Request { methods, planners, levels, field, seed, n_maps, n_pairs, time_limit_s, isa } =
+        let Request { methods, planners, levels, field, seed, n_maps, n_pairs, time_limit_s, isa, plant } =
             request.clone();
         field.validate()?;
+        plant.check()?;
         let isa = Instructions::find(isa)?.isa();
         let vehicle = VEHICLE.to_owned();
         let config_hash = hash_of(&config_for(&formats::read_vehicle(VEHICLE)?, Isa::Auto))?;
@@ -140,6 +146,7 @@ impl Plan {
             time_limit_s,
             isa,
             config_hash,
+            plant,
         };
         if plan.jobs(Shard::WHOLE).next().is_none() {
             return Err(SweepError::NoDrives {
@@ -195,6 +202,7 @@ impl Plan {
         let vehicle = formats::read_vehicle(&self.vehicle)?;
         let mut episode = EpisodeConfig::for_vehicle(&vehicle);
         episode.rules.time_limit_s = self.time_limit_s;
+        episode.engine = self.plant;
         Ok(Settings {
             field: self.field.clone(),
             seed: self.seed,
@@ -228,6 +236,7 @@ mod tests {
             n_pairs,
             time_limit_s: 1.0,
             isa: Isa::Portable,
+            plant: Engine::Rapier,
         })
     }
 
@@ -288,5 +297,14 @@ mod tests {
         let plan = plan(&[Method::Pietra, Method::Truth], &[0.1, 0.6], 2, 2).unwrap();
         let text = serde_json::to_string(&plan).unwrap();
         assert_eq!(serde_json::from_str::<Plan>(&text).unwrap(), plan);
+    }
+
+    #[test]
+    fn a_plan_that_names_no_plant_was_driven_in_the_built_in_one() {
+        let plan = plan(&[Method::Truth], &[], 1, 1).unwrap();
+        let text = serde_json::to_string(&plan).unwrap();
+        let old = text.replace(r#","plant":"rapier""#, "");
+        assert_ne!(old, text);
+        assert_eq!(serde_json::from_str::<Plan>(&old).unwrap(), plan);
     }
 }

@@ -168,6 +168,10 @@ pub struct BenchNavigationArguments {
           allow_hyphen_values = true)]
     pub time_limit: f64,
 
+    /// What simulates the vehicle
+    #[arg(long, value_enum, default_value_t = BenchPlant::Rapier)]
+    pub plant: BenchPlant,
+
     /// Do only the I-th of N parts of the work: every method over the same starts and goals
     #[arg(long, value_name = "I/N", help_heading = "Long work")]
     pub shard: Option<Shard>,
@@ -178,7 +182,7 @@ pub struct BenchNavigationArguments {
 
     /// Drive nothing and make the table of the drives in these folders, separated by commas
     #[arg(long, value_name = "DIR,..", value_delimiter = ',', help_heading = "Long work",
-          conflicts_with_all = ["methods", "planners", "alpha", "maps", "pairs", "seed", "field", "time_limit", "shard", "resume",
+          conflicts_with_all = ["methods", "planners", "alpha", "maps", "pairs", "seed", "field", "time_limit", "plant", "shard", "resume",
                                 "threads", "isa"])]
     pub merge: Vec<PathBuf>,
 
@@ -198,6 +202,24 @@ pub struct PlannerArgument {
     pub name: PlannerName,
     /// What starts it.
     pub command: String,
+}
+
+/// What simulates the vehicle of a benchmark.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum BenchPlant {
+    /// The built-in plant
+    Rapier,
+    /// MuJoCo, in a build with --features mujoco (docs/plant.md)
+    Mujoco,
+}
+
+impl From<BenchPlant> for scenarios::Engine {
+    fn from(plant: BenchPlant) -> Self {
+        match plant {
+            BenchPlant::Rapier => Self::Rapier,
+            BenchPlant::Mujoco => Self::Mujoco,
+        }
+    }
 }
 
 /// What to train and judge.
@@ -291,6 +313,8 @@ Example, half a minute:
   surefoot bench navigation --methods physics,nominal --alpha 0.6 --maps 1 --pairs 1
 Example, what the risk tolerance does to one method:
   surefoot bench navigation --methods pietra,truth --alpha 0.1,0.2,0.4,0.6,0.8,1 --maps 5 --pairs 4
+Example, the same in another physics engine (docs/plant.md says how to build it):
+  surefoot bench navigation --plant mujoco --methods physics,nominal --alpha 0.6 --maps 1 --pairs 1
 Example, days in pieces:
   surefoot bench navigation --out table; surefoot bench navigation --out table --resume
 Example, one of 40 jobs of an array, and what its last one does:

@@ -94,13 +94,14 @@ fn request(arguments: &BenchNavigationArguments) -> Result<Request, UsageError> 
         n_pairs: arguments.pairs,
         time_limit_s: arguments.time_limit,
         isa: arguments.kernels.isa.into(),
+        plant: arguments.plant.into(),
     })
 }
 
-/// A field or an instruction set that cannot be is the user's choice.
+/// A field, a plant or an instruction set that cannot be is the user's choice.
 fn told_request(error: SweepError) -> anyhow::Error {
     match error {
-        SweepError::Field(_) | SweepError::Isa(_) | SweepError::NoDrives { .. } => {
+        SweepError::Field(_) | SweepError::Isa(_) | SweepError::Plant(_) | SweepError::NoDrives { .. } => {
             UsageError::from_input(error).into()
         }
         other => told(other),

@@ -9,8 +9,14 @@ use crate::{Picture, html, verdict};
 pub fn page(report: &Report, pictures: &[Picture], revision: &str) -> String {
     let plan = &report.plan;
     let line = format!(
-        "{}, {} maps of seed {} with {} pairs of start and goal each, 40 m apart, time limit {} s, {:?}, revision {revision}.",
-        plan.vehicle, plan.n_maps, plan.seed, plan.n_pairs, plan.time_limit_s, plan.isa
+        "{}, {} maps of seed {} with {} pairs of start and goal each, 40 m apart, time limit {} s, plant {}, {:?}, revision {revision}.",
+        plan.vehicle,
+        plan.n_maps,
+        plan.seed,
+        plan.n_pairs,
+        plan.time_limit_s,
+        plan.plant.name(),
+        plan.isa
     );
     let mut body = html::heading("Navigation benchmark", &line);
     if !report.verdicts.is_empty() {

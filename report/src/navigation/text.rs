@@ -68,6 +68,7 @@ mod tests {
             n_pairs: 5,
             time_limit_s: 120.0,
             isa: mppi::Isa::Portable,
+            plant: scenarios::Engine::Rapier,
         };
         let drives = outcomes.iter().zip(0..).map(|(&outcome, k)| DriveResult {
             method: bench::closed_loop::Method::Physics.into(),

@@ -151,8 +151,9 @@ impl Crossing {
         let (Some(row), Some(walkers)) = (trace.get(cycle), self.history.get(cycle)) else {
             return Ok(false);
         };
+        let world = Arc::clone(&task.world);
         let mut plant =
-            Plant::deviating(&self.vehicle, &config.deviations, Arc::clone(&task.world), task.start)?;
+            Plant::in_engine(config.engine, &self.vehicle, &config.deviations, world, task.start)?;
         let sample_s = IMU_PERIOD_NS as f64 * 1e-9;
         for pair in trace[..=cycle].windows(2) {
             plant.set_command(pair[0].command)?;

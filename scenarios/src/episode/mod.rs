@@ -12,7 +12,7 @@ use bicycle::{Command, Decision, ImuSample, Odometry, Vehicle};
 use terrain::{Scan, SettingError};
 
 use crate::{
-    Collision, CommandError, Deviation, IMU_PERIOD_NS, Imu, ImuConfig, Motion, OdometryConfig,
+    Collision, CommandError, Deviation, Engine, IMU_PERIOD_NS, Imu, ImuConfig, Motion, OdometryConfig,
     OdometrySensor, Plant, PlantError, RangeSensor, RangeSensorConfig, Task, Walker,
 };
 pub use crossing::Strike;
@@ -57,6 +57,8 @@ pub struct EpisodeConfig {
     pub deviations: Vec<Deviation>,
     /// Who walks about.
     pub walkers: Vec<Walker>,
+    /// What simulates the machine.
+    pub engine: Engine,
 }
 
 impl EpisodeConfig {
@@ -72,6 +74,7 @@ impl EpisodeConfig {
             faults: Vec::new(),
             deviations: Vec::new(),
             walkers: Vec::new(),
+            engine: Engine::default(),
         }
     }
 }
@@ -133,7 +136,8 @@ impl Episode {
         seed: u64,
     ) -> Result<Self, EpisodeError> {
         let samples_per_cycle = samples_per_cycle(&config)?;
-        let plant = Plant::deviating(vehicle, &config.deviations, Arc::clone(&task.world), task.start)?;
+        let world = Arc::clone(&task.world);
+        let plant = Plant::in_engine(config.engine, vehicle, &config.deviations, world, task.start)?;
         let range_sensor = match config.range_sensor {
             Some(sensor) => Some(RangeSensor::new(sensor, Arc::clone(&task.world), seed)?),
             None => None,

@@ -12,7 +12,7 @@ use super::ground::Ground;
 use super::rest::{Rest, Stance};
 
 /// Friction of the body's panels on the ground [-].
-const PANEL_FRICTION: f64 = 0.5;
+pub(super) const PANEL_FRICTION: f64 = 0.5;
 /// Steps between checks whether a hull is near the ground.
 const CHECK_STEPS: u32 = 16;
 /// A hull counts as near the ground below this share of the ground clearance.
@@ -280,7 +280,7 @@ impl Chassis {
 
 /// Corners of the boxes in the body frame: the belly between the axles, and what hangs over front and rear, which
 /// ends at hub height so that wheels meet steep ground before bumpers do.
-fn boxes(vehicle: &Vehicle, stance: &Stance) -> [[Vector3<f64>; 2]; 3] {
+pub(super) fn boxes(vehicle: &Vehicle, stance: &Stance) -> [[Vector3<f64>; 2]; 3] {
     let geometry = &vehicle.geometry;
     let belly_m = geometry.ground_clearance_m - stance.axle_height_m;
     let bumper_m = belly_m.max(0.0);

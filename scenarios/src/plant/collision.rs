@@ -1,10 +1,6 @@
 //! What obstacles do to the vehicle.
 
-use nalgebra::{Vector2, Vector3};
-
-use super::chassis::Chassis;
-use super::ground::Ground;
-use super::wheel::{RunningGear, Wheel};
+use nalgebra::Vector2;
 
 /// What obstacles did to the vehicle.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -29,32 +25,27 @@ pub(super) struct Collisions {
 }
 
 impl Collisions {
-    /// Counts what obstacles did in a step that ended at a time.
+    /// Counts the impulse of obstacles in a step that ended at a time, with this level velocity of the centre of gravity
+    /// [m/s] and place of the rear axle's centre [m].
     pub(super) fn count(
         &mut self,
-        (gear, wheels): (&[RunningGear; 4], &[Wheel; 4]),
-        (chassis, ground): (&Chassis, &Ground),
-        (time_s, step_s): (f64, f64),
+        velocity_mps: Vector2<f64>,
+        at_m: [f64; 2],
+        time_s: f64,
+        impulse_ns: impl FnOnce() -> Vector2<f64>,
     ) {
-        if !ground.has_obstacles() {
-            return;
-        }
-        let motion = chassis.motion();
         // A hard body is stopped and thrown back within one step: what counts is how it came.
-        let before_mps = std::mem::replace(&mut self.velocity_mps, motion.linear_mps.xy());
+        let before_mps = std::mem::replace(&mut self.velocity_mps, velocity_mps);
         if self.first.is_some() && before_mps.dot(&self.approach_mps) <= 0.0 {
             self.approach_mps = Vector2::zeros();
             return;
         }
-        let on_wheels = gear.iter().zip(wheels).map(|(gear, wheel)| gear.obstacle_force_n(wheel, ground));
-        let impulse_ns =
-            chassis.obstacle_impulse_ns(ground).xy() + on_wheels.sum::<Vector3<f64>>().xy() * step_s;
+        let impulse_ns = impulse_ns();
         if impulse_ns != Vector2::zeros() {
             if self.first.is_none() {
                 self.approach_mps = before_mps;
             }
             self.impulse_ns += impulse_ns;
-            let at_m = motion.origin_m.xy().into();
             let first = Collision { time_s, at_m, impulse_ns: 0.0 };
             self.first.get_or_insert(first).impulse_ns = self.impulse_ns.norm();
         }

@@ -38,6 +38,24 @@ pub enum PlantError {
         /// The wheel [m].
         found_m: [f64; 2],
     },
+    /// This build has no MuJoCo.
+    #[error(
+        "this build has no plant in MuJoCo: build it by `scripts/mujoco cargo build --features mujoco`, which fetches \
+         the library from the Python package index (docs/plant.md)"
+    )]
+    NoMujoco,
+    /// MuJoCo simulates the machine as described only.
+    #[error("the plant in MuJoCo: expected a machine without deviations, found {n_found}")]
+    DeviationsInMujoco {
+        /// How many there are.
+        n_found: usize,
+    },
+    /// MuJoCo refuses the model.
+    #[error("MuJoCo: {told}")]
+    Mujoco {
+        /// What it says.
+        told: String,
+    },
 }
 
 /// A command that is no number.

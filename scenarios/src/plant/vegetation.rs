@@ -3,6 +3,8 @@
 use bicycle::Vehicle;
 use nalgebra::Vector2;
 
+use super::ground::Ground;
+
 /// Resistance over load for plants as tall as the wheel [-].
 const WHEEL_RESISTANCE: f64 = 0.4;
 /// Resistance over load for plants that reach a wheel's diameter up the bumper [-].
@@ -34,6 +36,17 @@ impl Immersion {
         let ratio = self.height_m / self.diameter_m;
         let above_belly = (self.height_m - self.clearance_m).max(0.0) / self.diameter_m;
         self.density * (WHEEL_RESISTANCE * ratio * ratio + BUMPER_RESISTANCE * above_belly)
+    }
+}
+
+/// How far the plants at a wheel's leading edge reach above its foot, at most as far as they are tall [m].
+pub(crate) fn plants_above_m(ground: &Ground, edge_m: Vector2<f64>, foot_m: f64) -> f64 {
+    let plants_m = f64::from(ground.patch(edge_m.x, edge_m.y).vegetation_height_m);
+    if plants_m > 0.0 {
+        let above_m = ground.height_m(edge_m.x, edge_m.y) + plants_m - foot_m;
+        above_m.clamp(0.0, plants_m)
+    } else {
+        0.0
     }
 }
 

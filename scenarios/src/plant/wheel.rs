@@ -10,7 +10,7 @@ use super::ground::Ground;
 use super::rest::Rest;
 use super::strut::Strut;
 use super::tyre::{Bristles, Footing, Tyre};
-use super::vegetation::{Immersion, Stems};
+use super::vegetation::{Immersion, Stems, plants_above_m};
 use crate::Deviation;
 
 /// Radial damping of the tyre over critical for the wheel [-].
@@ -366,18 +366,12 @@ impl RunningGear {
         // Plants are met at the leading edge of the wheel.
         let ahead_m = self.radius_m.copysign(hub_mps.dot(&frame.forward));
         let edge_m = frame.hub_m + frame.forward * ahead_m;
-        let plants_m = f64::from(ground.patch(edge_m.x, edge_m.y).vegetation_height_m);
-        let mut immersion = Immersion {
-            height_m: plants_m,
+        let immersion = Immersion {
+            height_m: plants_above_m(ground, edge_m.xy(), frame.hub_m.z - self.radius_m),
             diameter_m: 2.0 * self.radius_m,
             clearance_m: self.clearance_m,
             density: self.vegetation_density,
         };
-        if plants_m > 0.0 {
-            let foot_m = frame.hub_m.z - self.radius_m;
-            let above_m = ground.height_m(edge_m.x, edge_m.y) + plants_m - foot_m;
-            immersion.height_m = above_m.clamp(0.0, plants_m);
-        }
         let force_n = wheel.stems.push_n(&immersion, hub_mps.xy(), self.reference_load_n, self.step_s);
         Vector3::new(force_n.x, force_n.y, 0.0)
     }
