@@ -23,8 +23,8 @@ pub use comparison::Comparison;
 pub use drive::{DriveResult, name_of_outcome};
 pub use entrant::{Entrant, PlannerName, PlannerNameError};
 pub use external::{Answers, ComputeTime, External, ExternalError, nobody};
-pub use plan::{Plan, Request, Shard, ShardError, VEHICLE};
-pub use row::Row;
+pub use plan::{Plan, Request, Shard, ShardError};
+pub use row::{JUMP_S, Row};
 
 /// Drives and what they add up to.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -96,6 +96,8 @@ mod tests {
 
     fn plan(time_limit_s: f64) -> Plan {
         let request = Request {
+            vehicle: "pietra_full_size".to_owned(),
+            speed_mps: None,
             methods: vec![Method::Nominal, Method::Physics],
             planners: Vec::new(),
             levels: vec![CvarLevel::new(0.5).unwrap()],

@@ -39,7 +39,7 @@ use clap::{Parser, Subcommand};
 
 pub use bench::{
     BenchCommand, BenchControlArguments, BenchLearningArguments, BenchNavigationArguments,
-    BenchPriorMapArguments, BenchWork, PlannerArgument,
+    BenchPriorMapArguments, BenchWork, NavigationGround, PlannerArgument,
 };
 pub use bench_arena::BenchArenaArguments;
 pub use bench_gap::BenchGapArguments;

@@ -236,6 +236,7 @@ fn made_up_table(n_maps: u32) -> Report {
             distance_to_goal_m: 1.0,
             largest_roll_deg: 14.0,
             largest_pitch_deg: 15.0,
+            longest_flight_s: 0.0,
             failed_at_m: (outcome != Outcome::Goal).then_some([20.0, 30.0]),
             stops: BTreeMap::new(),
             compute: None,
@@ -243,6 +244,8 @@ fn made_up_table(n_maps: u32) -> Report {
     };
     let drives: Vec<_> = (0..5).flat_map(|row| (0..n_maps).map(move |map| drive(row, map))).collect();
     let request = Request {
+        vehicle: "pietra_full_size".to_owned(),
+        speed_mps: None,
         methods: vec![Method::Truth, Method::Physics, Method::Nominal],
         planners: Vec::new(),
         levels: [0.4, 0.6, 0.8].map(|level| CvarLevel::new(level).expect("a level")).into(),

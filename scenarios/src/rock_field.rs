@@ -18,6 +18,9 @@ pub const MAPS_PER_SPLIT: u32 = 10;
 /// Rock above this height is bare rock to the tyre; below it is rubble in the dirt [m].
 const BARE_ROCK_M: f64 = 0.03;
 
+/// Length of the vehicle that the field of the fast table is told for [m].
+const FULL_SIZE_M: f64 = 3.4;
+
 /// What a map is for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -160,6 +163,33 @@ impl RockFieldConfig {
             rolling_std_m: 0.08,
             pad_radius_m: 7.0,
             ..default
+        }
+    }
+
+    /// The field of the fast table, for a vehicle of a length [m]: mounds to fly off, crests that hide what is behind them,
+    /// and boulders that ask for turns, in proportion to the vehicle. None of it is in the way of whoever is slow.
+    pub fn fast(length_m: f64) -> Self {
+        let scale = length_m / FULL_SIZE_M;
+        let population =
+            |per_m2: f64, height_m: [f64; 2], height_to_radius, elongation, gap_m: f64| RockPopulation {
+                density_per_m2: per_m2 / (scale * scale),
+                height_m: height_m.map(|height_m| scale * height_m),
+                height_to_radius,
+                elongation,
+                gap_m: scale * gap_m,
+            };
+        Self {
+            side_m: 50.0,
+            resolution_m: if scale < 0.5 { 0.05 } else { 0.1 },
+            small: population(0.1, [0.02, 0.05], [0.2, 0.4], [1.0, 1.6], 0.0),
+            medium: population(0.02, [0.15, 0.35], [0.15, 0.3], [1.0, 2.0], 2.0),
+            boulders: population(0.004, [1.0, 1.4], [0.4, 0.6], [1.0, 1.3], 8.0),
+            ridges: population(0.003, [0.3, 0.6], [0.18, 0.3], [3.0, 6.0], 4.0),
+            rolling_std_m: scale * 0.15,
+            rolling_wavelength_m: [scale * 5.0, scale * 25.0],
+            friction_variation: 0.08,
+            test_height_scale: 1.0,
+            pad_radius_m: scale * 7.0,
         }
     }
 

@@ -37,6 +37,8 @@ pub struct DriveResult {
     pub largest_roll_deg: f64,
     /// Largest |pitch| of the plant [deg].
     pub largest_pitch_deg: f64,
+    /// Longest time in which no wheel touched the ground [s].
+    pub longest_flight_s: f64,
     /// Where a drive that did not reach the goal ended: x, y [m]; null for one that did.
     pub failed_at_m: Option<[f64; 2]>,
     /// Cycles in which the controller asked for a stop, by reason.
@@ -172,6 +174,7 @@ impl Job {
             distance_to_goal_m: episode.task().distance_to_goal_m(pose.x_m, pose.y_m),
             largest_roll_deg: episode.largest_roll_rad().to_degrees(),
             largest_pitch_deg: episode.largest_pitch_rad().to_degrees(),
+            longest_flight_s: episode.longest_flight_s(),
             failed_at_m: (outcome != Outcome::Goal).then_some([pose.x_m, pose.y_m]),
             stops: answers.stops,
             compute: ComputeTime::of(&answers.cycles_ms),
@@ -199,6 +202,7 @@ pub(super) fn driven(
         distance_to_goal_m: 1.0,
         largest_roll_deg: 10.0,
         largest_pitch_deg: 12.0,
+        longest_flight_s: 0.0,
         failed_at_m: (outcome != Outcome::Goal).then_some([20.0, 31.26]),
         stops: BTreeMap::new(),
         compute: None,

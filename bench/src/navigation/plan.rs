@@ -17,12 +17,13 @@ use super::{Entrant, PlannerName};
 use crate::closed_loop::Method;
 use crate::sweep::{SweepError, hash_of, sweep};
 
-/// Name of the machine that drives.
-pub const VEHICLE: &str = "pietra_full_size";
-
 /// What to measure.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Request {
+    /// The machine: a name that is shipped, or a path.
+    pub vehicle: String,
+    /// Fastest speed that is commanded [m/s]; `None` for that of the machine's description.
+    pub speed_mps: Option<f64>,
     /// What the controller knows of the ground; a row each, for every level where there are levels.
     pub methods: Vec<Method>,
     /// Planners of other people's; a row each.
@@ -48,8 +49,10 @@ pub struct Request {
 /// All drives of a table, and what they have in common: results of two plans that are equal belong into one table.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Plan {
-    /// Name of the machine.
+    /// The machine: a name that is shipped, or a path.
     pub vehicle: String,
+    /// Fastest speed that is commanded [m/s].
+    pub speed_mps: f64,
     /// What the controller knows of the ground.
     pub methods: Vec<Method>,
     /// Planners of other people's.
@@ -127,26 +130,23 @@ impl Plan {
     /// # Errors
     /// Nothing to drive, a field that cannot be, or an instruction set that the machine lacks.
     pub fn new(request: &Request) -> Result<Self, SweepError> {
-        let Request { methods, planners, levels, field, seed, n_maps, n_pairs, time_limit_s, isa, plant } =
-            request.clone();
-        field.validate()?;
-        plant.check()?;
-        let isa = Instructions::find(isa)?.isa();
-        let vehicle = VEHICLE.to_owned();
-        let config_hash = hash_of(&config_for(&formats::read_vehicle(VEHICLE)?, Isa::Auto))?;
+        let machine = machine(&request.vehicle, request.speed_mps)?;
+        request.field.validate()?;
+        request.plant.check()?;
         let plan = Self {
-            vehicle,
-            methods,
-            planners,
-            levels,
-            field,
-            seed,
-            n_maps,
-            n_pairs,
-            time_limit_s,
-            isa,
-            config_hash,
-            plant,
+            vehicle: request.vehicle.clone(),
+            speed_mps: machine.limits.speed_max_mps,
+            methods: request.methods.clone(),
+            planners: request.planners.clone(),
+            levels: request.levels.clone(),
+            field: request.field.clone(),
+            seed: request.seed,
+            n_maps: request.n_maps,
+            n_pairs: request.n_pairs,
+            time_limit_s: request.time_limit_s,
+            isa: Instructions::find(request.isa)?.isa(),
+            config_hash: hash_of(&config_for(&machine, Isa::Auto))?,
+            plant: request.plant,
         };
         if plan.jobs(Shard::WHOLE).next().is_none() {
             return Err(SweepError::NoDrives {
@@ -199,7 +199,7 @@ impl Plan {
     }
 
     fn settings(&self) -> Result<Settings, SweepError> {
-        let vehicle = formats::read_vehicle(&self.vehicle)?;
+        let vehicle = machine(&self.vehicle, Some(self.speed_mps))?;
         let mut episode = EpisodeConfig::for_vehicle(&vehicle);
         episode.rules.time_limit_s = self.time_limit_s;
         episode.engine = self.plant;
@@ -211,6 +211,13 @@ impl Plan {
             vehicle,
         })
     }
+}
+
+/// The machine, with another limit of its speed if one was asked for.
+fn machine(name_or_path: &str, speed_mps: Option<f64>) -> Result<Vehicle, SweepError> {
+    let mut vehicle = formats::read_vehicle(name_or_path)?;
+    vehicle.limits.speed_max_mps = speed_mps.unwrap_or(vehicle.limits.speed_max_mps);
+    Ok(vehicle)
 }
 
 /// What `surefoot drive` uses, on one thread.
@@ -227,6 +234,8 @@ mod tests {
 
     fn plan(methods: &[Method], levels: &[f64], n_maps: u32, n_pairs: u32) -> Result<Plan, SweepError> {
         Plan::new(&Request {
+            vehicle: "pietra_full_size".to_owned(),
+            speed_mps: None,
             methods: methods.to_vec(),
             planners: Vec::new(),
             levels: levels.iter().map(|&level| CvarLevel::new(level).unwrap()).collect(),

@@ -8,6 +8,9 @@ use serde::Serialize;
 use super::{ComputeTime, DriveResult, Entrant};
 use crate::statistics::{Mean, wilson_interval};
 
+/// So long without a wheel on the ground is a jump [s]: it falls by 5 cm meanwhile, or rises by 1 and falls again.
+pub const JUMP_S: f64 = 0.1;
+
 /// One row of the table.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Row {
@@ -30,6 +33,8 @@ pub struct Row {
     pub median_time_to_goal_s: Option<f64>,
     /// Largest |roll| or |pitch| of each drive, however it ended [deg].
     pub largest_tilt_deg: Mean,
+    /// Drives in which all wheels were off the ground for at least [`JUMP_S`].
+    pub n_jumped: usize,
     /// Drives by how they ended.
     pub outcomes: BTreeMap<Outcome, usize>,
     /// How long a planner of other people's took for its commands.
@@ -61,6 +66,7 @@ impl Row {
             wilson_high,
             median_time_to_goal_s: median(times_s),
             largest_tilt_deg: Mean::of(&tilts_deg)?,
+            n_jumped: drives.iter().filter(|drive| drive.longest_flight_s >= JUMP_S).count(),
             outcomes,
             compute: ComputeTime::over(drives),
         })

@@ -145,6 +145,18 @@ pub struct BenchNavigationArguments {
           default_value = "0.4,0.6,0.8", allow_hyphen_values = true)]
     pub alpha: Vec<f64>,
 
+    /// The machine, a shipped name or a file; without networks of its own it is driven by physics, nominal and truth
+    #[arg(long, value_name = "NAME|FILE", default_value = "pietra_full_size")]
+    pub vehicle: String,
+
+    /// Fastest speed that is commanded [m/s] [default: the machine's]
+    #[arg(long, value_name = "M/S", value_parser = top_speed_mps, allow_hyphen_values = true)]
+    pub speed: Option<f64>,
+
+    /// What lies on the ground
+    #[arg(long, value_enum, default_value_t = NavigationGround::Rocks)]
+    pub ground: NavigationGround,
+
     /// Maps, 1 to 1000
     #[arg(long, value_name = "N", value_parser = values::map_count, default_value = "10",
           allow_hyphen_values = true)]
@@ -182,7 +194,7 @@ pub struct BenchNavigationArguments {
 
     /// Drive nothing and make the table of the drives in these folders, separated by commas
     #[arg(long, value_name = "DIR,..", value_delimiter = ',', help_heading = "Long work",
-          conflicts_with_all = ["methods", "planners", "alpha", "maps", "pairs", "seed", "field", "time_limit", "plant", "shard", "resume",
+          conflicts_with_all = ["methods", "planners", "vehicle", "speed", "ground", "alpha", "maps", "pairs", "seed", "field", "time_limit", "plant", "shard", "resume",
                                 "threads", "isa"])]
     pub merge: Vec<PathBuf>,
 
@@ -269,6 +281,21 @@ fn planner(word: &str) -> Result<PlannerArgument, String> {
     let (name, command) = word.split_once('=').unwrap_or((word, ""));
     let name = name.parse().map_err(|error: PlannerNameError| error.to_string())?;
     Ok(PlannerArgument { name, command: values::command(command)? })
+}
+
+/// What lies on the ground of the navigation benchmark.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum NavigationGround {
+    /// Boulders to drive around among rocks that the full-size vehicle rolls over: crawling
+    Rocks,
+    /// Mounds to fly off, crests and a few boulders, in proportion to the vehicle: driving fast
+    Fast,
+}
+
+fn top_speed_mps(word: &str) -> Result<f64, String> {
+    let expected = || format!("expected a speed from 0.1 to 30 m/s, found {word}");
+    let speed_mps: f64 = word.trim().parse().map_err(|_| expected())?;
+    if (0.1..=30.0).contains(&speed_mps) { Ok(speed_mps) } else { Err(expected()) }
 }
 
 fn pair_count(word: &str) -> Result<u32, String> {

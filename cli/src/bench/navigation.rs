@@ -7,13 +7,13 @@ use std::sync::{Mutex, PoisonError};
 
 use ::bench::navigation::{DriveResult, Plan, Report, Request, Shard};
 use ::bench::sweep::SweepError;
-use formats::{ConfigText, Journal, overlay};
+use formats::{ConfigText, Journal, overlay, read_vehicle};
 use rustix::time::{ClockId, clock_gettime};
 use scenarios::RockFieldConfig;
 use traversability::CvarLevel;
 
 use super::sweep::told;
-use crate::arguments::BenchNavigationArguments;
+use crate::arguments::{BenchNavigationArguments, NavigationGround};
 use crate::output::WithRevision;
 use crate::{UsageError, progress, summary};
 use kept::{Header, JOURNAL};
@@ -79,12 +79,18 @@ fn cpu_s() -> f64 {
 
 fn request(arguments: &BenchNavigationArguments) -> Result<Request, UsageError> {
     let levels = arguments.alpha.iter().map(|&alpha| CvarLevel::new(alpha));
-    let mut field = RockFieldConfig::navigation();
+    let vehicle = read_vehicle(&arguments.vehicle).map_err(UsageError::from_input)?;
+    let mut field = match arguments.ground {
+        NavigationGround::Rocks => RockFieldConfig::navigation(),
+        NavigationGround::Fast => RockFieldConfig::fast(vehicle.geometry.length_m),
+    };
     if let Some(path) = &arguments.field {
         let text = ConfigText::read(path).map_err(UsageError::from_input)?;
         field = overlay(&text, &field).map_err(UsageError::from_input)?;
     }
     Ok(Request {
+        vehicle: arguments.vehicle.clone(),
+        speed_mps: arguments.speed,
         methods: arguments.methods.iter().map(|&method| method.into()).collect(),
         planners: arguments.planners.iter().map(|planner| planner.name.clone()).collect(),
         levels: levels.collect::<Result<_, _>>().map_err(UsageError::from_input)?,

@@ -1,6 +1,6 @@
 //! The numbers of the navigation benchmark as tables.
 
-use bench::navigation::{Comparison, Entrant, Report, Row, name_of_outcome};
+use bench::navigation::{Comparison, Entrant, JUMP_S, Report, Row, name_of_outcome};
 use scenarios::Outcome;
 
 use crate::table::Table;
@@ -16,12 +16,20 @@ pub(super) fn rows(report: &Report) -> Table {
         ["method", "alpha", "goal", "success [95 % Wilson]", "median time", "failures"]
             .map(str::to_owned)
             .into();
+    let has_jumped = report.rows.iter().any(|row| row.n_jumped > 0);
+    if has_jumped {
+        header.push("jumped".to_owned());
+        notes.push(format!("jumped: drives with all wheels off the ground for {JUMP_S} s or more"));
+    }
     let has_compute = report.rows.iter().any(|row| row.compute.is_some());
     if has_compute {
         header.push("a command [ms]".to_owned());
         notes.push("a command: median and, of the worst drive, 99 of 100, by the machine's clock; no simulated time passes".to_owned());
     }
     let mut rows: Vec<Vec<String>> = report.rows.iter().map(row).collect();
+    if has_jumped {
+        rows.iter_mut().zip(&report.rows).for_each(|(cells, row)| cells.push(row.n_jumped.to_string()));
+    }
     if has_compute {
         rows.iter_mut().zip(&report.rows).for_each(|(cells, row)| cells.push(compute(row)));
     }

@@ -59,6 +59,8 @@ mod tests {
 
     fn report(outcomes: &[Outcome]) -> Report {
         let request = Request {
+            vehicle: "pietra_full_size".to_owned(),
+            speed_mps: None,
             methods: vec![bench::closed_loop::Method::Physics],
             planners: Vec::new(),
             levels: vec![traversability::CvarLevel::new(0.6).expect("a level")],
@@ -81,6 +83,7 @@ mod tests {
             distance_to_goal_m: 12.34,
             largest_roll_deg: 10.0,
             largest_pitch_deg: 12.0,
+            longest_flight_s: 0.0,
             failed_at_m: (outcome != Outcome::Goal).then_some([20.0, 31.26]),
             stops: BTreeMap::from([(StopReason::StaleScan, 1), (StopReason::NoFeasibleRollout, 41)]),
             compute: None,

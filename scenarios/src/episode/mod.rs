@@ -308,6 +308,11 @@ impl Episode {
         self.referee.largest_pitch_rad()
     }
 
+    /// Longest time so far in which no wheel touched the ground [s].
+    pub fn longest_flight_s(&self) -> f64 {
+        self.referee.longest_flight_s()
+    }
+
     /// True motion and command at the beginning of every cycle so far.
     pub fn trace(&self) -> &[TraceRow] {
         &self.trace

@@ -124,6 +124,9 @@ pub(super) struct Referee {
     path_length_m: f64,
     largest_roll_rad: f64,
     largest_pitch_rad: f64,
+    /// Since when no wheel has touched the ground [s].
+    airborne_since_s: Option<f64>,
+    longest_flight_s: f64,
 }
 
 impl Referee {
@@ -140,6 +143,8 @@ impl Referee {
             path_length_m: 0.0,
             largest_roll_rad: 0.0,
             largest_pitch_rad: 0.0,
+            airborne_since_s: None,
+            longest_flight_s: 0.0,
         }
     }
 
@@ -157,6 +162,10 @@ impl Referee {
 
     pub(super) fn largest_pitch_rad(&self) -> f64 {
         self.largest_pitch_rad
+    }
+
+    pub(super) fn longest_flight_s(&self) -> f64 {
+        self.longest_flight_s
     }
 
     pub(super) fn interrupt(&mut self) {
@@ -185,6 +194,7 @@ impl Referee {
         self.path_length_m += squares.sum::<f64>().sqrt();
         self.largest_roll_rad = self.largest_roll_rad.max(pose.roll_rad.abs());
         self.largest_pitch_rad = self.largest_pitch_rad.max(pose.pitch_rad.abs());
+        self.watch_flight(plant, time_s);
         if self.outcome.is_some() {
             return;
         }
@@ -207,6 +217,15 @@ impl Referee {
         } else {
             None
         };
+    }
+
+    fn watch_flight(&mut self, plant: &Plant, time_s: f64) {
+        if plant.wheels().iter().any(|wheel| wheel.contact_m.is_some()) {
+            self.airborne_since_s = None;
+            return;
+        }
+        let since_s = *self.airborne_since_s.get_or_insert(time_s);
+        self.longest_flight_s = self.longest_flight_s.max(time_s - since_s);
     }
 
     /// Judges what only shows over several cycles.

@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 
-use ::bench::navigation::{Answers, ExternalError, PlannerName, VEHICLE};
+use ::bench::navigation::{Answers, ExternalError, PlannerName};
 use bicycle::{Decision, Limits};
 use scenarios::Episode;
 use simulator::Answer;
@@ -36,10 +36,12 @@ impl Planners {
                 return Err(UsageError(told).into());
             }
         }
+        let mut limits = formats::read_vehicle(&arguments.vehicle)?.limits;
+        limits.speed_max_mps = arguments.speed.unwrap_or(limits.speed_max_mps);
         let planners = Self {
             entered,
             timeout: Duration::from_secs_f64(arguments.planner_timeout),
-            limits: formats::read_vehicle(VEHICLE)?.limits,
+            limits,
             idle: Mutex::default(),
             n_started: AtomicUsize::new(0),
         };
