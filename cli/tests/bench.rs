@@ -207,6 +207,30 @@ fn navigation_goes_on_where_it_was_broken_off_and_parts_make_the_same_table() {
 }
 
 #[test]
+fn navigation_is_driven_by_another_machine_at_another_speed_over_other_ground() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let out = folder.path().join("out");
+    let output = navigation(&out, &["--vehicle", "buggy_fifth", "--speed", "3", "--ground", "fast"]);
+    assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+    let table: Value = serde_json::from_slice(&read(&out, "navigation.json")).expect("JSON");
+    assert_eq!((&table["vehicle"], &table["speed_mps"]), (&"buggy_fifth".into(), &3.0.into()), "{table}");
+    // Boulders of the full-size field are at least 1 m high, and the buggy has a quarter of that machine's length.
+    assert_eq!(table["field"]["boulders"]["height_m"][0], 0.25, "{table}");
+    assert_eq!(table["drives"][0]["longest_flight_s"], 0.0, "{table}");
+    for (words, part) in [
+        (["--speed", "0"], "--speed: expected a speed above 0 and up to 50 m/s, found \"0\""),
+        (["--speed", "nan"], "--speed: expected a speed above 0 and up to 50 m/s, found \"nan\""),
+        (["--vehicle", "nobody"], "nobody"),
+        (["--ground", "sand"], "--ground: expected rocks, fast, found \"sand\""),
+    ] {
+        let output = navigation(&folder.path().join("none"), &words);
+        let told = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{told}");
+        assert!(told.contains(part) && told.lines().count() == 1, "{told}");
+    }
+}
+
+#[test]
 fn slippery_courses_write_table_and_picture_and_refuse_what_cannot_be_driven() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let out = folder.path().join("out");

@@ -82,6 +82,19 @@ fn pairs_of_a_rock_map_differ_and_lie_within_its_borders() {
     assert!(told.contains("side_m") && told.contains("47"), "{told}");
 }
 
+/// A ramp of 0.25 ends 0.3 m high. At 1.2 m/s the front wheels leave it with 0.29 m/s upwards and land after
+/// (0.29 + sqrt(0.29^2 + 2 * 9.81 * 0.3)) / 9.81 = 0.28 s; the rear wheels leave it 0.18 / 1.2 = 0.15 s later. Between these
+/// times no wheel touches the ground, less where the nose falls onto it or the attitude ends the drive first.
+#[test]
+fn the_longest_time_without_a_wheel_on_the_ground_is_told() {
+    let cruise = Decision::Drive(Command { speed_mps: 1.2, steering_rad: 0.0 });
+    let (_, level) = outcome(flat(), cruise);
+    assert_eq!(level.longest_flight_s(), 0.0);
+    let ramp = |x_m: f64| if (4.0..5.2).contains(&x_m) { 0.25 * (x_m - 4.0) } else { 0.0 };
+    let (_, thrown) = outcome(strip(ramp, |_| Patch::open(Stribeck::ASPHALT)), cruise);
+    assert!((0.02..0.28).contains(&thrown.longest_flight_s()), "{}", thrown.longest_flight_s());
+}
+
 #[test]
 fn starting_at_the_goal_is_being_there() {
     let task = Task { goal_m: [2.1, 2.0], ..flat() };

@@ -244,6 +244,22 @@ fn a_rock_field_that_cannot_be_is_refused_by_name() {
     );
 }
 
+/// Half the length: half of all heights and distances, four times as many of everything on a square metre.
+#[test]
+fn the_field_to_drive_fast_over_grows_with_the_vehicle() {
+    let [full, half] = [3.4, 1.7].map(RockFieldConfig::fast);
+    for field in [&full, &half] {
+        field.validate().unwrap();
+    }
+    let of = |field: &RockFieldConfig| [field.small, field.medium, field.boulders, field.ridges];
+    for (large, small) in of(&full).into_iter().zip(of(&half)) {
+        assert!((small.density_per_m2 / large.density_per_m2 - 4.0).abs() < 1e-9);
+        assert_eq!(small.height_m, large.height_m.map(|height_m| 0.5 * height_m));
+        assert_eq!((small.height_to_radius, small.gap_m), (large.height_to_radius, 0.5 * large.gap_m));
+    }
+    assert_eq!((half.rolling_std_m, half.pad_radius_m), (0.5 * full.rolling_std_m, 0.5 * full.pad_radius_m));
+}
+
 #[test]
 fn the_arena_has_a_ramp_bushes_crates_and_a_clear_start_and_goal() {
     let world = arena(&ArenaConfig { bush_height_m: 0.3, ..ArenaConfig::default() }).unwrap();

@@ -150,7 +150,7 @@ pub struct BenchNavigationArguments {
     pub vehicle: String,
 
     /// Fastest speed that is commanded [m/s] [default: the machine's]
-    #[arg(long, value_name = "M/S", value_parser = top_speed_mps, allow_hyphen_values = true)]
+    #[arg(long, value_name = "M/S", value_parser = values::speed_mps, allow_hyphen_values = true)]
     pub speed: Option<f64>,
 
     /// What lies on the ground
@@ -290,12 +290,6 @@ pub enum NavigationGround {
     Rocks,
     /// Mounds to fly off, crests and a few boulders, in proportion to the vehicle: driving fast
     Fast,
-}
-
-fn top_speed_mps(word: &str) -> Result<f64, String> {
-    let expected = || format!("expected a speed from 0.1 to 30 m/s, found {word}");
-    let speed_mps: f64 = word.trim().parse().map_err(|_| expected())?;
-    if (0.1..=30.0).contains(&speed_mps) { Ok(speed_mps) } else { Err(expected()) }
 }
 
 fn pair_count(word: &str) -> Result<u32, String> {
