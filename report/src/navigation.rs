@@ -85,8 +85,9 @@ fn drawn(report: &Report) -> Canvas {
     let shares = Axes { frame, x: Range { low: 0.0, high: 100.0 }, y: rows };
 
     let told = format!(
-        "rocks, 40 m · {} · {} maps with {} pairs of start and goal in every row · time limit {} s{}",
+        "rocks, 40 m · {} at up to {} m/s · {} maps with {} pairs of start and goal in every row · time limit {} s{}",
         report.plan.vehicle,
+        report.plan.speed_mps,
         report.plan.n_maps,
         report.plan.n_pairs,
         report.plan.time_limit_s,
