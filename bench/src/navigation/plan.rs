@@ -75,7 +75,6 @@ pub struct Plan {
     /// [`formats::config_hash`] of the pipeline's configuration.
     pub config_hash: String,
     /// What simulates the vehicle.
-    #[serde(default)]
     pub plant: Engine,
 }
 
@@ -306,14 +305,5 @@ mod tests {
         let plan = plan(&[Method::Pietra, Method::Truth], &[0.1, 0.6], 2, 2).unwrap();
         let text = serde_json::to_string(&plan).unwrap();
         assert_eq!(serde_json::from_str::<Plan>(&text).unwrap(), plan);
-    }
-
-    #[test]
-    fn a_plan_that_names_no_plant_was_driven_in_the_built_in_one() {
-        let plan = plan(&[Method::Truth], &[], 1, 1).unwrap();
-        let text = serde_json::to_string(&plan).unwrap();
-        let old = text.replace(r#","plant":"rapier""#, "");
-        assert_ne!(old, text);
-        assert_eq!(serde_json::from_str::<Plan>(&old).unwrap(), plan);
     }
 }
