@@ -197,8 +197,16 @@ impl Plan {
         })
     }
 
+    /// The machine as it is driven, its limit of speed the plan's.
+    ///
+    /// # Errors
+    /// A file that is no longer there or no machine.
+    pub fn machine(&self) -> Result<Vehicle, SweepError> {
+        machine(&self.vehicle, Some(self.speed_mps))
+    }
+
     fn settings(&self) -> Result<Settings, SweepError> {
-        let vehicle = machine(&self.vehicle, Some(self.speed_mps))?;
+        let vehicle = self.machine()?;
         let mut episode = EpisodeConfig::for_vehicle(&vehicle);
         episode.rules.time_limit_s = self.time_limit_s;
         episode.engine = self.plant;

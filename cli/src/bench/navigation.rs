@@ -27,7 +27,7 @@ pub(crate) fn run_navigation(arguments: &BenchNavigationArguments) -> anyhow::Re
     }
     let plan = Plan::new(&request(arguments)?).map_err(told_request)?;
     // Before anything is written: a planner that does not start is to cost nobody a folder or a drive.
-    let planners = Planners::start(arguments)?;
+    let planners = Planners::start(arguments, plan.machine().map_err(told)?.limits)?;
     arguments.results.prepare()?;
     let header = Header::of(&plan);
     let path = arguments.results.file(JOURNAL);

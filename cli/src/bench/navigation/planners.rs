@@ -25,10 +25,10 @@ pub(super) struct Planners {
 }
 
 impl Planners {
-    /// Starts one process of each and has it join.
+    /// Starts one process of each and has it join; commands are to keep to the limits.
     ///
     /// Errors: a name that was entered twice; a process that does not start or does not join in time.
-    pub(super) fn start(arguments: &BenchNavigationArguments) -> anyhow::Result<Self> {
+    pub(super) fn start(arguments: &BenchNavigationArguments, limits: Limits) -> anyhow::Result<Self> {
         let entered = arguments.planners.clone();
         for (place, PlannerArgument { name, .. }) in entered.iter().enumerate() {
             if entered[..place].iter().any(|other| other.name == *name) {
@@ -36,8 +36,6 @@ impl Planners {
                 return Err(UsageError(told).into());
             }
         }
-        let mut limits = formats::read_vehicle(&arguments.vehicle)?.limits;
-        limits.speed_max_mps = arguments.speed.unwrap_or(limits.speed_max_mps);
         let planners = Self {
             entered,
             timeout: Duration::from_secs_f64(arguments.planner_timeout),
