@@ -19,7 +19,7 @@ pub struct BenchArenaArguments {
     pub methods: Vec<Method>,
 
     /// Drives of every method over short bushes and as many over tall ones, at most 1000
-    #[arg(long, value_name = "N", value_parser = run_count, default_value = "60", allow_hyphen_values = true)]
+    #[arg(long, value_name = "N", value_parser = run_count, default_value = "30", allow_hyphen_values = true)]
     pub runs: u64,
 
     /// Risk tolerance in (0, 1]
