@@ -35,7 +35,8 @@ pub use types::{
     SimulatorDescription, SimulatorRun, StartState,
 };
 
-/// Effects that the surrogate may name for the simulator to decide about.
+/// Effects that the surrogate names for the simulator to decide about; the others are tried where none of these explains
+/// the gap.
 const N_CAUSES: usize = 5;
 
 /// Why a simulator could not decide.
@@ -72,7 +73,7 @@ pub struct InSimulatorDiagnosis {
 /// Fits the knobs of a simulator and the likeliest wrapped causes to real drives in it, and judges them.
 ///
 /// `screened` is the surrogate's ranking, best first; of its effects the first five that can be wrapped around a simulator
-/// are tried. `sim` are the simulator's own recorded drives, which show how well it repeats itself.
+/// are tried, and where neither one of them nor a knob explains the gap, the others that can. `sim` are the simulator's own recorded drives, which show how well it repeats itself.
 ///
 /// # Errors
 /// No nominal or real run, a run that cannot be used, or a failure of the simulator.
@@ -92,7 +93,8 @@ pub fn judge_in_simulator<E>(
     }
     let reference = Reference::of(simulator, (&nominal, &drives), run).map_err(InSimulatorError::Run)?;
     let trial = Trial::new(simulator, &reference, &drives, run);
-    let judged = Judged::of(&trial, &levers(simulator, screened, N_CAUSES)).map_err(InSimulatorError::Run)?;
+    let (likeliest, others) = levers(simulator, screened, N_CAUSES);
+    let judged = Judged::of(&trial, &likeliest, &others).map_err(InSimulatorError::Run)?;
     Ok(judged.diagnosis(simulator, reference))
 }
 

@@ -129,9 +129,36 @@ fn ranking(ids: &[&str]) -> Vec<Ranked> {
 const SCREENED: [&str; 5] = ["steer_lag", "friction", "steer_delay", "gyro_bias", "speed_scale"];
 
 fn judged(robot: Robot) -> InSimulatorDiagnosis {
+    judged_after(&SCREENED, robot)
+}
+
+fn judged_after(screened: &[&str], robot: Robot) -> InSimulatorDiagnosis {
     let sim = [drive(SOUND, 1), drive(SOUND, 2)];
     let real = [drive(robot, 11), drive(robot, 12)];
-    judge_in_simulator(&simulator(), &machine(), &ranking(&SCREENED), (&sim, &real), &run).unwrap()
+    judge_in_simulator(&simulator(), &machine(), &ranking(screened), (&sim, &real), &run).unwrap()
+}
+
+/// Five effects, none of which is a slow motor.
+const OTHERS: [&str; 5] = ["odom_scale", "gyro_bias", "yaw_misalign", "steer_bias", "backlash"];
+
+/// The knob is off by a ninth of what it can be off by, to either side.
+#[test]
+fn a_small_change_is_found_among_many_that_it_could_have_been() {
+    for motor_s in [0.32, 0.48] {
+        let found = judged_after(&OTHERS, Robot { motor_s, ..SOUND });
+        let [cause] = &found.answer.causes[..] else { panic!("{:?}", found.answer) };
+        assert_eq!(cause.name, "motor_s");
+        assert!((cause.found.value - motor_s).abs() < 0.02, "{cause:?}");
+    }
+}
+
+#[test]
+fn an_effect_that_the_model_thought_unlikely_is_found_where_no_other_explains_the_gap() {
+    let screened = [&OTHERS[..], &["speed_scale", "steer_delay"]].concat();
+    let found = judged_after(&screened, Robot { late_rows: 5, ..SOUND });
+    let tried: Vec<&str> = found.answer.candidates.iter().map(|candidate| candidate.name.as_str()).collect();
+    assert!(tried.contains(&"speed_scale"), "{tried:?}");
+    assert_eq!(found.answer.causes[0].name, "steer_delay");
 }
 
 #[test]

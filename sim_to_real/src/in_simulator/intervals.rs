@@ -4,13 +4,16 @@ use super::lever::Lever;
 use super::replay::Setting;
 use super::search::mean;
 use super::trial::Trial;
-use super::types::SimulatorCause;
+use super::types::{CauseKind, SimulatorCause};
 use crate::answer::Estimate;
+use crate::drive::STEP_S;
 
 /// Half the width of a 90 % interval in standard errors of a dozen stretches (Student).
 const STUDENT_90: f64 = 1.8;
 /// What is left open by a search that ends, in distances from what the simulator has.
 const RESOLUTION: f64 = 0.02;
+/// Whether a command that a robot delays or smooths changes early or late within a row of the log is not known [s].
+const HALF_A_ROW_S: f64 = 0.5 * STEP_S;
 /// The losses are seen this far to either side, in distances from what the simulator has.
 const ASIDE: f64 = 0.1;
 /// A limit's logarithm at most this far.
@@ -38,7 +41,8 @@ fn cause<E>(trial: &Trial<'_, E>, setting: &Setting, index: usize) -> Result<Sim
     let (n, middle) = (slopes.len() as f64, mean(&slopes));
     let squares: f64 = slopes.iter().map(|slope| (slope - middle).powi(2)).sum();
     let error = if bend > 0.0 && n > 1.0 { (squares / (n * (n - 1.0))).sqrt() / bend } else { f64::INFINITY };
-    Ok(told(lever, *place, (STUDENT_90 * error).hypot(RESOLUTION * distance)))
+    let unknown = if lever.kind() == CauseKind::Effect && lever.unit() == "s" { HALF_A_ROW_S } else { 0.0 };
+    Ok(told(lever, *place, (STUDENT_90 * error).hypot(RESOLUTION * distance) + unknown))
 }
 
 fn told(lever: &Lever, place: f64, half: f64) -> SimulatorCause {

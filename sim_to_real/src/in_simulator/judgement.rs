@@ -58,19 +58,25 @@ impl Gain {
 }
 
 impl Judged {
-    pub(super) fn of<E>(trial: &Trial<'_, E>, levers: &[Lever]) -> Result<Self, E> {
+    /// `others` are tried where the best of the likeliest leaves more than chance does.
+    pub(super) fn of<E>(trial: &Trial<'_, E>, likeliest: &[Lever], others: &[Lever]) -> Result<Self, E> {
         let without = trial.losses(&[Vec::new()])?.concat();
         let unit = mean(&without).max(trial.reference.loss);
         let parts = trial.parts();
-        let mut singles = fitted(trial, (&Vec::new(), &without), levers)?;
-        let foretold = |one: &Fitted| mean(&one.foretold(&parts));
-        singles.sort_by(|a, b| foretold(a).total_cmp(&foretold(b)));
         let gain = |one: &Fitted| Gain::of(&without, &one.foretold(&parts), unit);
+        let is_clear =
+            |singles: &[Fitted]| singles.first().is_some_and(|best| gain(best).is_clear(BEYOND_DOUBT));
+        let mut singles = alone(trial, &without, likeliest, &parts)?;
+        let left = if is_clear(&singles) { singles[0].loss() } else { mean(&without) };
+        if is_unknown(trial.reference, left) {
+            singles.extend(alone(trial, &without, others, &parts)?);
+            sort_by_foretold(&mut singles, &parts);
+        }
         let candidates = singles.iter().map(|one| candidate(one, gain(one))).collect();
-        let best = singles.first().filter(|best| gain(best).is_clear(BEYOND_DOUBT));
-        let Some(best) = best else {
+        if !is_clear(&singles) {
             return Ok(Self::of_nothing(trial.reference, mean(&without), candidates));
-        };
+        }
+        let best = &singles[0];
         let (setting, losses) = with_a_second(trial, (best, &singles), &parts)?;
         let is_rival = |other: &&Fitted| {
             let behind = Gain::of(&other.foretold(&parts), &best.foretold(&parts), unit);
@@ -87,8 +93,7 @@ impl Judged {
     }
 
     fn of_nothing(reference: &Reference, loss: f64, candidates: Vec<SimulatorCandidate>) -> Self {
-        let is_unknown = loss > UNKNOWN_IN_NULLS * reference.loss;
-        let verdict = if is_unknown { Verdict::Unknown } else { Verdict::None };
+        let verdict = if is_unknown(reference, loss) { Verdict::Unknown } else { Verdict::None };
         Self { verdict, setting: Vec::new(), causes: Vec::new(), candidates, not_told_apart: Vec::new() }
     }
 
@@ -108,6 +113,28 @@ impl Judged {
         };
         InSimulatorDiagnosis { answer, simulator: simulator.clone(), reference, setting: self.setting }
     }
+}
+
+/// Levers fitted one at a time, those first that foretell the other drives best.
+fn alone<E>(
+    trial: &Trial<'_, E>,
+    without: &[f64],
+    levers: &[Lever],
+    parts: &[usize],
+) -> Result<Vec<Fitted>, E> {
+    let mut singles = fitted(trial, (&Vec::new(), without), levers)?;
+    sort_by_foretold(&mut singles, parts);
+    Ok(singles)
+}
+
+fn sort_by_foretold(singles: &mut [Fitted], parts: &[usize]) {
+    let foretold = |one: &Fitted| mean(&one.foretold(parts));
+    singles.sort_by(|a, b| foretold(a).total_cmp(&foretold(b)));
+}
+
+/// Whether drives lie so far from what the simulator's own show that something is missing.
+fn is_unknown(reference: &Reference, loss: f64) -> bool {
+    loss > UNKNOWN_IN_NULLS * reference.loss
 }
 
 fn candidate(fitted: &Fitted, gain: Gain) -> SimulatorCandidate {
@@ -148,7 +175,7 @@ fn with_a_second<E>(
 fn verdict(reference: &Reference, before: f64, after: f64) -> Verdict {
     let over = |loss: f64| (loss - reference.loss).max(0.0);
     let left = over(after) / over(before).max(1e-9);
-    match after / reference.loss > UNKNOWN_IN_NULLS && left > UNKNOWN_SHARE {
+    match is_unknown(reference, after) && left > UNKNOWN_SHARE {
         false => Verdict::Effects,
         true if 1.0 - left < WORTH_A_NAME => Verdict::Unknown,
         true => Verdict::EffectsAndUnknown,

@@ -6,8 +6,12 @@ use crate::calibration::{coordinate, is_limit, value_at};
 use bicycle::Effect;
 use bicycle::effect::{CATALOGUE, Description, Parameter, Role};
 
-/// Shares of the way from a knob's default to its end that are tried first.
-const KNOB_SHARES: [f64; 2] = [0.3, 0.8];
+/// Shares of the way from where nothing is changed to an end that are tried first. An error that grows as the distance from
+/// the truth falls by 64 % or more at one of them, wherever the truth lies beyond 0.02: what is only just visible as well as
+/// what is not.
+const SHARES: [f64; 3] = [0.03, 0.12, 0.5];
+/// Limits are tried at so many equal ratios, down from where there is none.
+const N_LIMITS: i32 = 6;
 /// Knobs whose ends have at least this ratio are fitted by their logarithm.
 const WIDE: f64 = 4.0;
 
@@ -18,10 +22,16 @@ pub(crate) enum Lever {
     Knob(Knob),
 }
 
-/// The simulator's knobs and the first `n_causes` of the ranking that can be wrapped around it.
-pub(super) fn levers(simulator: &SimulatorDescription, ranking: &[Ranked], n_causes: usize) -> Vec<Lever> {
-    let wrapped = ranking.iter().filter_map(|ranked| wrapped(&ranked.id)).take(n_causes);
-    wrapped.map(Lever::Effect).chain(simulator.knobs.iter().cloned().map(Lever::Knob)).collect()
+/// The simulator's knobs and the first `n_causes` of the ranking that can be wrapped around it; apart from them, the other
+/// effects of the ranking that can.
+pub(super) fn levers(
+    simulator: &SimulatorDescription,
+    ranking: &[Ranked],
+    n_causes: usize,
+) -> (Vec<Lever>, Vec<Lever>) {
+    let mut wrapped = ranking.iter().filter_map(|ranked| wrapped(&ranked.id)).map(Lever::Effect);
+    let likeliest = wrapped.by_ref().take(n_causes);
+    (likeliest.chain(simulator.knobs.iter().cloned().map(Lever::Knob)).collect(), wrapped.collect())
 }
 
 /// The effect of that id, if it acts on commands or sensors alone.
@@ -99,18 +109,15 @@ impl Lever {
 
     /// The places that are tried first.
     pub(super) fn tried(&self) -> Vec<f64> {
-        match self {
-            Self::Effect(own) => {
-                let parameter = &own.parameters[0];
-                parameter.tried.iter().map(|&value| coordinate(parameter, value, None).start).collect()
-            }
-            Self::Knob(knob) => {
-                let middle = knob_place(knob, knob.default);
-                let ends = [knob.low, knob.high].map(|end| knob_place(knob, end) - middle);
-                let sides = ends.into_iter().filter(|way| way.abs() > 0.0);
-                sides.flat_map(|way| KNOB_SHARES.map(|share| middle + share * way)).collect()
-            }
+        let (neutral, [first, last]) = (self.neutral(), self.ends());
+        if let Self::Effect(own) = self
+            && is_limit(&own.parameters[0])
+        {
+            let step = (tried_ends(&own.parameters[0]).0 - neutral) / f64::from(N_LIMITS);
+            return (1..=N_LIMITS).map(|n| neutral + f64::from(n) * step).collect();
         }
+        let ways = [first - neutral, last - neutral].into_iter().filter(|way| way.abs() > 0.0);
+        ways.flat_map(|way| SHARES.map(|share| neutral + share * way)).collect()
     }
 
     /// The farthest places that may be tried.
@@ -155,31 +162,58 @@ mod tests {
     fn what_acts_on_the_body_cannot_be_wrapped_and_is_passed_over() {
         let simulator = SimulatorDescription { name: "s".to_owned(), stochastic: false, knobs: Vec::new() };
         let ranking = ranked(&["friction", "steer_lag", "mass", "wind", "gyro_bias", "accel_limit"]);
-        let names = |n| -> Vec<String> {
-            levers(&simulator, &ranking, n).iter().map(|lever| lever.name().to_owned()).collect()
+        let names = |n| {
+            let (likeliest, others) = levers(&simulator, &ranking, n);
+            let names = |levers: &[Lever]| levers.iter().map(|lever| lever.name().to_owned()).collect();
+            let both: [Vec<String>; 2] = [names(&likeliest), names(&others)];
+            both
         };
-        assert_eq!(names(5), ["steer_lag", "gyro_bias", "accel_limit"]);
-        assert_eq!(names(2), ["steer_lag", "gyro_bias"]);
+        assert_eq!(names(5), [vec!["steer_lag", "gyro_bias", "accel_limit"], vec![]]);
+        assert_eq!(names(2), [vec!["steer_lag", "gyro_bias"], vec!["accel_limit"]]);
     }
 
-    /// A knob from 0.2 to 1.8 with its default at 0.9 is wide: by logarithm, 0.3 and 0.8 of the way to either end.
+    /// A knob from 0.2 to 1.8 with its default at 0.9 is wide: by logarithm, shares of the way to either end.
     #[test]
     fn a_knob_is_tried_on_both_sides_within_its_range() {
         let knob = Knob { name: "k".into(), unit: "-".into(), low: 0.2, high: 1.8, default: 0.9 };
         let lever = Lever::Knob(knob.clone());
         let values: Vec<f64> = lever.tried().iter().map(|&place| lever.value(place)).collect();
-        let expected = [
-            0.9 * (0.2_f64 / 0.9).powf(0.3),
-            0.9 * (0.2_f64 / 0.9).powf(0.8),
-            0.9 * 2.0_f64.powf(0.3),
-            0.9 * 2.0_f64.powf(0.8),
-        ];
+        let below = [0.03, 0.12, 0.5].map(|share| 0.9 * (0.2_f64 / 0.9).powf(share));
+        let above = [0.03, 0.12, 0.5].map(|share| 0.9 * 2.0_f64.powf(share));
+        let expected = [below, above].concat();
+        assert_eq!(values.len(), 6);
         for (value, expected) in values.iter().zip(expected) {
             assert!((value - expected).abs() < 1e-12, "{values:?}");
         }
         let [low, high] = lever.ends().map(|place| lever.value(place));
         assert!((low - 0.2).abs() < 1e-12 && (high - 1.8).abs() < 1e-12);
         let one_sided = Lever::Knob(Knob { default: 0.2, low: 0.2, high: 0.5, ..knob });
-        assert_eq!(one_sided.tried().len(), 2);
+        assert_eq!(one_sided.tried().len(), 3);
+    }
+
+    /// Wherever the truth lies from 0.02 of the way to the end on, one of the places tried first takes 64 % off an error
+    /// that grows as the distance from it: 1 - ((x - p) / x)^2.
+    #[test]
+    fn the_first_places_miss_nothing_between_hardly_visible_and_the_end() {
+        let nearest = |truth: f64| SHARES.map(|share| 1.0 - ((truth - share) / truth).powi(2));
+        let gains =
+            (2..=100).map(|percent| nearest(0.01 * f64::from(percent)).into_iter().fold(0.0, f64::max));
+        let least = gains.fold(1.0, f64::min);
+        assert!((least - 0.64).abs() < 0.01, "{least}");
+    }
+
+    #[test]
+    fn limits_are_tried_from_where_they_bind_hard_to_where_they_hardly_bind() {
+        let lever = Lever::Effect(wrapped("accel_limit").unwrap());
+        let values: Vec<f64> = lever.tried().iter().map(|&place| lever.value(place)).collect();
+        let parameter = &CATALOGUE.iter().find(|own| own.id == "accel_limit").unwrap().parameters[0];
+        let (first, last) = (parameter.tried[0], parameter.tried[parameter.tried.len() - 1]);
+        assert_eq!(values.len(), 6);
+        assert!((values[5] - first).abs() < 1e-9, "{values:?}");
+        // Where there is none is last^2 / first; six equal ratios lead from there to the first.
+        let ratio = (last / first).powf(2.0 / 6.0);
+        for (value, next) in values.iter().zip(&values[1..]) {
+            assert!((value / next - ratio).abs() < 1e-9, "{values:?}");
+        }
     }
 }

@@ -4,10 +4,12 @@ use super::lever::Lever;
 use super::replay::Setting;
 use super::trial::Trial;
 
-/// So many levers, the best of the scan, are fitted further.
-const N_REFINED: usize = 5;
-/// Halvings.
+/// So many levers, the best of the scan, are fitted further, and of these as many as the second number to the end: a scan
+/// shows at least 64 % of what a lever can do.
+const N_REFINED: [usize; 2] = [8, 5];
+/// Halvings, and how many of them the first number of levers take part in.
 const N_ROUNDS: usize = 6;
+const N_FIRST_ROUNDS: usize = 2;
 
 /// A lever with every place that was tried, from low to high.
 #[derive(Clone, Debug)]
@@ -36,9 +38,9 @@ pub(super) fn fitted<E>(
     let mut all: Vec<Fitted> = levers.iter().map(at_neutral).collect();
     let scan = |fitted: &Fitted| fitted.lever.tried();
     try_places(trial, known, &mut all, scan)?;
-    sort(&mut all);
-    let n_refined = N_REFINED.min(all.len());
-    for _ in 0..N_ROUNDS {
+    for round in 0..N_ROUNDS {
+        sort(&mut all);
+        let n_refined = N_REFINED[usize::from(round >= N_FIRST_ROUNDS)].min(all.len());
         try_places(trial, known, &mut all[..n_refined], Fitted::halfway)?;
     }
     sort(&mut all);
