@@ -85,7 +85,7 @@ fn drawn(report: &Report) -> Canvas {
     let shares = Axes { frame, x: Range { low: 0.0, high: 100.0 }, y: rows };
 
     let told = format!(
-        "40 m · {} at up to {} m/s · {} maps with {} pairs of start and goal in every row · time limit {} s{}",
+        "40 m · {} at up to {} m/s · maps in every row: {}, starts and goals on each: {} · time limit {} s{}",
         report.plan.vehicle,
         report.plan.speed_mps,
         report.plan.n_maps,

@@ -9,10 +9,10 @@ use crate::{Picture, html, verdict};
 pub fn page(report: &Report, pictures: &[Picture], revision: &str) -> String {
     let plan = &report.plan;
     let line = format!(
-        "{}, {} maps of seed {} with {} pairs of start and goal each, 40 m apart, time limit {} s, plant {}, {:?}, revision {revision}.",
+        "{}, maps of seed {}: {}, starts and goals on each, 40 m apart: {}, time limit {} s, plant {}, {:?}, revision {revision}.",
         plan.vehicle,
-        plan.n_maps,
         plan.seed,
+        plan.n_maps,
         plan.n_pairs,
         plan.time_limit_s,
         plan.plant.name(),
