@@ -26,6 +26,13 @@ class Case(NamedTuple):
     not_told_apart: list[str]
     verdict: str
     closed: float | None
+    inside: list[bool]
+    """Whether the 90 % interval that is told of what was changed holds its value; empty where it was not named."""
+
+
+def holds(found: dict, value: float) -> bool:
+    """Whether an interval holds a value; one that could not be told is null."""
+    return found["low"] is not None and found["high"] is not None and found["low"] <= value <= found["high"]
 
 
 def read(labels: Path, answers: Path) -> list[Case]:
@@ -36,7 +43,9 @@ def read(labels: Path, answers: Path) -> list[Case]:
         if path.exists():
             said = json.loads(path.read_text())["in_simulator"]
             causes = [cause["name"] for cause in said["causes"]]
-            told = (causes, said["not_told_apart"], said["verdict"], said["shrink"].get("closed"))
+            own = [cause["found"] for cause in said["causes"] if cause["name"] in label["effects"]]
+            inside = [holds(found, label["value"]) for found in own]
+            told = (causes, said["not_told_apart"], said["verdict"], said["shrink"].get("closed"), inside)
             cases.append(Case(name, label["effects"], label["visible_in_train"], *told))
         else:
             print(f"{name}: no answer", file=sys.stderr)
@@ -57,6 +66,7 @@ def rows(cases: list[Case]) -> dict[str, str]:
     changed = [case for case in cases if case.truth]
     sound = [case for case in cases if not case.truth]
     closed = [case.closed for case in changed if case.closed is not None]
+    inside = [is_inside for case in changed for is_inside in case.inside]
     first = sum(case.causes[:1] == case.truth for case in changed)
     among = sum(case.truth[0] in [*case.causes, *case.not_told_apart] for case in changed)
     return {
@@ -65,6 +75,7 @@ def rows(cases: list[Case]) -> dict[str, str]:
         "that name alone": share(sum(case.causes == case.truth for case in changed), len(changed)),
         "silence": share(sum(not case.causes for case in changed), len(changed)),
         "something named where nothing was changed": share(sum(bool(case.causes) for case in sound), len(sound)),
+        "value inside its 90 % interval": share(sum(inside), len(inside)),
         "gap closed, median": f"{median(closed):.2f} of {len(closed)}" if closed else "of 0",
     }
 
