@@ -5,7 +5,7 @@ use super::intervals::causes;
 use super::lever::Lever;
 use super::reference::Reference;
 use super::replay::Setting;
-use super::search::{Fitted, fitted, mean, refitted};
+use super::search::{Fitted, fitted, mean, polished, refitted};
 use super::trial::Trial;
 use super::types::{InSimulator, SimulatorCandidate, SimulatorCause, SimulatorDescription};
 use crate::answer::{Shrink, Verdict};
@@ -153,8 +153,10 @@ fn with_a_second<E>(
     (best, singles): (&Fitted, &[Fitted]),
     parts: &[usize],
 ) -> Result<(Setting, Vec<f64>), E> {
+    let has_room = |best: &Fitted| (best.loss() / (LEAST_LOSS * trial.reference.loss)).ln() >= PRICE_OF_TWO;
+    let best = if has_room(best) { &polished(trial, best)? } else { best };
     let alone = (vec![(best.lever.clone(), best.place())], best.losses().to_vec());
-    if (best.loss() / (LEAST_LOSS * trial.reference.loss)).ln() < PRICE_OF_TWO {
+    if !has_room(best) {
         return Ok(alone);
     }
     let others: Vec<Lever> = singles[1..].iter().map(|other| other.lever.clone()).collect();

@@ -7,7 +7,7 @@ use bicycle::Effect;
 use bicycle::effect::{CATALOGUE, Description, Parameter, Role};
 
 /// Shares of the way from where nothing is changed to an end that are tried first. An error that grows as the distance from
-/// the truth falls by 64 % or more at one of them, wherever the truth lies beyond 0.02: what is only just visible as well as
+/// the truth falls by 62 % or more at one of them, wherever the truth lies beyond 0.02: what is only just visible as well as
 /// what is not.
 const SHARES: [f64; 3] = [0.03, 0.12, 0.5];
 /// Limits are tried at so many equal ratios, down from where there is none.
@@ -191,7 +191,7 @@ mod tests {
         assert_eq!(one_sided.tried().len(), 3);
     }
 
-    /// Wherever the truth lies from 0.02 of the way to the end on, one of the places tried first takes 64 % off an error
+    /// Wherever the truth lies from 0.02 of the way to the end on, one of the places tried first takes 62 % off an error
     /// that grows as the distance from it: 1 - ((x - p) / x)^2.
     #[test]
     fn the_first_places_miss_nothing_between_hardly_visible_and_the_end() {
@@ -199,7 +199,7 @@ mod tests {
         let gains =
             (2..=100).map(|percent| nearest(0.01 * f64::from(percent)).into_iter().fold(0.0, f64::max));
         let least = gains.fold(1.0, f64::min);
-        assert!((least - 0.64).abs() < 0.01, "{least}");
+        assert!((least - 0.624).abs() < 0.005, "{least}");
     }
 
     #[test]
