@@ -73,7 +73,8 @@ pub struct InSimulatorDiagnosis {
 /// Fits the knobs of a simulator and the likeliest wrapped causes to real drives in it, and judges them.
 ///
 /// `screened` is the surrogate's ranking, best first; of its effects the first five that can be wrapped around a simulator
-/// are tried, and where neither one of them nor a knob explains the gap, the others that can. `sim` are the simulator's own recorded drives, which show how well it repeats itself.
+/// are tried, and where neither one of them nor a knob explains the gap, the others that can. `sim` are the simulator's own
+/// recorded drives, which show how well it repeats itself.
 ///
 /// # Errors
 /// No nominal or real run, a run that cannot be used, or a failure of the simulator.
