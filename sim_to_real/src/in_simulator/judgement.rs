@@ -58,7 +58,7 @@ impl Gain {
 }
 
 impl Judged {
-    /// `others` are tried where the best of the likeliest leaves more than chance does.
+    /// `others` are tried where what the best of the likeliest leaves is unknown.
     pub(super) fn of<E>(trial: &Trial<'_, E>, likeliest: &[Lever], others: &[Lever]) -> Result<Self, E> {
         let without = trial.losses(&[Vec::new()])?.concat();
         let unit = mean(&without).max(trial.reference.loss);
