@@ -15,7 +15,8 @@
 //!    height and variance, plants give a top, faces too high for a cell count as obstacles, branches high
 //!    above the ground count for nothing.
 //! 5. The surface is drawn. Ground that was hit is [`Knowledge::Measured`]. Ground below plants and obstacles is
-//!    inferred from the ground around them, and small gaps are filled when something was seen in all four
+//!    inferred from the ground around them, deep in a stand from its plants, which are taken to be as tall as those
+//!    between which ground was seen, and small gaps are filled when something was seen in all four
 //!    quadrants around and no ray passed below the height they would get; both are
 //!    [`Knowledge::Interpolated`], with the variance of the inference. All else stays [`Knowledge::Unknown`]: what
 //!    lies behind an edge is a hole until it is seen.

@@ -49,12 +49,7 @@ pub(super) fn fitted<E>(
 
 /// A lever fitted on, alone, until what its place is off by is no second cause.
 pub(super) fn polished<E>(trial: &Trial<'_, E>, fitted: &Fitted) -> Result<Fitted, E> {
-    let mut all = [fitted.clone()];
-    for _ in 0..N_ROUNDS {
-        try_places(trial, &Setting::new(), &mut all, Fitted::halfway)?;
-    }
-    let [found] = all;
-    Ok(found)
+    halved(trial, &Setting::new(), [fitted.clone()], N_ROUNDS)
 }
 
 /// A lever fitted again near where it is, beside what is known.
@@ -69,12 +64,22 @@ pub(super) fn refitted<E>(
     let [first, last] = fitted.lever.ends();
     let start =
         Fitted { lever: fitted.lever.clone(), tried: vec![Tried { place: middle, losses: losses.to_vec() }] };
-    let mut all = [start];
-    try_places(trial, known, &mut all, |_| vec![(middle - reach).max(first), (middle + reach).min(last)])?;
-    for _ in 0..N_ROUNDS / 2 {
-        try_places(trial, known, &mut all, Fitted::halfway)?;
+    let mut one = [start];
+    try_places(trial, known, &mut one, |_| vec![(middle - reach).max(first), (middle + reach).min(last)])?;
+    halved(trial, known, one, N_ROUNDS / 2)
+}
+
+/// The way from the best place of a lever to either neighbour, halved so many times.
+fn halved<E>(
+    trial: &Trial<'_, E>,
+    known: &Setting,
+    mut one: [Fitted; 1],
+    n_rounds: usize,
+) -> Result<Fitted, E> {
+    for _ in 0..n_rounds {
+        try_places(trial, known, &mut one, Fitted::halfway)?;
     }
-    let [found] = all;
+    let [found] = one;
     Ok(found)
 }
 

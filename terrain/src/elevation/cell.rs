@@ -60,6 +60,8 @@ pub(super) struct CellState {
     pub obstacle_contradictions: u8,
 }
 
+/// So many points named as ground tell of ground where plants or obstacles prevail: a camera errs.
+const GROUND_POINTS: f32 = 2.0;
 /// Share of an innovation that a cell's spread and its variance take over when it is far outside both.
 const SURPRISE_GAIN: f32 = 0.3;
 /// Squared number of standard deviations beyond which a height surprises.
@@ -118,6 +120,11 @@ impl CellState {
         vegetation + obstacle > open + loose
     }
 
+    fn shows_ground(&self) -> bool {
+        let [open, loose, ..] = self.evidence;
+        open + loose >= GROUND_POINTS
+    }
+
     fn forget_ground(&mut self) {
         (self.ground, self.ground_m) = (Ground::Unseen, f32::NAN);
         (self.variance_m2, self.spread_m2) = (f32::INFINITY, 0.0);
@@ -139,9 +146,11 @@ impl CellState {
         let rigid = touching.clone().filter(|p| p.is_rigid());
         let statistics = RigidStatistics::of(rigid.clone());
         let is_wall = statistics.span_m() > config.steep_span_m();
+        let was_covered = self.is_covered();
         for point in touching {
             self.take_evidence(point, is_wall);
         }
+        let shows_ground = self.shows_ground();
         self.cap_evidence(config.evidence_cap);
         if is_wall {
             return;
@@ -149,10 +158,13 @@ impl CellState {
         if self.is_covered() {
             // Where plants or obstacles prevail, a point named as ground is ground only at their foot.
             let foot_m = self.lowest_m;
-            if self.ground == Ground::Seen && self.ground_m - self.margin_m(config) > foot_m {
+            let is_one_leaf = !was_covered && !shows_ground;
+            let is_refuted = is_one_leaf || self.ground_m - self.margin_m(config) > foot_m;
+            if self.ground == Ground::Seen && is_refuted {
                 self.forget_ground();
             }
-            let is_foot = |p: &&CellPoint| p.height_m <= foot_m + 2.0 * p.variance_m2.sqrt();
+            let is_ground = shows_ground || self.ground == Ground::Seen;
+            let is_foot = |p: &&CellPoint| is_ground && p.height_m <= foot_m + 2.0 * p.variance_m2.sqrt();
             self.fuse_ground(&RigidStatistics::of(rigid.filter(is_foot)));
         } else {
             self.fuse_ground(&statistics);

@@ -15,7 +15,8 @@ pub(super) struct Inferred {
     pub seen_m2: f32,
 }
 
-/// The surface that the known cells within `radius` along x and y suggest for `cell`; `None` without any.
+/// The surface that the known cells within `radius` along x and y suggest for `cell`, of those that are no higher than
+/// `ceiling_m`; `None` without any.
 ///
 /// The height is that of their plane of least squares where it determines the height here better than a
 /// single cell would (leverage up to one), with the variance of its prediction. Otherwise it is their mean,
@@ -26,7 +27,7 @@ pub(super) fn infer(
     geometry: &GridGeometry,
     cell: Cell,
     radius: usize,
-    datum_m: f32,
+    [datum_m, ceiling_m]: [f32; 2],
 ) -> Option<Inferred> {
     let around = CellRegion::of_cell(cell).grown(radius, geometry);
     let mut sums = PlaneSums::default();
@@ -36,7 +37,8 @@ pub(super) fn infer(
         let (dy, mut dx) = (row as f64 - cell.row as f64, west - 1.0);
         for neighbour in &surface[row * geometry.n_cols..][around.cols.clone()] {
             dx += 1.0;
-            if !neighbour.height_m.is_nan() {
+            // Unknown ground is NaN and no lower than anything.
+            if neighbour.height_m <= ceiling_m {
                 sums.add(dx, dy, f64::from(neighbour.height_m - datum_m));
                 cover.add(neighbour);
             }

@@ -4,6 +4,7 @@ mod cell;
 mod config;
 mod gaps;
 mod sorting;
+mod stands;
 mod statistics;
 mod surfacing;
 mod visibility;

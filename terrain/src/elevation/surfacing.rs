@@ -2,6 +2,7 @@
 
 use super::cell::{CellState, Ground};
 use super::gaps::{Enclosure, Inferred, infer};
+use super::stands::Stands;
 use super::{ElevationConfig, ElevationMap};
 use crate::{CellRegion, GridMap, Knowledge, Pose, SurfaceCell, TerrainClass};
 
@@ -11,6 +12,7 @@ pub(super) struct Scratch {
     next: Vec<SurfaceCell>,
     inferred: Vec<(u32, SurfaceCell)>,
     enclosure: Enclosure,
+    stands: Stands,
 }
 
 /// A height is published anew when it moved by more than this share of the standard deviation that was told.
@@ -102,18 +104,27 @@ impl Scratch {
         self.fill_gaps(states, config, datum_m);
     }
 
-    /// Infers the ground where only plants or obstacles were seen: from ground within twice the gap radius,
-    /// else from the lowest plant within the gap radius. It is never above anything that was seen there.
+    /// Infers the ground where only plants or obstacles were seen: from ground within twice the gap radius or from the
+    /// stand of plants, whichever tells more; else from the lowest plant within the gap radius. It is never above anything
+    /// that was seen there.
     fn uncover(&mut self, states: &GridMap<CellState>, config: &ElevationConfig, datum_m: f32) {
         let (geometry, radius) = (states.geometry(), config.gap_radius_cells());
         self.inferred.clear();
+        self.stands.find(&self.next, states);
         for (index, state) in states.values().iter().enumerate() {
             if state.ground != Ground::Unseen || !state.was_hit() {
                 continue;
             }
             let cell = geometry.cell(index);
-            let ground = infer(&self.next, geometry, cell, 2 * radius, datum_m)
-                .map(|inferred| (inferred.surface.height_m, inferred.surface.height_variance_m2))
+            // What is named as ground clearly above a leaf that was seen here is a leaf itself, or says nothing of what is
+            // below.
+            let ceiling_m = state.lowest_m + config.visibility_margin_m;
+            let around = infer(&self.next, geometry, cell, 2 * radius, [datum_m, ceiling_m])
+                .map(|inferred| (inferred.surface.height_m, inferred.surface.height_variance_m2));
+            let ground = [around, self.stands.ground(index, state, config)]
+                .into_iter()
+                .flatten()
+                .min_by(|a, b| a.1.total_cmp(&b.1))
                 .or_else(|| lowest_plant(states, &CellRegion::of_cell(cell).grown(radius, geometry), config));
             let Some((height_m, height_variance_m2)) = ground else { continue };
             let height_m = height_m.min(state.lowest_m).min(state.ceiling_m);
@@ -143,7 +154,8 @@ impl Scratch {
             if *quadrants != Enclosure::ALL || self.next[index].is_known() || state.was_hit() {
                 continue;
             }
-            let inferred = infer(&self.next, geometry, geometry.cell(index), radius, datum_m);
+            let inferred =
+                infer(&self.next, geometry, geometry.cell(index), radius, [datum_m, f32::INFINITY]);
             let Some(Inferred { mut surface, seen_m2 }) = inferred else { continue };
             let tolerance_m = GAP_MARGIN_SHARE * config.visibility_margin_m + seen_m2.sqrt();
             if surface.height_m <= state.ceiling_m + tolerance_m {
@@ -236,8 +248,9 @@ fn differs(published: &SurfaceCell, next: &SurfaceCell, config: &ElevationConfig
 #[cfg(test)]
 impl Scratch {
     /// Where the buffers lie and how much they hold.
-    pub fn buffers(&self) -> [(usize, usize); 3] {
+    pub fn buffers(&self) -> [(usize, usize); 4] {
         [
+            self.stands.buffer(),
             (self.next.as_ptr() as usize, self.next.capacity()),
             (self.inferred.as_ptr() as usize, self.inferred.capacity()),
             (self.enclosure.quadrants.as_ptr() as usize, self.enclosure.quadrants.capacity()),

@@ -197,6 +197,64 @@ fn in_a_meadow_the_ground_is_at_the_lowest_leaf_around_and_uncertain() {
     assert!((cell.vegetation_height_m - 0.6).abs() < 1e-6 && (cell.height_variance_m2 - 0.0225).abs() < 1e-7);
 }
 
+/// Two rows of seven cells of bushes of 0.4 m on ground that rises by 0.2 per metre: between those of the first the ground
+/// is seen, of all others the upper half. A leaf of a first cell seems to be 0.9 m high.
+fn fuse_thicket(map: &mut ElevationMap) {
+    let mut points = vec![([SPOT[0], SPOT[1], 0.9], Vegetation)];
+    for (row, i) in (0..2).flat_map(|row| (0..7).map(move |i| (row, i))) {
+        let (x_m, low_m) = (SPOT[0] + 0.5 * f64::from(i), if i == 0 { 0.0 } else { 0.2 });
+        let at = |rise_m: f64| [x_m, SPOT[1] + 0.5 * f64::from(row), 0.2 * x_m + rise_m];
+        points.extend([low_m, 0.3, 0.35, 0.4].map(|rise_m| (at(rise_m), Vegetation)));
+        points.extend((i == 0).then(|| [0.0, 0.0].map(|rise_m| (at(rise_m), Open))).into_iter().flatten());
+    }
+    map.fuse(&scan_of(points), &HERE).unwrap();
+}
+
+/// Hidden ground is where it is, and uncertain by a uniform distribution over the plants' 0.4 m.
+fn assert_is_thicket(map: &ElevationMap) {
+    for x_m in (1..7).map(|i| SPOT[0] + 0.5 * f64::from(i)) {
+        let cell = map.surface().at(x_m, SPOT[1]).unwrap();
+        assert!((cell.vegetation_height_m - 0.4).abs() < 0.02, "{x_m} m: {cell:?}");
+        assert!((f64::from(cell.height_m) - 0.2 * x_m).abs() < 0.02, "{x_m} m: {cell:?}");
+        let above_uniform_m2 = cell.height_variance_m2 - 0.4_f32.powi(2) / 12.0;
+        assert!((0.0..0.001).contains(&above_uniform_m2), "{x_m} m: {cell:?}");
+    }
+}
+
+#[test]
+fn plants_that_hide_the_ground_are_as_tall_as_those_of_their_stand() {
+    for gap_radius_m in [0.2, 1.0] {
+        let mut map = plain_map(|config| config.gap_radius_m = gap_radius_m);
+        fuse_thicket(&mut map);
+        assert_is_thicket(&map);
+    }
+}
+
+/// A leaf in the sixth cell, 0.38 m above the ground, is named as ground.
+#[test]
+fn one_leaf_named_as_ground_in_a_thicket_says_nothing_of_the_ground() {
+    let mut map = plain_map(|config| config.gap_radius_m = 1.0);
+    let x_m = SPOT[0] + 2.5;
+    map.fuse(&scan_of([([x_m, SPOT[1], 0.2 * x_m + 0.38], Open)]), &HERE).unwrap();
+    fuse_thicket(&mut map);
+    assert_is_thicket(&map);
+}
+
+#[test]
+fn plants_of_another_stand_say_nothing() {
+    let mut map = plain_map(|config| config.gap_radius_m = 0.2);
+    let leaves = [0.2, 0.4].map(|z_m| ([SPOT[0] + 2.0, SPOT[1], z_m], Vegetation));
+    let seen = [column(&[0.0, 0.0], Open), column(&[0.1, 0.3, 0.4], Vegetation)].concat();
+    let beside = seen.iter().map(|&([x_m, y_m, z_m], class)| ([x_m, y_m + 0.5, z_m], class));
+    map.fuse(&scan_of(beside.chain(seen.clone()).chain(leaves)), &HERE).unwrap();
+    assert!((at_spot(&map).vegetation_height_m - 0.4).abs() < 1e-6);
+    let other = map.surface().at(SPOT[0] + 2.0, SPOT[1]).unwrap();
+    assert!(
+        (other.vegetation_height_m - 0.2).abs() < 0.02 && (other.height_m - 0.2).abs() < 1e-6,
+        "{other:?}"
+    );
+}
+
 #[test]
 fn a_leaf_named_as_ground_does_not_lift_the_ground() {
     let mut map = plain_map(|_| {});
