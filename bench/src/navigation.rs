@@ -20,7 +20,7 @@ use traversability::CvarLevel;
 
 use crate::Verdict;
 pub use comparison::Comparison;
-pub use drive::{DriveResult, name_of_outcome};
+pub use drive::{DriveResult, Place, name_of_outcome};
 pub use entrant::{Entrant, PlannerName, PlannerNameError};
 pub use external::{Answers, ComputeTime, External, ExternalError, nobody};
 pub use plan::{Plan, Request, Shard, ShardError};

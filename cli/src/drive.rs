@@ -145,7 +145,7 @@ fn drive<'a>(arguments: &DriveArguments, scene: &'a Scene) -> Result<Drive<'a>, 
             MapSource::Oracle => closed_loop::MapSource::Oracle,
         },
         level: CvarLevel::new(arguments.alpha).map_err(UsageError::from_input)?,
-        seed: arguments.seed,
+        seed: scene.seed,
     })
 }
 

@@ -117,7 +117,10 @@ fn scaling_writes_curves_and_picture() {
 fn navigation(out: &Path, more: &[&str]) -> Output {
     let mut words =
         vec!["bench", "navigation", "--methods", "physics,nominal", "--alpha", "0.4", "--maps", "1"];
-    words.extend(["--pairs", "2", "--time-limit", "1", "--isa", "portable"]);
+    words.extend(["--pairs", "2", "--isa", "portable"]);
+    if !more.contains(&"--time-limit") {
+        words.extend(["--time-limit", "1"]);
+    }
     words.extend(["--out", out.to_str().expect("UTF-8")]);
     surefoot(&[words.as_slice(), more].concat())
 }
@@ -157,6 +160,24 @@ fn navigation_writes_table_page_and_picture() {
     assert_eq!(&read(&out, "navigation.png")[..8], b"\x89PNG\r\n\x1a\n");
     let page = String::from_utf8(read(&out, "navigation.html")).expect("a page");
     assert!(page.contains("physics") && page.contains("data:image/png;base64,") && !page.contains("http"));
+}
+
+#[test]
+fn a_drive_of_the_benchmark_is_driven_again() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let [table, again] = ["table", "again"].map(|name| folder.path().join(name));
+    navigation(&table, &["--time-limit", "4"]);
+    let words =
+        ["drive", "--world", "navigation:1,2", "--method", "physics", "--alpha", "0.4", "--isa", "portable"];
+    let to = ["--time-limit", "4", "--out", again.to_str().expect("UTF-8")];
+    assert_eq!(surefoot(&[words.as_slice(), &to].concat()).status.code(), Some(1), "no goal in 4 s");
+    let json = |out: &Path, name: &str| serde_json::from_slice::<Value>(&read(out, name)).expect("JSON");
+    let (drive, summary) = (&json(&table, "navigation.json")["drives"][1], json(&again, "summary.json"));
+    assert_eq!((&drive["method"], &drive["pair"]), (&"physics".into(), &1.into()));
+    assert!(drive["path_length_m"].as_f64() > Some(1.0), "{drive}");
+    for key in ["path_length_m", "distance_to_goal_m", "largest_roll_deg", "largest_pitch_deg"] {
+        assert_eq!(drive[key], summary[key], "{key}");
+    }
 }
 
 #[test]

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::fmt;
 
 use bicycle::{Decision, Model, StopReason};
-use scenarios::{Episode, Outcome, RockMap, Split, Task, seed_of};
+use scenarios::{Episode, Outcome, RockFieldConfig, RockFieldError, RockMap, Split, Task, seed_of};
 use serde::{Deserialize, Serialize};
 use traversability::CvarLevel;
 
@@ -46,6 +46,33 @@ pub struct DriveResult {
     /// How long a planner of other people's took for its commands.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub compute: Option<ComputeTime>,
+}
+
+/// A start with its goal on a map of the benchmark: what drives by different methods share.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Place {
+    /// Of the benchmark.
+    pub seed: u64,
+    /// Map, from 0.
+    pub map: u32,
+    /// Start and goal on it, from 0.
+    pub pair: u32,
+}
+
+impl Place {
+    /// World, start and goal.
+    ///
+    /// # Errors
+    /// A field that cannot be, or that has no room for such a drive.
+    pub fn task(&self, field: &RockFieldConfig) -> Result<Task, RockFieldError> {
+        let map = RockMap { seed: self.seed, split: Split::Test, index: self.map };
+        Task::on_rock_map(field, map, self.pair)
+    }
+
+    /// Seed of the sensors' noise and the controller's samples.
+    pub fn seed_of_drive(&self) -> u64 {
+        seed_of(self.seed, &[0xD21E, self.map.into(), self.pair.into()])
+    }
 }
 
 /// A drive to be done.
@@ -126,26 +153,22 @@ impl Job {
         settings: &Settings,
         external: &External<'_>,
     ) -> Result<DriveResult, BrokenDrive> {
-        let Settings { vehicle, episode, .. } = settings;
-        let episode = Episode::new(self.task(settings)?, vehicle, episode.clone(), self.seed(settings))
+        let Settings { field, seed, vehicle, episode, .. } = settings;
+        let place = self.place(*seed);
+        let episode = Episode::new(place.task(field)?, vehicle, episode.clone(), place.seed_of_drive())
             .map_err(DriveError::from)?;
         let (episode, answers) = external(name, episode).map_err(BrokenDrive::External)?;
         Ok(self.result(&episode, answers))
     }
 
-    fn task(&self, settings: &Settings) -> Result<Task, BrokenDrive> {
-        let map = RockMap { seed: settings.seed, split: Split::Test, index: self.map };
-        Ok(Task::on_rock_map(&settings.field, map, self.pair)?)
-    }
-
-    /// Of the sensors' noise, the same whoever drives.
-    fn seed(&self, settings: &Settings) -> u64 {
-        seed_of(settings.seed, &[0xD21E, self.map.into(), self.pair.into()])
+    fn place(&self, seed: u64) -> Place {
+        Place { seed, map: self.map, pair: self.pair }
     }
 
     fn begin(&self, method: Method, settings: &Settings) -> Result<ClosedLoop, BrokenDrive> {
+        let place = self.place(settings.seed);
         Ok(ClosedLoop::new(Drive {
-            task: self.task(settings)?,
+            task: place.task(&settings.field)?,
             vehicle: &settings.vehicle,
             model: Model::of(&settings.vehicle),
             config: settings.config.clone(),
@@ -155,7 +178,7 @@ impl Job {
             corrector: None,
             map_source: MapSource::Sensed,
             level: self.level.unwrap_or(CvarLevel::MEAN),
-            seed: self.seed(settings),
+            seed: place.seed_of_drive(),
         })?)
     }
 

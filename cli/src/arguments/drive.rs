@@ -17,11 +17,17 @@ const PLANNING: [&str; 10] =
 #[derive(Args, Clone, Debug)]
 #[command(after_long_help = AFTER_HELP)]
 pub struct DriveArguments {
-    /// Ground to drive on: rocks, arena, or an elevation file (.npz, GeoTIFF, 16-bit PNG)
+    /// Ground to drive on: rocks, arena, navigation:MAP,PAIR, or an elevation file (.npz, GeoTIFF, 16-bit PNG)
     ///
     /// `rocks` is a generated field of 50 x 50 m, another one for every seed. `arena` is a hall of 9.6 x 8 m with a
-    /// ramp and bushes. A file holds heights in metres; see "Elevation files" below.
-    #[arg(long, value_name = "rocks|arena|FILE", default_value = "rocks", help_heading = "World")]
+    /// ramp and bushes. `navigation:7,3` is the third start and goal on the seventh map of `surefoot bench navigation`:
+    /// with the benchmark's --seed, one of its drives again. A file holds heights in metres; see "Elevation files" below.
+    #[arg(
+        long,
+        value_name = "rocks|arena|navigation:MAP,PAIR|FILE",
+        default_value = "rocks",
+        help_heading = "World"
+    )]
     pub world: WorldSource,
 
     /// Height of the arena's bushes [m]; only with --world arena [default: 0.05]
@@ -150,7 +156,7 @@ impl DriveArguments {
     /// A height was given for a world that has no bushes to set.
     pub fn bush_height_m(&self) -> Result<f64, UsageError> {
         match (self.bush_height, &self.world) {
-            (Some(_), WorldSource::Rocks | WorldSource::File(_)) => Err(UsageError(
+            (Some(_), world) if *world != WorldSource::Arena => Err(UsageError(
                 "--bush-height: expected together with --world arena, found without it".into(),
             )),
             (height, _) => Ok(height.unwrap_or(ArenaConfig::default().bush_height_m)),
@@ -161,7 +167,7 @@ impl DriveArguments {
     pub fn vehicle_name_or_path(&self) -> &str {
         let fitting = match self.world {
             WorldSource::Arena => "rc_car",
-            WorldSource::Rocks | WorldSource::File(_) => "pietra_full_size",
+            WorldSource::Rocks | WorldSource::Navigation { .. } | WorldSource::File(_) => "pietra_full_size",
         };
         self.vehicle.as_deref().unwrap_or(fitting)
     }
@@ -255,6 +261,8 @@ Examples:
       The same field for a controller that believes in full traction everywhere.
   surefoot drive --world arena --bush-height 0.3
       Tall bushes: does it take the ramp?
+  surefoot drive --world navigation:7,3 --method truth
+      A drive of `surefoot bench navigation` again, with its picture and recording.
   surefoot drive --deviation steering_delay=0.25 --deviation tyre_grip=0.6
       A robot that is not what its simulator says. Record it, diagnose it with
       `surefoot gap`, and drive again with --model.
@@ -356,8 +364,20 @@ mod tests {
     }
 
     #[test]
+    fn places_of_the_benchmark_are_told_from_one() {
+        assert_eq!(parse(&["--world", "navigation:7,3"]).world, WorldSource::Navigation { map: 6, pair: 2 });
+        for wrong in
+            ["navigation:0,1", "navigation:1,0", "navigation:1", "navigation:a,1", "navigation:1,1001"]
+        {
+            let told = wrong.parse::<WorldSource>().unwrap_err();
+            assert!(told.contains("navigation:MAP,PAIR, both from 1") && told.contains(wrong), "{told}");
+        }
+    }
+
+    #[test]
     fn bushes_elsewhere_are_refused() {
         assert!(parse(&["--bush-height", "0.1"]).bush_height_m().is_err());
+        assert!(parse(&["--world", "navigation:1,1", "--bush-height", "0.1"]).bush_height_m().is_err());
     }
 
     #[test]

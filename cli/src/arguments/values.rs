@@ -9,6 +9,13 @@ use std::str::FromStr;
 pub enum WorldSource {
     /// Generated rock field.
     Rocks,
+    /// A map of the navigation benchmark, and a start with its goal on it, both from 0.
+    Navigation {
+        /// Map, from 0.
+        map: u32,
+        /// Start and goal on it, from 0.
+        pair: u32,
+    },
     /// PIETRA's hall of 9.6 x 8 m with a ramp and bushes.
     Arena,
     /// Elevation file: `.npz`, GeoTIFF or 16-bit PNG.
@@ -24,12 +31,27 @@ impl FromStr for WorldSource {
             "arena" => return Ok(Self::Arena),
             _ => {}
         }
+        if let Some(place) = word.strip_prefix("navigation:") {
+            let [map, pair] = place_of_benchmark(place)
+                .ok_or_else(|| format!("expected navigation:MAP,PAIR, both from 1, found {word:?}"))?;
+            return Ok(Self::Navigation { map, pair });
+        }
         let extension = Path::new(word).extension().and_then(|extension| extension.to_str());
         match extension.map(str::to_ascii_lowercase).as_deref() {
             Some("npz" | "tif" | "tiff" | "png") => Ok(Self::File(PathBuf::from(word))),
-            _ => Err(format!("expected rocks, arena or a file ending in .npz, .tif or .png, found {word:?}")),
+            _ => Err(format!(
+                "expected rocks, arena, navigation:MAP,PAIR or a file ending in .npz, .tif or .png, found {word:?}"
+            )),
         }
     }
+}
+
+/// Map and pair of the navigation benchmark, told from 1, from 0.
+fn place_of_benchmark(word: &str) -> Option<[u32; 2]> {
+    let (map, pair) = word.split_once(',')?;
+    let from_zero =
+        |number: &str| number.trim().parse::<u32>().ok()?.checked_sub(1).filter(|&index| index < 1000);
+    Some([from_zero(map)?, from_zero(pair)?])
 }
 
 /// Where the vehicle starts: its rear axle's centre in the map frame.

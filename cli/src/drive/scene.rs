@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use bench::closed_loop::layers_of;
+use bench::navigation::Place;
 use bicycle::lanes::{Instructions, Isa};
 use bicycle::{Model, Vehicle};
 use formats::{ConfigText, overlay, read_elevation, read_model, read_vehicle};
@@ -21,6 +22,8 @@ pub(super) struct Scene {
     pub model: Model,
     pub config: Config,
     pub task: Task,
+    /// Of the sensors' noise and the controller's samples.
+    pub seed: u64,
     pub knowledge: Knowledge,
     /// Commands to carry out instead of planning.
     pub script: Option<Script>,
@@ -44,7 +47,11 @@ pub(super) fn prepare(arguments: &DriveArguments) -> Result<Scene, UsageError> {
         // Whoever follows commands to their end passes the goal by.
         task.goal_tolerance_m = 0.0;
     }
-    Ok(Scene { vehicle, model, config, task, knowledge, script })
+    let seed = match arguments.world {
+        WorldSource::Navigation { map, pair } => Place { seed: arguments.seed, map, pair }.seed_of_drive(),
+        _ => arguments.seed,
+    };
+    Ok(Scene { vehicle, model, config, task, seed, knowledge, script })
 }
 
 /// The machine alone, with a guard that its configuration may change.
@@ -119,6 +126,10 @@ fn task_of_world(arguments: &DriveArguments, vehicle: &Vehicle) -> Result<Task, 
     let standard = match &arguments.world {
         WorldSource::Rocks => {
             Task::rock_field(&RockFieldConfig::default(), arguments.seed).map_err(UsageError::from_input)?
+        }
+        &WorldSource::Navigation { map, pair } => {
+            let place = Place { seed: arguments.seed, map, pair };
+            place.task(&RockFieldConfig::navigation()).map_err(UsageError::from_input)?
         }
         WorldSource::Arena => arena(arguments)?,
         WorldSource::File(path) => return in_file(arguments, vehicle, path),
