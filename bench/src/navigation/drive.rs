@@ -69,6 +69,12 @@ impl Place {
         Task::on_rock_map(field, map, self.pair)
     }
 
+    /// Corners of the ground [m]: every planner is told where it ends, which no sensor shows.
+    pub fn fence_m(field: &RockFieldConfig) -> Vec<[f64; 2]> {
+        let side_m = field.side_m;
+        vec![[0.0, 0.0], [side_m, 0.0], [side_m, side_m], [0.0, side_m]]
+    }
+
     /// Seed of the sensors' noise and the controller's samples.
     pub fn seed_of_drive(&self) -> u64 {
         seed_of(self.seed, &[0xD21E, self.map.into(), self.pair.into()])

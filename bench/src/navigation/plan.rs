@@ -11,7 +11,7 @@ use scenarios::{Engine, EpisodeConfig, RockFieldConfig};
 use serde::{Deserialize, Serialize};
 use traversability::CvarLevel;
 
-use super::drive::{DriveResult, Job};
+use super::drive::{DriveResult, Job, Place};
 use super::external::External;
 use super::{Entrant, PlannerName};
 use crate::closed_loop::Method;
@@ -144,7 +144,7 @@ impl Plan {
             n_pairs: request.n_pairs,
             time_limit_s: request.time_limit_s,
             isa: Instructions::find(request.isa)?.isa(),
-            config_hash: hash_of(&config_for(&machine, Isa::Auto))?,
+            config_hash: hash_of(&config_for(&machine, &request.field, Isa::Auto))?,
             plant: request.plant,
         };
         if plan.jobs(Shard::WHOLE).next().is_none() {
@@ -213,7 +213,7 @@ impl Plan {
         Ok(Settings {
             field: self.field.clone(),
             seed: self.seed,
-            config: config_for(&vehicle, self.isa),
+            config: config_for(&vehicle, &self.field, self.isa),
             episode,
             vehicle,
         })
@@ -227,9 +227,10 @@ fn machine(name_or_path: &str, speed_mps: Option<f64>) -> Result<Vehicle, SweepE
     Ok(vehicle)
 }
 
-/// What `surefoot drive` uses, on one thread.
-fn config_for(vehicle: &Vehicle, isa: Isa) -> Config {
+/// What `surefoot drive` uses on this ground, on one thread.
+fn config_for(vehicle: &Vehicle, field: &RockFieldConfig, isa: Isa) -> Config {
     let mut config = Config::for_vehicle(vehicle);
+    config.areas.geofence_m = Place::fence_m(field);
     config.controller.n_threads = 1;
     config.controller.isa = isa;
     config

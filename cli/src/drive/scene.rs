@@ -39,7 +39,10 @@ pub(crate) struct Machine {
 
 /// Reads and builds everything; whatever cannot be is refused here, before anything drives.
 pub(super) fn prepare(arguments: &DriveArguments) -> Result<Scene, UsageError> {
-    let Machine { vehicle, model, config, knowledge } = machine(arguments, GuardConfig::default())?;
+    let Machine { vehicle, model, mut config, knowledge } = machine(arguments, GuardConfig::default())?;
+    if matches!(arguments.world, WorldSource::Navigation { .. }) && config.areas.geofence_m.is_empty() {
+        config.areas.geofence_m = Place::fence_m(&RockFieldConfig::navigation());
+    }
     let mut task = task(arguments, &vehicle)?;
     let read = |path: &PathBuf| Script::read(path, &vehicle.limits);
     let script = arguments.commands.as_ref().map(read).transpose()?;
