@@ -51,7 +51,8 @@ impl Stands {
     /// without a stand.
     pub fn ground(&self, index: usize, state: &CellState, config: &ElevationConfig) -> Option<(f32, f32)> {
         let Plants { height_m, variance_m2, distance, .. } = self.plants[index];
-        let uncertain_m2 = (variance_m2 + height_m * height_m / 12.0).min(config.hidden_ground_std_m.powi(2));
+        let unknown_m2 = config.hidden_ground_std_m * config.hidden_ground_std_m;
+        let uncertain_m2 = (variance_m2 + height_m * height_m / 12.0).min(unknown_m2);
         (distance < FAR).then_some((state.vegetation_top_m - height_m, uncertain_m2))
     }
 
