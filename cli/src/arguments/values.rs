@@ -32,8 +32,9 @@ impl FromStr for WorldSource {
             _ => {}
         }
         if let Some(place) = word.strip_prefix("navigation:") {
-            let [map, pair] = place_of_benchmark(place)
-                .ok_or_else(|| format!("expected navigation:MAP,PAIR, both from 1, found {word:?}"))?;
+            let [map, pair] = place_of_benchmark(place).ok_or_else(|| {
+                format!("expected navigation:MAP,PAIR, both from 1 to 1000, found {word:?}")
+            })?;
             return Ok(Self::Navigation { map, pair });
         }
         let extension = Path::new(word).extension().and_then(|extension| extension.to_str());
