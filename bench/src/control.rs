@@ -95,7 +95,7 @@ pub(crate) fn measure_config(config: Config, work: Work, n_updates: usize) -> Re
     let model = model(work)?;
     let map = random_map();
     let mut field = CostToGo::new(CostToGoConfig::default(), &model.limits, N_ROWS, N_COLS)?;
-    field.update(map.view(), GOAL_M)?;
+    field.update(map.view(), GOAL_M, 0.0)?;
     let terminal = match work {
         Work::Bound | Work::Effects => Terminal::StraightLine,
         Work::Drive => Terminal::CostToGo(field.view()),

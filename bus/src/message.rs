@@ -9,7 +9,7 @@ use crate::layout::{RecordLayout, record};
 pub use convert::{HOLD_REASONS, STOP_REASONS, drive_row};
 
 /// Version of everything in this file; messages of another are refused.
-pub const LAYOUT_VERSION: u32 = 7;
+pub const LAYOUT_VERSION: u32 = 8;
 
 /// Moving obstacles that are told of at the most.
 pub const TRACKS_MAX: usize = 16;
@@ -203,6 +203,10 @@ record! {
         stuck: Source,
         /// Where the time to the goal leads [m].
         goal_m: [f64; 2],
+        /// Distance from there at which it ends [m].
+        tolerance_m: f64,
+        /// Headings for which is told what turning adds to it: 16, or 0 for a vehicle that turns on the spot.
+        n_headings: u64,
         /// Share of the worst outcomes that was judged for, in (0, 1].
         alpha: f64,
         /// First 8 bytes of the SHA-256 of the networks' weights; 0 = none.

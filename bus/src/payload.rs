@@ -14,32 +14,38 @@ pub(crate) use check::{
 
 /// Yaw bins beyond which nobody believes a map.
 const YAWS_MAX: u64 = 1024;
+/// Headings for which times are told of a vehicle with a turning circle.
+pub const HEADINGS: usize = 16;
 /// Bytes of an element of a risk map.
 const QUAD: usize = size_of::<[f32; 4]>();
 
 /// Where the parts of a risk map lie in its payload, in elements of four f32: risks [row, col, yaw], then grounds
-/// [row, col] of twelve bytes, then times to the goal [row, col], each part filled up to whole elements.
+/// [row, col] of twelve bytes, then times to the goal [row, col] and, of a vehicle with a turning circle, what that adds
+/// [heading, row, col], each part filled up to whole elements.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct RiskParts {
     n_cells: usize,
     n_risks: usize,
     n_ground_elements: usize,
+    n_headings: usize,
 }
 
 impl RiskParts {
-    /// The parts of a map of this shape.
-    pub fn new(geometry: &GridGeometry, n_yaws: usize) -> Self {
+    /// The parts of a map of this shape, with what turning adds for so many headings.
+    pub fn new(geometry: &GridGeometry, n_yaws: usize, n_headings: usize) -> Self {
         let n_cells = geometry.n_cells();
         Self {
             n_cells,
             n_risks: n_cells * n_yaws,
             n_ground_elements: (n_cells * size_of::<Ground>()).div_ceil(QUAD),
+            n_headings,
         }
     }
 
     /// Elements of the whole payload.
     pub fn n_elements(&self) -> usize {
-        self.n_risks + self.n_ground_elements + (self.n_cells * size_of::<f32>()).div_ceil(QUAD)
+        let n_times = self.n_cells * (1 + self.n_headings);
+        self.n_risks + self.n_ground_elements + (n_times * size_of::<f32>()).div_ceil(QUAD)
     }
 
     /// The risks.
@@ -59,16 +65,18 @@ impl RiskParts {
         bytemuck::cast_slice(&bytes[..self.n_cells * size_of::<Ground>()])
     }
 
-    /// The times to the goal [s].
-    pub fn seconds<'a>(&self, payload: &'a [[f32; 4]]) -> &'a [f32] {
-        let part = &payload[self.n_risks + self.n_ground_elements..];
-        &part.as_flattened()[..self.n_cells]
+    /// The times to the goal.
+    pub fn times<'a>(&self, payload: &'a [[f32; 4]]) -> TimesView<'a> {
+        let part = payload[self.n_risks + self.n_ground_elements..].as_flattened();
+        let (seconds, rest) = part.split_at(self.n_cells);
+        TimesView { seconds, turning_s: &rest[..self.n_headings * self.n_cells] }
     }
 
-    /// The times to the goal, to be written in place [s].
-    pub fn seconds_mut<'a>(&self, payload: &'a mut [[f32; 4]]) -> &'a mut [f32] {
-        let part = &mut payload[self.n_risks + self.n_ground_elements..];
-        &mut part.as_flattened_mut()[..self.n_cells]
+    /// The times to the goal and what turning adds to them, to be written in place [s].
+    pub fn times_mut<'a>(&self, payload: &'a mut [[f32; 4]]) -> [&'a mut [f32]; 2] {
+        let part = payload[self.n_risks + self.n_ground_elements..].as_flattened_mut();
+        let (seconds, rest) = part.split_at_mut(self.n_cells);
+        [seconds, &mut rest[..self.n_headings * self.n_cells]]
     }
 
     /// The element at a place of a payload that says what `known` does; times to the goal are zero.
@@ -93,18 +101,31 @@ impl RiskParts {
     }
 }
 
-/// A risk map as the controller reads it, where its message lies, and least times to the goal [s], shape [row, col].
-pub fn risk_views<'a>(header: &RiskHeader, payload: &'a [[f32; 4]]) -> Option<(RiskMapView<'a>, &'a [f32])> {
+/// Times to the goal, where their message lies.
+#[derive(Clone, Copy, Debug)]
+pub struct TimesView<'a> {
+    /// Least times, whatever the heading [s], shape [row, col].
+    pub seconds: &'a [f32],
+    /// What keeping to the turning circle adds [s], shape [heading, row, col]; empty of a vehicle without one.
+    pub turning_s: &'a [f32],
+}
+
+/// A risk map as the controller reads it, where its message lies, and the times to the goal.
+pub fn risk_views<'a>(
+    header: &RiskHeader,
+    payload: &'a [[f32; 4]],
+) -> Option<(RiskMapView<'a>, TimesView<'a>)> {
     let geometry = header.grid.geometry()?;
     let n_yaws = (1..=YAWS_MAX).contains(&header.n_yaws).then_some(header.n_yaws as usize)?;
     // Times are interpolated between cells: one row or column has nothing to interpolate between.
     let geometry = Some(geometry).filter(|geometry| geometry.n_rows.min(geometry.n_cols) >= 2)?;
-    let parts = RiskParts::new(&geometry, n_yaws);
+    let n_headings = [0, HEADINGS].into_iter().find(|n| *n as u64 == header.n_headings)?;
+    let parts = RiskParts::new(&geometry, n_yaws, n_headings);
     if parts.n_elements() != payload.len() {
         return None;
     }
     let map = RiskMapView::new(geometry, n_yaws, parts.risks(payload), parts.ground(payload)).ok()?;
-    Some((map, parts.seconds(payload)))
+    Some((map, parts.times(payload)))
 }
 
 /// Hash of a payload, as headers carry it.
@@ -181,7 +202,7 @@ mod tests {
                 };
             }
         });
-        let parts = RiskParts::new(&geometry, 3);
+        let parts = RiskParts::new(&geometry, 3, 0);
         let known = map.view();
         let payload = (0..parts.n_elements()).map(|place| parts.element(&known, place)).collect();
         let header =
@@ -231,13 +252,36 @@ mod tests {
     #[test]
     fn a_risk_map_is_read_where_its_message_lies() {
         let (map, header, mut payload) = told();
-        let parts = RiskParts::new(map.geometry(), 3);
-        parts.seconds_mut(&mut payload)[14] = 7.0;
-        let (view, seconds) = risk_views(&header, &payload).unwrap();
+        let parts = RiskParts::new(map.geometry(), 3, 0);
+        parts.times_mut(&mut payload)[0][14] = 7.0;
+        let (view, times) = risk_views(&header, &payload).unwrap();
         assert_eq!((view.risks, view.ground), (map.view().risks, map.view().ground));
-        assert_eq!((seconds.len(), seconds[14]), (15, 7.0));
+        assert_eq!((times.seconds.len(), times.seconds[14], times.turning_s.len()), (15, 7.0, 0));
         assert_eq!(view.risks.as_ptr().cast(), payload.as_ptr(), "no copy");
         assert_eq!(check_risk(&header, &payload), Ok(()));
+    }
+
+    #[test]
+    fn what_turning_adds_is_told_for_sixteen_headings_or_none() {
+        let (map, header, _) = told();
+        let parts = RiskParts::new(map.geometry(), 3, HEADINGS);
+        let known = map.view();
+        let mut payload: Vec<[f32; 4]> =
+            (0..parts.n_elements()).map(|place| parts.element(&known, place)).collect();
+        let [seconds, turning_s] = parts.times_mut(&mut payload);
+        assert_eq!((seconds.len(), turning_s.len()), (15, HEADINGS * 15));
+        (seconds[14], turning_s[HEADINGS * 15 - 1]) = (7.0, 3.0);
+        let header = RiskHeader { n_headings: HEADINGS as u64, ..header };
+        let (view, times) = risk_views(&header, &payload).unwrap();
+        assert_eq!(view.ground, known.ground);
+        assert_eq!((times.seconds[14], times.turning_s[HEADINGS * 15 - 1]), (7.0, 3.0));
+        assert_eq!(check_risk(&header, &payload), Ok(()));
+        for n_headings in [0, 1, 15, 17, u64::MAX] {
+            let refused = check_risk(&RiskHeader { n_headings, ..header }, &payload);
+            assert_eq!(refused, Err(Refusal::Malformed), "{n_headings}");
+        }
+        parts.times_mut(&mut payload)[1][40] = f32::NAN;
+        assert_eq!(check_risk(&header, &payload), Err(Refusal::NonFinite));
     }
 
     #[test]
@@ -253,9 +297,9 @@ mod tests {
         // Times are interpolated between rows: one alone is none, however right its length is.
         let row = GridGeometry { resolution_m: 0.2, origin: [0, 0], n_rows: 1, n_cols: 5 };
         let lone = RiskHeader { grid: Grid::from(&row), ..header };
-        let length = RiskParts::new(&row, 3).n_elements();
+        let length = RiskParts::new(&row, 3, 0).n_elements();
         assert_eq!(refused(lone, &vec![[0.0; 4]; length]), Refusal::Malformed);
-        let parts = RiskParts::new(map.geometry(), 3);
+        let parts = RiskParts::new(map.geometry(), 3, 0);
         let n_risks = parts.n_risks;
         for (place, k) in [(0, 0), (n_risks - 1, 3), (n_risks, 0), (payload.len() - 1, 1)] {
             for value in [f32::NAN, f32::INFINITY] {

@@ -1,4 +1,4 @@
-/* Messages of Surefoot, layout version 7. Written from its types; do not edit. */
+/* Messages of Surefoot, layout version 8. Written from its types; do not edit. */
 #ifndef SUREFOOT_LAYOUT_H
 #define SUREFOOT_LAYOUT_H
 
@@ -6,7 +6,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#define SUREFOOT_LAYOUT_VERSION 7u
+#define SUREFOOT_LAYOUT_VERSION 8u
 
 /* First field of every header: whose message it is, and of when. Known to the channels as surefoot.Stamp. */
 typedef struct SurefootStamp {
@@ -241,6 +241,10 @@ typedef struct SurefootRiskHeader {
     SurefootSource stuck;
     /* Where the time to the goal leads [m]. */
     double goal_m[2];
+    /* Distance from there at which it ends [m]. */
+    double tolerance_m;
+    /* Headings for which is told what turning adds to it: 16, or 0 for a vehicle that turns on the spot. */
+    uint64_t n_headings;
     /* Share of the worst outcomes that was judged for, in (0, 1]. */
     double alpha;
     /* First 8 bytes of the SHA-256 of the networks' weights; 0 = none. */
@@ -248,7 +252,7 @@ typedef struct SurefootRiskHeader {
     /* XXH3 of the payload. */
     uint64_t content_hash;
 } SurefootRiskHeader;
-static_assert(sizeof(SurefootRiskHeader) == 176, "RiskHeader");
+static_assert(sizeof(SurefootRiskHeader) == 192, "RiskHeader");
 static_assert(offsetof(SurefootRiskHeader, stamp) == 0, "RiskHeader.stamp");
 static_assert(offsetof(SurefootRiskHeader, grid) == 40, "RiskHeader.grid");
 static_assert(offsetof(SurefootRiskHeader, n_yaws) == 80, "RiskHeader.n_yaws");
@@ -257,9 +261,11 @@ static_assert(offsetof(SurefootRiskHeader, surface) == 96, "RiskHeader.surface")
 static_assert(offsetof(SurefootRiskHeader, odometry_at_ns) == 112, "RiskHeader.odometry_at_ns");
 static_assert(offsetof(SurefootRiskHeader, stuck) == 120, "RiskHeader.stuck");
 static_assert(offsetof(SurefootRiskHeader, goal_m) == 136, "RiskHeader.goal_m");
-static_assert(offsetof(SurefootRiskHeader, alpha) == 152, "RiskHeader.alpha");
-static_assert(offsetof(SurefootRiskHeader, checkpoint) == 160, "RiskHeader.checkpoint");
-static_assert(offsetof(SurefootRiskHeader, content_hash) == 168, "RiskHeader.content_hash");
+static_assert(offsetof(SurefootRiskHeader, tolerance_m) == 152, "RiskHeader.tolerance_m");
+static_assert(offsetof(SurefootRiskHeader, n_headings) == 160, "RiskHeader.n_headings");
+static_assert(offsetof(SurefootRiskHeader, alpha) == 168, "RiskHeader.alpha");
+static_assert(offsetof(SurefootRiskHeader, checkpoint) == 176, "RiskHeader.checkpoint");
+static_assert(offsetof(SurefootRiskHeader, content_hash) == 184, "RiskHeader.content_hash");
 
 /* What the vehicle shall do. It grows old from when what it was decided on was measured, whenever it is sent. Known to the channels as surefoot.Command. */
 typedef struct SurefootCommandRecord {

@@ -33,7 +33,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let isa = isa.ok_or_else(|| format!("expected an instruction set of {:?}", Isa::SETS))?;
     let mut field = CostToGo::new(CostToGoConfig::default(), &LIMITS, 96, 81)?;
     let map = random_map();
-    field.update(map.view(), GOAL_M)?;
+    field.update(map.view(), GOAL_M, 0.0)?;
     let lag = Effect::SteerLag(SteerLag { time_constant_s: 0.2 });
     let understeer = Effect::Understeer(Understeer { gradient_s2_per_m2: 0.02 });
     let (config, terminal, effects) = match work.as_str() {

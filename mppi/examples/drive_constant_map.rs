@@ -35,7 +35,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         }
     }
     let mut field = CostToGo::new(CostToGoConfig::default(), &LIMITS, geometry.n_rows, geometry.n_cols)?;
-    field.update(map.view(), GOAL_M)?;
+    field.update(map.view(), GOAL_M, 0.0)?;
 
     let model = Model { wheelbase_m: 1.0, limits: LIMITS, effects: Vec::new() };
     let stepper = Stepper::new(&model, 0.1, 1.0);

@@ -3,110 +3,30 @@
 //! The field solves the shortest-path problem on the grid, an edge costing the time that its length takes at the
 //! speed that the ground allows in that direction: `length / (speed x worst-case traction)`, the risk being that of
 //! the yaw bin along the edge. It drives forward only and ignores the turning circle: a car cannot follow every path
-//! that the field promises, so the field is a lower bound for the vehicle. The rollouts before it keep it honest, and
-//! where they end they pay for turning to it.
+//! that the field promises, so the field is a lower bound for the vehicle. What a turning circle adds to it, from every
+//! place and heading, is found by a second search, in which a vehicle may back up as well.
 
 mod buckets;
+mod config;
+mod lattice;
 mod stencil;
+mod turning;
+mod view;
 
 use bicycle::MotionLimits;
 use buckets::BucketQueue;
-use serde::{Deserialize, Serialize};
+pub use config::{CostToGoConfig, CostToGoError, Neighbourhood};
+pub use lattice::N_HEADINGS;
 use stencil::{EDGES, Edge};
 use traversability::{Cell, GridGeometry, GroundFlags, Risk, RiskMapView};
+use turning::{Ground, Turning};
+pub use view::CostToGoView;
+
+/// Radius beyond which a turning circle is not looked at more closely: it is as wide as the largest windows.
+const RADIUS_MAX_CELLS: f64 = 100.0;
 
 /// Cells of padding on every side, so that no neighbour of a cell lies outside the arrays.
 const PADDING: usize = 2;
-
-/// How far one edge of the search reaches.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Neighbourhood {
-    /// The 8 adjacent cells; on uniform ground at most 8.3 % longer than the straight line.
-    Eight,
-    /// And the 8 cells a knight's move away; at most 2.8 % longer.
-    Sixteen,
-}
-
-/// What the field assumes beyond the risk map.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct CostToGoConfig {
-    /// Directions of travel that the search knows.
-    pub neighbourhood: Neighbourhood,
-    /// Speed on unknown cells over the vehicle's speed limit, in [0.01, 1]; whatever the risk map says of them, unless
-    /// the footprint touches an obstacle.
-    pub unknown_speed_share: f64,
-    /// Speed beyond the window over the vehicle's speed limit, in [0.01, 1]: the smaller, the more memory the queue
-    /// takes.
-    pub outside_speed_share: f64,
-    /// How many times longer than at the speed limit a forbidden pose takes, in [1, 10000]. Finite, so that an
-    /// enclosed vehicle still knows which way is out; ground too slippery for this speed counts as forbidden.
-    pub forbidden_slowdown: f64,
-}
-
-impl Default for CostToGoConfig {
-    fn default() -> Self {
-        Self {
-            neighbourhood: Neighbourhood::Sixteen,
-            unknown_speed_share: 0.5,
-            outside_speed_share: 0.5,
-            forbidden_slowdown: 1000.0,
-        }
-    }
-}
-
-/// Why there is no cost-to-go field.
-#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-pub enum CostToGoError {
-    /// A value of the configuration or of the vehicle's limits is out of range.
-    #[error("{field}: expected {expected}, found {found}")]
-    Config {
-        /// Name of the field.
-        field: &'static str,
-        /// The range that would do.
-        expected: &'static str,
-        /// The value that was given.
-        found: f64,
-    },
-    /// The window has no cell inside its border.
-    #[error("cost-to-go window: expected at least 3 x 3 cells, found {n_rows} x {n_cols}")]
-    WindowTooSmall {
-        /// Rows asked for.
-        n_rows: usize,
-        /// Columns asked for.
-        n_cols: usize,
-    },
-    /// The risk map is not of the shape that the field was made for.
-    #[error(
-        "risk map: expected {expected_rows} x {expected_cols} cells with as many grounds and risks for every yaw, \
-         found {n_rows} x {n_cols}, {n_ground} grounds, {n_risks} risks of {n_yaws} yaws"
-    )]
-    MapShape {
-        /// Rows of the field.
-        expected_rows: usize,
-        /// Columns of the field.
-        expected_cols: usize,
-        /// Rows of the map.
-        n_rows: usize,
-        /// Columns of the map.
-        n_cols: usize,
-        /// Length of the map's ground array.
-        n_ground: usize,
-        /// Length of the map's risk array.
-        n_risks: usize,
-        /// Yaw bins of the map.
-        n_yaws: usize,
-    },
-    /// The goal is not a point.
-    #[error("goal: expected finite coordinates, found ({x_m}, {y_m})")]
-    Goal {
-        /// East [m].
-        x_m: f64,
-        /// North [m].
-        y_m: f64,
-    },
-}
 
 /// The field of least time to the goal, with all the memory that its computation needs.
 ///
@@ -129,15 +49,12 @@ pub struct CostToGo {
     queue: BucketQueue,
     /// The result [s], shape [row, col].
     seconds: Vec<f32>,
-}
-
-/// Time to the goal [s] from every cell.
-#[derive(Clone, Copy, Debug)]
-pub struct CostToGoView<'a> {
-    /// Where the cells lie.
-    pub geometry: GridGeometry,
-    /// Least time from the cell's centre to the goal's cell [s], finite, shape [row, col].
-    pub seconds: &'a [f32],
+    /// Places of the cells where the goal counts as reached, of `seconds`.
+    reached: Vec<usize>,
+    /// Places of the cells from which a way leads out of the window, of `seconds`.
+    exits: Vec<usize>,
+    /// What a turning circle adds, for maps of the last one's resolution.
+    turning: Option<Turning>,
 }
 
 impl CostToGo {
@@ -153,7 +70,7 @@ impl CostToGo {
         n_cols: usize,
     ) -> Result<Self, CostToGoError> {
         let limits = limits.into();
-        validate(&config, &limits)?;
+        config::validate(&config, &limits)?;
         if n_rows < 3 || n_cols < 3 {
             return Err(CostToGoError::WindowTooSmall { n_rows, n_cols });
         }
@@ -174,17 +91,26 @@ impl CostToGo {
             labels_s: vec![0.0; n_padded],
             queue: BucketQueue::new(n_buckets, n_padded),
             seconds: vec![0.0; n_rows * n_cols],
+            reached: Vec::with_capacity(n_rows * n_cols),
+            exits: Vec::with_capacity(2 * (n_rows + n_cols)),
+            turning: None,
         })
     }
 
-    /// Solves for the times over `map` to `goal_m`, which may lie beyond it. Allocates nothing.
+    /// Solves for the times over `map` to within `tolerance_m` of `goal_m`, which may lie beyond it. Allocates nothing
+    /// after the first map of a resolution.
     ///
     /// # Errors
     /// A map of another shape than the field's, or a goal that is not finite; the field then stays as it was.
-    pub fn update(&mut self, map: RiskMapView<'_>, goal_m: [f64; 2]) -> Result<(), CostToGoError> {
+    pub fn update(
+        &mut self,
+        map: RiskMapView<'_>,
+        goal_m: [f64; 2],
+        tolerance_m: f64,
+    ) -> Result<(), CostToGoError> {
         self.check_shape(&map)?;
-        if !goal_m.iter().all(|value| value.is_finite()) {
-            return Err(CostToGoError::Goal { x_m: goal_m[0], y_m: goal_m[1] });
+        if !goal_m.iter().chain([&tolerance_m]).all(|value| value.is_finite()) {
+            return Err(CostToGoError::Goal { x_m: goal_m[0], y_m: goal_m[1], tolerance_m });
         }
         self.geometry = map.geometry;
         self.fill_slowness(&map);
@@ -194,18 +120,54 @@ impl CostToGo {
             self.labels_s[start..start + self.n_cols].fill(f32::INFINITY);
         }
         self.queue.restart((self.geometry.resolution_m / f64::from(self.speed_max_mps)) as f32);
-        self.seed(goal_m);
+        self.find_reached(goal_m, tolerance_m);
+        let border_slowness = self.seed(goal_m);
         self.search_outwards();
         for (row, seconds) in self.seconds.chunks_exact_mut(self.n_cols).enumerate() {
             let start = (row + PADDING) * (self.n_cols + 2 * PADDING) + PADDING;
             seconds.copy_from_slice(&self.labels_s[start..start + self.n_cols]);
         }
+        self.keep_to_turning_circle(goal_m, border_slowness);
         Ok(())
+    }
+
+    fn keep_to_turning_circle(&mut self, goal_m: [f64; 2], border_slowness: f32) {
+        let radius_cells = self.config.turning_radius_m / self.geometry.resolution_m;
+        if radius_cells <= 0.0 {
+            return;
+        }
+        let radius_cells = radius_cells.min(RADIUS_MAX_CELLS);
+        let fitting = self.turning.take().filter(|turning| turning.radius_cells() == radius_cells);
+        let mut turning = fitting.unwrap_or_else(|| self.turning_circle(radius_cells));
+        let corner_m = self.geometry.south_west_m();
+        turning.update(&Ground {
+            slowness: &self.slowness,
+            padding: PADDING,
+            resolution_m: self.geometry.resolution_m,
+            field_s: &self.seconds,
+            goal_cells: [0, 1].map(|axis| (goal_m[axis] - corner_m[axis]) / self.geometry.resolution_m - 0.5),
+            reached: &self.reached,
+            exits: &self.exits,
+            border_slowness,
+        });
+        self.turning = Some(turning);
+    }
+
+    fn turning_circle(&self, radius_cells: f64) -> Turning {
+        let share = self.config.reverse_speed_share;
+        let reverse_slowdown = (share > 0.0).then(|| (1.0 / share) as f32);
+        Turning::new(radius_cells, reverse_slowdown, self.n_rows, self.n_cols)
+    }
+
+    /// Headings for which is found what turning adds: all of the search's, or none for who turns on the spot.
+    pub fn n_headings(&self) -> usize {
+        if self.config.turning_radius_m > 0.0 { N_HEADINGS } else { 0 }
     }
 
     /// The field of the last update.
     pub fn view(&self) -> CostToGoView<'_> {
-        CostToGoView { geometry: self.geometry, seconds: &self.seconds }
+        let turning_s = self.turning.as_ref().map_or(&[][..], Turning::turning_s);
+        CostToGoView { geometry: self.geometry, seconds: &self.seconds, turning_s }
     }
 
     fn check_shape(&self, map: &RiskMapView<'_>) -> Result<(), CostToGoError> {
@@ -275,28 +237,47 @@ impl CostToGo {
         self.slowness_at(1.0 / self.config.forbidden_slowdown)
     }
 
-    /// Puts the first known times into the queue and decides what the border ring is.
-    fn seed(&mut self, goal_m: [f64; 2]) {
+    /// The goal's cell, and those whose centres are within the tolerance, but for the border.
+    fn find_reached(&mut self, goal_m: [f64; 2], tolerance_m: f64) {
+        self.reached.clear();
         let goal = self.geometry.cell_at(goal_m[0], goal_m[1]);
-        let inside = goal.filter(|&cell| !self.is_border(cell));
+        for index in 0..self.n_rows * self.n_cols {
+            let cell = self.geometry.cell(index);
+            let [x_m, y_m] = self.geometry.centre_m(cell);
+            let is_near = libm::hypot(goal_m[0] - x_m, goal_m[1] - y_m) <= tolerance_m;
+            if (is_near || goal == Some(cell)) && !self.is_border(cell) {
+                self.reached.push(index);
+            }
+        }
+    }
+
+    /// Puts the first known times into the queue and decides what the border ring is: its time per metre [s/m].
+    fn seed(&mut self, goal_m: [f64; 2]) -> f32 {
+        let goal = self.geometry.cell_at(goal_m[0], goal_m[1]);
+        let is_inside = goal.is_some_and(|cell| !self.is_border(cell));
         let outside_slowness = self.slowness_at(self.config.outside_speed_share);
-        let border_slowness = if inside.is_some() { self.forbidden_slowness() } else { outside_slowness };
+        let border_slowness = if is_inside { self.forbidden_slowness() } else { outside_slowness };
+        self.exits.clear();
         for index in 0..self.n_rows * self.n_cols {
             let cell = self.geometry.cell(index);
             if self.is_border(cell) {
+                if !is_inside {
+                    self.exits.push(index);
+                }
                 let place = self.padded(cell);
                 self.slowness[place] = [border_slowness; 16];
                 // From the goal's own cell the line is too short to say where it passes.
-                if inside.is_none() && (goal == Some(cell) || !self.crosses_inside(cell, goal_m)) {
+                if !is_inside && (goal == Some(cell) || !self.crosses_inside(cell, goal_m)) {
                     let [x_m, y_m] = self.geometry.centre_m(cell);
                     let distance_m = libm::hypot(goal_m[0] - x_m, goal_m[1] - y_m);
                     self.improve(place, distance_m as f32 * outside_slowness);
                 }
             }
         }
-        if let Some(cell) = inside {
-            self.improve(self.padded(cell), 0.0);
+        for place in 0..self.reached.len() {
+            self.improve(self.padded(self.geometry.cell(self.reached[place])), 0.0);
         }
+        border_slowness
     }
 
     /// Whether the straight line from a cell of the border to the goal passes through the window's inside: the
@@ -343,53 +324,4 @@ impl CostToGo {
             }
         }
     }
-}
-
-impl CostToGoView<'_> {
-    /// Time from the cell that holds the point [s]; beyond the window, from the nearest cell of its border.
-    pub fn nearest_s(&self, x_m: f64, y_m: f64) -> f32 {
-        let [col, row] = self.position(x_m, y_m);
-        self.seconds[row.round() as usize * self.geometry.n_cols + col.round() as usize]
-    }
-
-    /// Time interpolated between the four surrounding cell centres [s]; beyond the window, on its border.
-    pub fn interpolated_s(&self, x_m: f64, y_m: f64) -> f32 {
-        let [col, row] = self.position(x_m, y_m);
-        let west = (col as usize).min(self.geometry.n_cols - 2);
-        let south = (row as usize).min(self.geometry.n_rows - 2);
-        let (east_share, north_share) = ((col - west as f64) as f32, (row - south as f64) as f32);
-        let mix = |from: f32, to: f32, share: f32| from * (1.0 - share) + to * share;
-        let along_row = |row: usize| {
-            let start = row * self.geometry.n_cols + west;
-            mix(self.seconds[start], self.seconds[start + 1], east_share)
-        };
-        mix(along_row(south), along_row(south + 1), north_share)
-    }
-
-    /// Column and row of a point, counted from the south-west cell's centre and held within the window. A NaN
-    /// becomes 0, so that the lookups never fail.
-    fn position(&self, x_m: f64, y_m: f64) -> [f64; 2] {
-        let [west_m, south_m] = self.geometry.south_west_m();
-        let place = |value_m: f64, start_m: f64, n: usize| {
-            ((value_m - start_m) / self.geometry.resolution_m - 0.5).max(0.0).min((n - 1) as f64)
-        };
-        [place(x_m, west_m, self.geometry.n_cols), place(y_m, south_m, self.geometry.n_rows)]
-    }
-}
-
-fn validate(config: &CostToGoConfig, limits: &MotionLimits) -> Result<(), CostToGoError> {
-    let check = |field, found: f64, expected, allowed: bool| {
-        if allowed { Ok(()) } else { Err(CostToGoError::Config { field, expected, found }) }
-    };
-    let share =
-        |field, found: f64| check(field, found, "a number from 0.01 to 1", (0.01..=1.0).contains(&found));
-    let positive =
-        |field, found: f64| check(field, found, "a finite number > 0", found > 0.0 && found.is_finite());
-    share("unknown_speed_share", config.unknown_speed_share)?;
-    share("outside_speed_share", config.outside_speed_share)?;
-    let slowdown = config.forbidden_slowdown;
-    check("forbidden_slowdown", slowdown, "a number from 1 to 10000", (1.0..=1e4).contains(&slowdown))?;
-    positive("limits.speed_max_mps", limits.high[0])?;
-    positive("limits.roll_max_rad", limits.roll_max_rad)?;
-    positive("limits.pitch_max_rad", limits.pitch_max_rad)
 }

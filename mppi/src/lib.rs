@@ -67,7 +67,7 @@ pub use bicycle::lanes::Isa;
 pub use config::{Actuation, Config, ConfigError, Costs, Recovery, SampleSpace, Sampling, Temperature};
 pub use controller::{Controller, Phase};
 pub use cost::{Future, Place, RolloutCost, Step, StepCost};
-pub use cost_to_go::{CostToGo, CostToGoConfig, CostToGoError, CostToGoView, Neighbourhood};
+pub use cost_to_go::{CostToGo, CostToGoConfig, CostToGoError, CostToGoView, N_HEADINGS, Neighbourhood};
 pub use diagnostics::{CostTerm, Diagnostics};
 pub use discs::{Disc, DiscPrices, MovingDiscs, Outline};
 pub use driven::Driven;

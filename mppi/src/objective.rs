@@ -1,6 +1,6 @@
 //! What the controller is asked to do and what it is told.
 
-use crate::cost_to_go::CostToGoView;
+use crate::cost_to_go::{CostToGoView, N_HEADINGS};
 use crate::kernel::Kernel;
 use bicycle::lanes::{Constant, Lanes, Real};
 use bicycle::{MotionState, State};
@@ -145,6 +145,8 @@ fn direction(from_m: [f64; 2], to_m: [f64; 2]) -> ([f64; 2], f64) {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct TerminalField<'a> {
     seconds: &'a [f32],
+    /// What the turning circle adds, shape [heading, row, col]; empty where that is told as on open ground.
+    turning_s: &'a [f32],
     n_rows: usize,
     n_cols: usize,
     /// Cells of the field per cell of the map.
@@ -156,19 +158,21 @@ pub(crate) struct TerminalField<'a> {
 }
 
 impl<'a> TerminalField<'a> {
-    /// `None` when the field has less than two rows or columns, or not the length that its geometry says.
+    /// `None` when the field has less than two rows or columns, or not the lengths that its geometry says.
     pub(crate) fn new(view: CostToGoView<'a>, map: &GridGeometry, turning_s_per_rad: f64) -> Option<Self> {
         let GridGeometry { n_rows, n_cols, resolution_m, .. } = view.geometry;
         let (map_corner, corner) = (map.south_west_m(), view.geometry.south_west_m());
         let offset = [0, 1].map(|axis| (map_corner[axis] - corner[axis]) / resolution_m - 0.5);
-        let usable = n_rows >= 2 && n_cols >= 2 && view.seconds.len() == n_rows * n_cols;
+        let CostToGoView { seconds, turning_s, .. } = view;
+        let n_turning = if turning_s.is_empty() { 0 } else { N_HEADINGS * n_rows * n_cols };
+        let fits = seconds.len() == n_rows * n_cols && turning_s.len() == n_turning;
+        let usable = n_rows >= 2 && n_cols >= 2 && fits;
         let scale = map.resolution_m / resolution_m;
-        let seconds = view.seconds;
-        usable.then_some(Self { seconds, n_rows, n_cols, scale, offset, turning_s_per_rad })
+        usable.then_some(Self { seconds, turning_s, n_rows, n_cols, scale, offset, turning_s_per_rad })
     }
 
     /// Time to go from a pose [s]: that of its place, interpolated between cell centres, beyond the field that of its
-    /// rim; and what it takes to turn to where the time falls fastest.
+    /// rim; and what it takes to turn.
     #[inline(always)]
     pub(crate) fn time_to_go<K: Kernel>(
         &self,
@@ -176,11 +180,12 @@ impl<'a> TerminalField<'a> {
         y_cells: Real<K>,
         turns: Real<K>,
     ) -> Real<K> {
-        let (seconds, gradient) = self.seconds(x_cells, y_cells);
-        seconds + self.turning_s(gradient, turns)
+        let spot = self.spot(x_cells, y_cells);
+        let (seconds, gradient) = self.seconds(&spot);
+        seconds + self.turning_s(&spot, gradient, turns)
     }
 
-    /// What it takes from a pose to turn to where the time falls fastest [s].
+    /// What it takes from a pose to turn to the way [s].
     #[inline(always)]
     pub(crate) fn time_to_turn<K: Kernel>(
         &self,
@@ -188,15 +193,39 @@ impl<'a> TerminalField<'a> {
         y_cells: Real<K>,
         turns: Real<K>,
     ) -> Real<K> {
-        let (_, gradient) = self.seconds(x_cells, y_cells);
-        self.turning_s(gradient, turns)
+        let spot = self.spot(x_cells, y_cells);
+        let (_, gradient) = self.seconds(&spot);
+        self.turning_s(&spot, gradient, turns)
+    }
+
+    #[inline(always)]
+    fn turning_s<K: Kernel>(&self, spot: &Spot<K>, gradient: [Real<K>; 2], turns: Real<K>) -> Real<K> {
+        if self.turning_s.is_empty() {
+            self.turning_on_open_ground_s(gradient, turns)
+        } else {
+            self.turning_among_obstacles_s(spot, turns)
+        }
+    }
+
+    /// As the search over poses found it, interpolated between cells and headings.
+    #[inline(always)]
+    fn turning_among_obstacles_s<K: Kernel>(&self, spot: &Spot<K>, turns: Real<K>) -> Real<K> {
+        let kernel = turns.0;
+        let ([heading, next], share) = headings(turns);
+        let n_cells = kernel.word((self.n_rows * self.n_cols) as u32);
+        let at = |heading: K::Bits| {
+            let corner = kernel.add_bits(kernel.mul_bits(heading, n_cells), spot.corner);
+            self.between_cells(self.turning_s, corner, spot).0
+        };
+        let (from, to) = (at(heading), at(next));
+        (to - from).mul_add(share, from)
     }
 
     /// Who faces away from the way by an angle e and drives the tightest turn of radius R covers R e until it faces it,
     /// and comes R sin e nearer: R (e - sin e) are lost. With that much added, time to go falls by a second per second
     /// in the tightest turn on open ground, whatever the heading (the Dubins vehicle, far from its goal).
     #[inline(always)]
-    fn turning_s<K: Kernel>(&self, [east, north]: [Real<K>; 2], turns: Real<K>) -> Real<K> {
+    fn turning_on_open_ground_s<K: Kernel>(&self, [east, north]: [Real<K>; 2], turns: Real<K>) -> Real<K> {
         let kernel = turns.0;
         let (sine, cosine) = turns.sin_cos_turns();
         let slope = east.mul_add(east, north * north).sqrt().max(kernel.real(SMALLEST_SLOPE_S));
@@ -206,16 +235,35 @@ impl<'a> TerminalField<'a> {
 
     /// Time to go, and its change per cell to the east and to the north [s].
     #[inline(always)]
-    fn seconds<K: Kernel>(&self, x_cells: Real<K>, y_cells: Real<K>) -> (Real<K>, [Real<K>; 2]) {
+    fn seconds<K: Kernel>(&self, spot: &Spot<K>) -> (Real<K>, [Real<K>; 2]) {
+        self.between_cells(self.seconds, spot.corner, spot)
+    }
+
+    /// Where a point lies among the cell centres.
+    #[inline(always)]
+    fn spot<K: Kernel>(&self, x_cells: Real<K>, y_cells: Real<K>) -> Spot<K> {
         let kernel = x_cells.0;
         let (col, east) = self.place(x_cells, self.offset[0], self.n_cols);
         let (row, north) = self.place(y_cells, self.offset[1], self.n_rows);
         let corner = kernel.add_bits(kernel.mul_bits(row, kernel.word(self.n_cols as u32)), col);
-        let (south, rise_south) = self.along_row(corner, east);
+        Spot { corner, east, north }
+    }
+
+    /// A table's value between four cells, of which the south-western is at `corner`, and its change per cell to the east
+    /// and to the north.
+    #[inline(always)]
+    fn between_cells<K: Kernel>(
+        &self,
+        table: &[f32],
+        corner: K::Bits,
+        spot: &Spot<K>,
+    ) -> (Real<K>, [Real<K>; 2]) {
+        let kernel = spot.east.0;
+        let (south, rise_south) = along_row(table, corner, spot.east);
         let upper_corner = kernel.add_bits(corner, kernel.word(self.n_cols as u32));
-        let (upper, rise_upper) = self.along_row(upper_corner, east);
-        let eastward = (rise_upper - rise_south).mul_add(north, rise_south);
-        ((upper - south).mul_add(north, south), [eastward, upper - south])
+        let (upper, rise_upper) = along_row(table, upper_corner, spot.east);
+        let eastward = (rise_upper - rise_south).mul_add(spot.north, rise_south);
+        ((upper - south).mul_add(spot.north, south), [eastward, upper - south])
     }
 
     /// Cell and share of the way to the next one, along one axis.
@@ -227,15 +275,46 @@ impl<'a> TerminalField<'a> {
         let whole = kernel.truncate(place.min(kernel.real((n - 2) as f64)).1);
         (whole, place - Real(kernel, kernel.convert(whole)))
     }
+}
 
-    /// Between a cell and its eastern neighbour, and how much more the neighbour's is.
-    #[inline(always)]
-    fn along_row<K: Kernel>(&self, index: K::Bits, share: Real<K>) -> (Real<K>, Real<K>) {
-        let kernel = share.0;
-        let west = Real(kernel, kernel.gather(self.seconds, index));
-        let east = Real(kernel, kernel.gather(self.seconds, kernel.add_bits(index, kernel.word(1))));
-        ((east - west).mul_add(share, west), east - west)
-    }
+/// Where a point lies among the cell centres of a field: the cell to the south-west, and the shares of the way to the
+/// next ones.
+struct Spot<K: Kernel> {
+    corner: K::Bits,
+    east: Real<K>,
+    north: Real<K>,
+}
+
+/// Between a cell and its eastern neighbour, and how much more the neighbour's is.
+#[inline(always)]
+fn along_row<K: Kernel>(table: &[f32], index: K::Bits, share: Real<K>) -> (Real<K>, Real<K>) {
+    let kernel = share.0;
+    let west = Real(kernel, kernel.gather(table, index));
+    let east = Real(kernel, kernel.gather(table, kernel.add_bits(index, kernel.word(1))));
+    ((east - west).mul_add(share, west), east - west)
+}
+
+/// Share of an octant, counted from an axis, at which the knight's move lies: atan(1/2) of 45 degrees.
+const KNIGHT_SHARE: f64 = 0.590_334_470_601_733_1;
+
+/// The headings of the search on either side of a yaw, and how far it is from the first to the second. Two lie in every
+/// octant: its beginning and a knight's move, nearer to its diagonal.
+#[inline(always)]
+fn headings<K: Kernel>(turns: Real<K>) -> ([K::Bits; 2], Real<K>) {
+    let kernel = turns.0;
+    let [zero, one] = [0.0, 1.0].map(|value| kernel.real(value));
+    let wrapped = turns.wrap_turns();
+    let octants = wrapped.add_where(wrapped.less(zero), one) * kernel.real(8.0);
+    let octant = kernel.truncate_up_to(octants.1, kernel.real(7.0).1);
+    let past = octants - Real(kernel, kernel.convert(octant));
+    let begins_at_diagonal = Real(kernel, kernel.convert(kernel.and_bits(octant, kernel.word(1))));
+    let knight = begins_at_diagonal.mul_add(kernel.real(1.0 - 2.0 * KNIGHT_SHARE), kernel.real(KNIGHT_SHARE));
+    let is_beyond = zero.add_where(past.exceeds(knight), one);
+    let length = is_beyond.mul_add(one - knight - knight, knight);
+    let share = ((past - is_beyond * knight) / length).clamp(zero, one);
+    let heading = kernel.add_bits(kernel.shl::<1>(octant), kernel.truncate(is_beyond.1));
+    let next = kernel.and_bits(kernel.add_bits(heading, kernel.word(1)), kernel.word(15));
+    ([heading, next], share)
 }
 
 /// e - sin e of the angle e in [0, pi] between a heading and the way [rad], by the cosine of the angle between the

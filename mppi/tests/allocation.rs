@@ -57,8 +57,13 @@ fn a_decision_allocates_nothing() {
     ];
     let map = fixture::rough(3);
     for (config, model) in cases {
-        let mut field = CostToGo::new(CostToGoConfig::default(), &model.limits, 160, 160).unwrap();
-        field.update(map.view(), [15.0, 10.0]).unwrap();
+        let turning =
+            CostToGoConfig { turning_radius_m: 3.0, reverse_speed_share: 0.25, ..CostToGoConfig::default() };
+        let mut field = CostToGo::new(turning, &model.limits, 160, 160).unwrap();
+        field.update(map.view(), [15.0, 10.0], 0.0).unwrap();
+        let before = N_ALLOCATIONS.load(Ordering::Relaxed);
+        field.update(map.view(), [15.0, 10.0], 0.5).unwrap();
+        assert_eq!(N_ALLOCATIONS.load(Ordering::Relaxed) - before, 0);
         let prices = DiscPrices { touch_s: 1.0, near_s: 0.1, foresight_s: 0.5 };
         let discs = MovingDiscs::new(Outline::default(), prices, 4, config.n_steps);
         let mut controller = Controller::with_costs(config, model, (discs, ()), 1).unwrap();

@@ -33,6 +33,7 @@ fn config(neighbourhood: Neighbourhood) -> CostToGoConfig {
         unknown_speed_share: UNKNOWN_SPEED_SHARE,
         outside_speed_share: OUTSIDE_SPEED_SHARE,
         forbidden_slowdown: SLOWDOWN,
+        ..CostToGoConfig::default()
     }
 }
 
@@ -43,7 +44,7 @@ fn geometry(n_rows: usize, n_cols: usize) -> GridGeometry {
 fn field(neighbourhood: Neighbourhood, map: &RiskMap, goal_m: [f64; 2]) -> CostToGo {
     let GridGeometry { n_rows, n_cols, .. } = *map.geometry();
     let mut field = CostToGo::new(config(neighbourhood), &limits(), n_rows, n_cols).unwrap();
-    field.update(map.view(), goal_m).unwrap();
+    field.update(map.view(), goal_m, 0.0).unwrap();
     field
 }
 
@@ -451,7 +452,7 @@ fn the_field_is_optimal() {
         let n_yaws = [13, 16, 8][seed % 3];
         let map = random_map(seed as u64, 14, 17, n_yaws);
         for (field, reach) in &mut field_of {
-            field.update(map.view(), goal_m).unwrap();
+            field.update(map.view(), goal_m, 0.0).unwrap();
             let expected_s = Oracle { map: map.view(), goal_m, reach: *reach }.solve();
             for (&found_s, expected_s) in field.view().seconds.iter().zip(expected_s) {
                 close(f64::from(found_s), expected_s);
@@ -466,7 +467,7 @@ fn the_result_does_not_depend_on_what_was_solved_before() {
     let goals_m = [[2.0, 5.0], [400.0, -3.0], [0.0, 6.0]];
     let mut reused = CostToGo::new(config(Neighbourhood::Sixteen), &limits(), 20, 30).unwrap();
     for (map, goal_m) in maps.iter().zip(goals_m) {
-        reused.update(map.view(), goal_m).unwrap();
+        reused.update(map.view(), goal_m, 0.0).unwrap();
         let fresh = field(Neighbourhood::Sixteen, map, goal_m);
         let bits = |field: &CostToGo| -> Vec<u32> {
             field.view().seconds.iter().map(|seconds| seconds.to_bits()).collect()
@@ -485,7 +486,7 @@ fn interpolation_is_exact_on_a_plane_and_holds_the_border_value_beyond() {
             plane_s(x_m, y_m) as f32
         })
         .collect();
-    let view = CostToGoView { geometry, seconds: &seconds };
+    let view = CostToGoView { geometry, seconds: &seconds, turning_s: &[] };
     let [west_m, south_m] = geometry.centre_m(Cell { row: 0, col: 0 });
     let [east_m, north_m] = geometry.centre_m(Cell { row: 5, col: 8 });
     for i in 0..200 {
@@ -515,6 +516,10 @@ fn bad_input_is_refused_with_its_numbers() {
         (CostToGoConfig { outside_speed_share: f64::NAN, ..good }, "outside_speed_share"),
         (CostToGoConfig { forbidden_slowdown: 0.5, ..good }, "forbidden_slowdown"),
         (CostToGoConfig { forbidden_slowdown: f64::INFINITY, ..good }, "forbidden_slowdown"),
+        (CostToGoConfig { turning_radius_m: -0.1, ..good }, "turning_radius_m"),
+        (CostToGoConfig { turning_radius_m: f64::NAN, ..good }, "turning_radius_m"),
+        (CostToGoConfig { reverse_speed_share: 0.001, ..good }, "reverse_speed_share"),
+        (CostToGoConfig { reverse_speed_share: 1.1, ..good }, "reverse_speed_share"),
     ] {
         assert!(refused(config, limits()).starts_with(field), "{}", refused(config, limits()));
     }
@@ -522,10 +527,13 @@ fn bad_input_is_refused_with_its_numbers() {
     assert_eq!(refused(good, still), "limits.speed_max_mps: expected a finite number > 0, found 0");
     let mut field = CostToGo::new(good, &limits(), 9, 9).unwrap();
     let other = RiskMap::constant(geometry(9, 10), 13, Risk::NONE);
-    assert!(matches!(field.update(other.view(), [0.0; 2]), Err(CostToGoError::MapShape { n_cols: 10, .. })));
+    assert!(matches!(
+        field.update(other.view(), [0.0; 2], 0.0),
+        Err(CostToGoError::MapShape { n_cols: 10, .. })
+    ));
     let map = RiskMap::constant(geometry(9, 9), 13, Risk::NONE);
     let headless = RiskMap::constant(geometry(9, 9), 0, Risk::NONE);
-    assert!(matches!(field.update(headless.view(), [0.0; 2]), Err(CostToGoError::MapShape { .. })));
-    assert!(matches!(field.update(map.view(), [f64::NAN, 0.0]), Err(CostToGoError::Goal { .. })));
+    assert!(matches!(field.update(headless.view(), [0.0; 2], 0.0), Err(CostToGoError::MapShape { .. })));
+    assert!(matches!(field.update(map.view(), [f64::NAN, 0.0], 0.0), Err(CostToGoError::Goal { .. })));
     assert!(CostToGo::new(good, &limits(), 2, 9).is_err());
 }

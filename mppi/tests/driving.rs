@@ -87,7 +87,7 @@ fn the_cost_to_go_field_leads_around_what_the_horizon_cannot_see() {
     let mut map = level();
     block(&mut map, |x_m, y_m| (5.0..6.0).contains(&x_m) && (-12.0..12.0).contains(&y_m));
     let mut field = CostToGo::new(CostToGoConfig::default(), &model().limits, 160, 160).unwrap();
-    field.update(map.view(), [10.0, 0.0]).unwrap();
+    field.update(map.view(), [10.0, 0.0], 0.0).unwrap();
     let terminal = Terminal::CostToGo(field.view());
     let objective = Objective::Goal { goal_m: [10.0, 0.0], tolerance_m: 0.5, terminal };
     let drive = drive(&smooth(), &model(), &map, objective, (standing(), 500));
@@ -104,7 +104,7 @@ fn a_goal_behind_is_turned_around_for_though_the_horizon_is_shorter_than_the_tur
     let model = Model { limits, ..model() };
     let map = level();
     let mut field = CostToGo::new(CostToGoConfig::default(), &model.limits, 160, 160).unwrap();
-    field.update(map.view(), [-15.0, 0.0]).unwrap();
+    field.update(map.view(), [-15.0, 0.0], 0.0).unwrap();
     let terminal = Terminal::CostToGo(field.view());
     let objective = Objective::Goal { goal_m: [-15.0, 0.0], tolerance_m: 0.5, terminal };
     let drive = drive(&smooth(), &model, &map, objective, (standing(), 400));
@@ -354,7 +354,7 @@ fn who_is_nowhere_has_no_time_to_go() {
     let mut map = level();
     let GridGeometry { n_rows, n_cols, .. } = *map.geometry();
     let mut field = CostToGo::new(CostToGoConfig::default(), &model().limits, n_rows, n_cols).unwrap();
-    field.update(map.view(), [8.0, 0.0]).unwrap();
+    field.update(map.view(), [8.0, 0.0], 0.0).unwrap();
     let terminal = Terminal::CostToGo(field.view());
     let objective = Objective::Goal { goal_m: [8.0, 0.0], tolerance_m: 0.5, terminal };
     map.fill(|risks, _| risks.fill(Risk { linear_traction: f32::NAN, ..Risk::NONE }));

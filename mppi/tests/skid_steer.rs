@@ -103,7 +103,7 @@ fn the_cost_to_go_field_leads_it_around_what_the_horizon_cannot_see() {
     let mut map = level();
     block(&mut map, |x_m, y_m| (5.0..6.0).contains(&x_m) && (-12.0..12.0).contains(&y_m));
     let mut field = CostToGo::new(CostToGoConfig::default(), &model().limits, 160, 160).unwrap();
-    field.update(map.view(), [10.0, 0.0]).unwrap();
+    field.update(map.view(), [10.0, 0.0], 0.0).unwrap();
     let terminal = Terminal::CostToGo(field.view());
     let objective = Objective::Goal { goal_m: [10.0, 0.0], tolerance_m: 0.5, terminal };
     assert!(has_arrived(&drive(&config(), &map, objective, 500)));

@@ -13,7 +13,8 @@ use crate::frame::Frame;
 use crate::friction::KnownFriction;
 use crate::risk::{Belief, RiskLayer};
 use crate::{
-    Config, Jump, MessageId, MissionMessage, NavigatorError, RiskHeader, StuckMessage, SurfaceHeader,
+    Config, Destination, Jump, MessageId, MissionMessage, NavigatorError, RiskHeader, StuckMessage,
+    SurfaceHeader,
 };
 
 /// Judges the ground and finds the least time over it to the goal. Only what has changed since the map of the ground
@@ -32,7 +33,7 @@ pub struct Assessor {
     /// When the odometry was measured in whose frame the newest map lies that was told of [ns].
     frame_at_ns: u64,
     stuck: MessageId,
-    goal_m: Option<[f64; 2]>,
+    destination: Option<Destination>,
 }
 
 /// What the ground is judged with.
@@ -87,7 +88,7 @@ impl Assessor {
             frame: Frame::default(),
             frame_at_ns: 0,
             stuck: MessageId::default(),
-            goal_m: None,
+            destination: None,
         })
     }
 
@@ -128,20 +129,18 @@ impl Assessor {
 
     /// Follows what was said of where to go, and for which share of outcomes to plan.
     pub fn hear_mission(&mut self, mission: &MissionMessage) -> Result<(), NavigatorError> {
-        if let Some(destination) = mission.destination {
-            self.goal_m = Some(destination.goal_m);
-        }
+        self.destination = mission.destination.or(self.destination);
         mission.level.map_or(Ok(()), |level| self.judge_at(level))
     }
 
     /// Where the times to the goal shall lead from now on.
-    pub fn set_goal(&mut self, goal_m: [f64; 2]) {
-        self.goal_m = Some(goal_m);
+    pub fn set_destination(&mut self, destination: Destination) {
+        self.destination = Some(destination);
     }
 
     /// Whether it has been said where to: before, no map of the ground is worth judging.
     pub fn has_goal(&self) -> bool {
-        self.goal_m.is_some()
+        self.destination.is_some()
     }
 
     /// Remembers a pose that proved impassable, where it lies in the frame of the newest map that was told of; of very
@@ -201,16 +200,21 @@ impl Assessor {
     /// Finds the least time over the corrected map to the goal, and says what that map is, but for its name; `None` before
     /// the ground was judged or without a goal.
     pub fn finish(&mut self, corrected: RiskMapView<'_>) -> Result<Option<RiskHeader>, NavigatorError> {
-        let Some((judged, goal_m)) = self.judged.zip(self.goal_m) else { return Ok(None) };
-        self.cost_to_go.update(corrected, goal_m)?;
+        let Some((judged, destination)) = self.judged.zip(self.destination) else { return Ok(None) };
+        self.cost_to_go.update(corrected, destination.goal_m, destination.tolerance_m)?;
         Ok(Some(RiskHeader {
             id: MessageId::default(),
             valid_at_ns: judged.valid_at_ns,
             surface: judged.id,
             frame_at_ns: judged.frame_at_ns,
             stuck: self.stuck,
-            goal_m,
+            destination,
         }))
+    }
+
+    /// Headings for which its times tell what turning adds.
+    pub fn n_headings(&self) -> usize {
+        self.cost_to_go.n_headings()
     }
 
     /// The times of the last [`Assessor::finish`].

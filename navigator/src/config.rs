@@ -1,6 +1,6 @@
 //! Settings of the whole pipeline, and the ones that fit a machine.
 
-use bicycle::{Geometry, Vehicle};
+use bicycle::{Geometry, Limits, Vehicle};
 use kinodynamics::CorrectionConfig;
 use mppi::CostToGoConfig;
 use physics_prior::{PriorConfig, SlopeLaw};
@@ -84,7 +84,12 @@ impl Config {
     pub fn for_vehicle(vehicle: &Vehicle) -> Self {
         let fitting = Self::for_geometry(&vehicle.geometry, vehicle.limits.speed_max_mps);
         let prior = PriorConfig { slope_law: SlopeLaw::of(vehicle), lean: vehicle.lean(), ..fitting.prior };
-        Self { prior, ..fitting }
+        let cost_to_go = CostToGoConfig {
+            turning_radius_m: vehicle.geometry.wheelbase_m / libm::tan(vehicle.limits.steering_max_rad),
+            reverse_speed_share: reverse_speed_share(&vehicle.limits, &fitting.controller),
+            ..fitting.cost_to_go
+        };
+        Self { prior, cost_to_go, ..fitting }
     }
 
     /// Settings that fit a vehicle's lengths and its fastest speed: a window of at most 128 cells a side that holds twice
@@ -235,6 +240,14 @@ fn cost_to_go(length_m: f64) -> CostToGoConfig {
         unknown_speed_share: if is_small { 0.25 } else { default.unknown_speed_share },
         ..default
     }
+}
+
+/// Speed in reverse over the speed limit, so that a metre costs what plans pay for it: a step in reverse has a price, and
+/// covers less.
+fn reverse_speed_share(limits: &Limits, controller: &mppi::Config) -> f64 {
+    let price = 1.0 + controller.costs.reverse_s / controller.step_s;
+    let share = limits.reverse_speed_max_mps / (limits.speed_max_mps * price);
+    if share < 0.01 { 0.0 } else { share.min(1.0) }
 }
 
 /// The controller's defaults with the lengths of the recovery scaled from a vehicle of 3.4 m. Small machines spin

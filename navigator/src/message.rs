@@ -120,8 +120,8 @@ pub struct RiskHeader {
     pub frame_at_ns: u64,
     /// The last stuck pose that it takes into account.
     pub stuck: MessageId,
-    /// The goal that its times lead to, as it was said [m].
-    pub goal_m: [f64; 2],
+    /// Where its times lead, as it was said.
+    pub destination: Destination,
 }
 
 /// A risk map as the pilot reads it, where whoever carries it keeps it.

@@ -371,7 +371,7 @@ impl<M: Driven> Pilot<M> {
 /// A risk map's message as the controller is asked on it.
 fn risk_input(map: RiskMessage<'_>) -> Option<RiskInput<'_>> {
     let (risk, time_to_goal) = map.content?;
-    let RiskHeader { goal_m, frame_at_ns, .. } = map.header;
+    let RiskHeader { destination: Destination { goal_m, .. }, frame_at_ns, .. } = map.header;
     Some(RiskInput { map: risk, time_to_goal, goal_m, odometry_at_ns: frame_at_ns })
 }
 

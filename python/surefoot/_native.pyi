@@ -23,7 +23,8 @@ class Defect(RuntimeError):
 
 @final
 class CostToGo:
-    """The field of least time to the goal over the known map, which tells the controller what lies beyond its horizon.
+    """The field of least time to the goal over the known map, which tells the controller what lies beyond its horizon, with
+    what a turning circle adds to it from every place and heading.
 
     CostToGo(model, n_rows, n_cols, settings=None) for risk maps of that many rows and columns. settings: a dict, TOML text or
     a path with what differs from the defaults, as the part "cost_to_go" of `settings_for(vehicle)`.
@@ -39,9 +40,16 @@ class CostToGo:
     def seconds(self) -> NDArray[float32]:
         """Least time from each cell to the goal [s]: float32 (row, col), zero before the first update, a copy."""
 
-    def update(self, risk_map: RiskMap, goal_m: _Floats) -> None:
-        """Solves for the times over the map to the goal, two numbers, x_m, y_m, which may lie beyond it. Raises `ValueError` for a
-        map of another shape or a goal that is no place; the field is then as it was.
+    @property
+    def turning_s(self) -> NDArray[float32]:
+        """What keeping to the turning circle takes beyond that [s]: float32 (heading, row, col), a copy; no heading for a vehicle
+        that turns on the spot or before the first update, else 16: to the 8 adjacent cells and to the 8 a knight's move away,
+        counter-clockwise from east.
+        """
+
+    def update(self, risk_map: RiskMap, goal_m: _Floats, tolerance_m: SupportsFloat | SupportsIndex=0.0) -> None:
+        """Solves for the times over the map to within a tolerance of the goal, two numbers, x_m, y_m, which may lie beyond it.
+        Raises `ValueError` for a map of another shape or a goal that is no place; the field is then as it was.
         """
 
 @final

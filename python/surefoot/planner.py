@@ -58,11 +58,12 @@ class Planner:
     ) -> Decision:
         """What to do now to reach the goal: a `Decision`.
 
-        ground: an `ElevationMap` or a `Surface`, or None where it is as it was at the last decision, and so is the goal.
+        ground: an `ElevationMap` or a `Surface`, or None where it is as it was at the last decision, and so are goal and
+        tolerance.
         """
         if ground is not None:
             self.risk_map = self.judge.judge(ground, centre_m=state[:2])
-            self.field.update(self.risk_map, goal_m)
+            self.field.update(self.risk_map, goal_m, tolerance_m)
         elif self.risk_map is None:
             raise ValueError("ground: expected an ElevationMap or a Surface for the first decision, found None")
         return self.controller.decide(

@@ -185,6 +185,20 @@ def test_times_to_the_goal_are_those_of_the_straight_line_on_level_ground(model)
         field.update(ground.level_map(), (np.inf, 0.0))
 
 
+def test_who_faces_away_from_the_goal_turns_by_half_a_circle_first(model):
+    settings = {"turning_radius_m": 1.5, "reverse_speed_share": 0.0}
+    field = surefoot.CostToGo(model, 81, 121, settings)
+    assert field.turning_s.shape == (0, 81, 121)
+    field.update(ground.level_map(), GOAL_M, tolerance_m=0.5)
+    assert field.turning_s.shape == (16, 81, 121) and field.turning_s.dtype == np.float32
+    speed_mps = 0.8 * limits(model)["speed_max_mps"]
+    east, west, row, col = 0, 8, 40, 40
+    # pi R along the circle brings it no nearer and two radii aside.
+    lost_s = (field.turning_s[west, row, col] - field.turning_s[east, row, col]) * speed_mps
+    assert abs(lost_s - np.pi * 1.5) < 1.0
+    assert surefoot.CostToGo(model, 81, 121).turning_s.shape[0] == 0
+
+
 def test_what_was_sent_instead_is_where_the_next_plan_starts(model):
     risk_map = ground.level_map()
     settings = {"delay_s": 0.3}

@@ -1,8 +1,8 @@
-"""Messages of Surefoot, layout version 7. Written from its types; do not edit."""
+"""Messages of Surefoot, layout version 8. Written from its types; do not edit."""
 
 import ctypes
 
-LAYOUT_VERSION = 7
+LAYOUT_VERSION = 8
 
 
 class Stamp(ctypes.Structure):
@@ -330,6 +330,10 @@ class RiskHeader(ctypes.Structure):
         ("stuck", Source),
         # Where the time to the goal leads [m].
         ("goal_m", ctypes.c_double * 2),
+        # Distance from there at which it ends [m].
+        ("tolerance_m", ctypes.c_double),
+        # Headings for which is told what turning adds to it: 16, or 0 for a vehicle that turns on the spot.
+        ("n_headings", ctypes.c_uint64),
         # Share of the worst outcomes that was judged for, in (0, 1].
         ("alpha", ctypes.c_double),
         # First 8 bytes of the SHA-256 of the networks' weights; 0 = none.
@@ -343,7 +347,7 @@ class RiskHeader(ctypes.Structure):
         return "surefoot.RiskHeader"
 
 
-assert ctypes.sizeof(RiskHeader) == 176
+assert ctypes.sizeof(RiskHeader) == 192
 assert RiskHeader.stamp.offset == 0
 assert RiskHeader.grid.offset == 40
 assert RiskHeader.n_yaws.offset == 80
@@ -352,9 +356,11 @@ assert RiskHeader.surface.offset == 96
 assert RiskHeader.odometry_at_ns.offset == 112
 assert RiskHeader.stuck.offset == 120
 assert RiskHeader.goal_m.offset == 136
-assert RiskHeader.alpha.offset == 152
-assert RiskHeader.checkpoint.offset == 160
-assert RiskHeader.content_hash.offset == 168
+assert RiskHeader.tolerance_m.offset == 152
+assert RiskHeader.n_headings.offset == 160
+assert RiskHeader.alpha.offset == 168
+assert RiskHeader.checkpoint.offset == 176
+assert RiskHeader.content_hash.offset == 184
 
 
 class CommandRecord(ctypes.Structure):

@@ -5,7 +5,7 @@ use bus::message::{
     StuckRecord, SurfaceHeader, TRACKS_MAX, TrackRecord, TracksHeader,
     mission::{DRIVE, EMERGENCY_STOP, MANUAL, NONE, PAUSED, UNDER_WAY},
 };
-use bus::payload::risk_views;
+use bus::payload::{TimesView, risk_views};
 use kinodynamics::{Effect, Reason};
 use mppi::CostToGoView;
 use navigator::{
@@ -129,6 +129,9 @@ pub fn surface_header(record: &SurfaceHeader) -> navigator::SurfaceHeader {
     }
 }
 
+// A message holds the headings that the search over poses knows.
+const _: () = assert!(bus::payload::HEADINGS == mppi::N_HEADINGS);
+
 // A message holds what a tracker tells of.
 const _: () = assert!(TRACKS_MAX == tracking::TRACKS_MAX);
 
@@ -171,8 +174,10 @@ pub fn shift_of(record: &SurfaceHeader) -> Jump {
 
 /// A risk map, read where its message lies.
 pub fn risk_message<'a>(record: &RiskHeader, payload: &'a [[f32; 4]]) -> RiskMessage<'a> {
-    let content = risk_views(record, payload)
-        .map(|(map, seconds)| (map, CostToGoView { geometry: map.geometry, seconds }));
+    let content = risk_views(record, payload).map(|(map, times)| {
+        let TimesView { seconds, turning_s } = times;
+        (map, CostToGoView { geometry: map.geometry, seconds, turning_s })
+    });
     RiskMessage {
         header: navigator::RiskHeader {
             id: id_of(record.stamp.source()),
@@ -180,7 +185,7 @@ pub fn risk_message<'a>(record: &RiskHeader, payload: &'a [[f32; 4]]) -> RiskMes
             surface: id_of(record.surface),
             frame_at_ns: record.odometry_at_ns,
             stuck: id_of(record.stuck),
-            goal_m: record.goal_m,
+            destination: Destination { goal_m: record.goal_m, tolerance_m: record.tolerance_m },
         },
         content,
     }

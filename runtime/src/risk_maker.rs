@@ -1,7 +1,7 @@
 //! A surface message becomes a risk map's: the work of learning, of mapping while learning is silent, and of replay.
 
 use crate::convert::{mission_message, source_of, stuck_message, surface_header};
-use navigator::{Assessor, NavigatorError};
+use navigator::{Assessor, Destination, NavigatorError};
 use traversability::{CvarLevel, RiskMapView};
 
 use bus::channel::{Inlet, Refusal};
@@ -59,8 +59,8 @@ impl RiskMaker {
     }
 
     /// Where the times to the goal shall lead from now on.
-    pub fn set_goal(&mut self, goal_m: [f64; 2]) {
-        self.assessor.set_goal(goal_m);
+    pub fn set_destination(&mut self, destination: Destination) {
+        self.assessor.set_destination(destination);
     }
 
     /// Whether it has been said where to: before, no surface is worth judging.
@@ -94,28 +94,36 @@ impl RiskMaker {
     /// Number of elements of the message; `None` before the first surface or without a goal.
     pub fn n_elements(&self) -> Option<usize> {
         let known = self.assessor.known().filter(|_| self.has_goal())?;
-        Some(RiskParts::new(&known.geometry, known.n_yaws).n_elements())
+        Some(self.parts(&known).n_elements())
     }
 
     /// What is to be written into the message first, element by element.
     pub fn writer(&self) -> Option<impl Fn(usize) -> [f32; 4] + '_> {
         let known = self.assessor.known()?;
-        let parts = RiskParts::new(&known.geometry, known.n_yaws);
+        let parts = self.parts(&known);
         Some(move |place| parts.element(&known, place))
+    }
+
+    fn parts(&self, known: &RiskMapView<'_>) -> RiskParts {
+        RiskParts::new(&known.geometry, known.n_yaws, self.assessor.n_headings())
     }
 
     /// Completes, in place, a message that was written so, and gives its header, without stamp.
     pub fn finish(&mut self, payload: &mut [[f32; 4]]) -> Result<RiskHeader, NavigatorError> {
         let Some(known) = self.assessor.known() else { return Ok(RiskHeader::default()) };
         let (geometry, n_yaws) = (known.geometry, known.n_yaws);
-        let parts = RiskParts::new(&geometry, n_yaws);
+        let parts = self.parts(&known);
         self.assessor.correct(parts.risks_mut(payload));
         // The parts have the lengths of a map of this shape.
         let Ok(map) = RiskMapView::new(geometry, n_yaws, parts.risks(payload), parts.ground(payload)) else {
             return Ok(RiskHeader::default());
         };
         let Some(header) = self.assessor.finish(map)? else { return Ok(RiskHeader::default()) };
-        parts.seconds_mut(payload).copy_from_slice(self.assessor.time_to_goal().seconds);
+        let times = self.assessor.time_to_goal();
+        let [seconds, turning_s] = parts.times_mut(payload);
+        seconds.copy_from_slice(times.seconds);
+        turning_s.copy_from_slice(times.turning_s);
+        let Destination { goal_m, tolerance_m } = header.destination;
         Ok(RiskHeader {
             stamp: Stamp::default(),
             grid: Grid::from(&geometry),
@@ -124,7 +132,9 @@ impl RiskMaker {
             surface: source_of(header.surface),
             odometry_at_ns: header.frame_at_ns,
             stuck: source_of(header.stuck),
-            goal_m: header.goal_m,
+            goal_m,
+            tolerance_m,
+            n_headings: self.assessor.n_headings() as u64,
             alpha: self.assessor.level().get(),
             checkpoint: self.checkpoint,
             content_hash: payload::content_hash(payload),

@@ -104,7 +104,7 @@ pub(crate) fn check_tracks(_: &TracksHeader, payload: &[TrackRecord]) -> Result<
 }
 
 pub(crate) fn check_risk(header: &RiskHeader, payload: &[[f32; 4]]) -> Result<(), Refusal> {
-    let (map, seconds_to_goal) = risk_views(header, payload).ok_or(Refusal::Malformed)?;
+    let (map, times) = risk_views(header, payload).ok_or(Refusal::Malformed)?;
     require(matches!(header.map_source, 1 | 2), Refusal::Malformed)?;
     // A finite number times zero is zero; of anything else the sum is no number. One pass, without a branch.
     let of_risks = map.risks.iter().fold(0.0, |sum: f32, risk| {
@@ -112,7 +112,8 @@ pub(crate) fn check_risk(header: &RiskHeader, payload: &[[f32; 4]]) -> Result<()
     });
     let of_ground =
         map.ground.iter().fold(0.0, |sum: f32, ground| sum + 0.0 * (ground.gradient[0] + ground.gradient[1]));
-    let of_times = seconds_to_goal.iter().fold(0.0, |sum: f32, seconds| sum + 0.0 * seconds);
+    let of_times =
+        times.seconds.iter().chain(times.turning_s).fold(0.0, |sum: f32, seconds| sum + 0.0 * seconds);
     require(of_risks + of_ground + of_times == 0.0, Refusal::NonFinite)?;
     let known = |ground: &Ground| usize::from(ground.class) < TerrainClass::COUNT;
     require(map.ground.iter().all(known), Refusal::Malformed)

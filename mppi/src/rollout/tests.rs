@@ -4,10 +4,11 @@
 mod skid_steer;
 
 use super::*;
-use crate::cost_to_go::CostToGoView;
+use crate::cost_to_go::{CostToGoView, N_HEADINGS};
 use crate::kernel;
 use bicycle::lanes::{Constant, Instructions};
 use bicycle::{Command, Effect, Limits, Model, State, Stepper};
+use std::f64::consts::{PI, TAU};
 use traversability::{FrictionLimit, GridGeometry, Ground, RiskMap};
 
 const N_STEPS: usize = 40;
@@ -220,7 +221,7 @@ fn the_cost_to_go_field_is_interpolated_between_cells() {
     let seconds: Vec<f32> =
         (0..geometry.n_cells()).map(|index| linear(geometry.centre_m(geometry.cell(index))) as f32).collect();
     const TURNING_S_PER_RAD: f64 = 2.5;
-    let view = CostToGoView { geometry, seconds: &seconds };
+    let view = CostToGoView { geometry, seconds: &seconds, turning_s: &[] };
     let field = TerminalField::new(view, map.geometry(), TURNING_S_PER_RAD).unwrap();
     let stepper = stepper(0.5);
     let task = GoalTask { x_cells: Constant::new(1e6), ..goal(&map, 0.0, Rest::Field(field)) };
@@ -240,6 +241,52 @@ fn the_cost_to_go_field_is_interpolated_between_cells() {
             let cosine = (-0.3 * yaw.cos() + 0.2 * yaw.sin()) / 0.3_f64.hypot(0.2);
             let expected = linear([x, y]) + TURNING_S_PER_RAD * (cosine.acos() - cosine.acos().sin());
             assert!((found - expected).abs() < 1.5e-3, "{found} {expected}");
+        }
+    }
+}
+
+/// What turning adds is looked up where the rollout ends: here by a table that is linear in x and y for every heading, and
+/// between headings linear in yaw.
+#[test]
+fn what_turning_adds_is_interpolated_between_cells_and_headings() {
+    let map = RiskMap::constant(GridGeometry::centred(0.5, 60, 50, 1.0, -2.0), 13, Risk::NONE);
+    let geometry = GridGeometry::centred(0.4, 90, 80, 1.3, -1.7);
+    let knight = 0.5_f64.atan();
+    let yaws = [0.0, knight, PI / 4.0, PI / 2.0 - knight];
+    let heading_rad = |heading: usize| yaws[heading % 4] + PI / 2.0 * (heading / 4 % 4) as f64;
+    let added = |heading: usize, [x_m, y_m]: [f64; 2]| {
+        20.0 + 1.5 * (heading as f64 - 8.0).abs() + 0.1 * heading as f64 * x_m - 0.2 * y_m
+    };
+    let seconds = vec![7.0; geometry.n_cells()];
+    let turning_s: Vec<f32> = (0..N_HEADINGS)
+        .flat_map(|heading| (0..geometry.n_cells()).map(move |index| (heading, index)))
+        .map(|(heading, index)| added(heading, geometry.centre_m(geometry.cell(index))) as f32)
+        .collect();
+    let view = CostToGoView { geometry, seconds: &seconds, turning_s: &turning_s };
+    let field = TerminalField::new(view, map.geometry(), 2.5).unwrap();
+    assert!(
+        TerminalField::new(CostToGoView { turning_s: &turning_s[1..], ..view }, map.geometry(), 2.5)
+            .is_none()
+    );
+    let stepper = stepper(0.5);
+    let task = GoalTask { x_cells: Constant::new(1e6), ..goal(&map, 0.0, Rest::Field(field)) };
+    let mut scene = scene(&map, &stepper, Task::Goal(task));
+    for machine in machines() {
+        // Nobody moves: the pose is that of the start.
+        for k in 0..64 {
+            let yaw_rad = TAU * (f64::from(k) / 64.0 - 0.5) + 0.01;
+            scene.start.turns = yaw_rad / TAU;
+            let mut chunk = Chunk::new(N_STEPS);
+            kernel::run(machine, RollOut { scene: &scene, chunk: &mut chunk });
+            let yaw_rad = yaw_rad.rem_euclid(TAU);
+            let first = (0..N_HEADINGS).rev().find(|heading| heading_rad(*heading) <= yaw_rad).unwrap();
+            let next_rad = if first == 15 { TAU } else { heading_rad(first + 1) };
+            let share = (yaw_rad - heading_rad(first)) / (next_rad - heading_rad(first));
+            let at = [START[0], START[1]];
+            let expected =
+                7.0 + (1.0 - share) * added(first, at) + share * added((first + 1) % N_HEADINGS, at);
+            let found = f64::from(chunk.terms[CostTerm::Terminal as usize].0[k as usize]);
+            assert!((found - expected).abs() < 2e-3, "{yaw_rad}: {found} {expected}");
         }
     }
 }

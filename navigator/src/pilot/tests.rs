@@ -77,7 +77,7 @@ impl Drive {
         let map = RiskMap::constant(GridGeometry::centred(0.25, 160, 160, 0.0, 0.0), 8, Risk::NONE);
         let mut field = CostToGo::new(CostToGoConfig::default(), &limits(), 160, 160).unwrap();
         let goal_m = [18.0, 0.0];
-        field.update(map.view(), goal_m).unwrap();
+        field.update(map.view(), goal_m, 0.0).unwrap();
         let state = State { x_m: -15.0, speed_mps: SPEED_MPS, ..State::default() };
         let applied = Applied { command: Command::default(), since_ns: 0, by: AppliedBy::Command };
         Self { pilot: Pilot::new(model, config, 1).unwrap(), map, field, goal_m, state, applied, cycle: 0 }

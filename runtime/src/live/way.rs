@@ -35,13 +35,16 @@ mod tests {
         let geometry = GridGeometry { resolution_m: 1.0, origin: [0, 0], n_rows: 4, n_cols: 5 };
         // Least time in the corner: the sum of row and column.
         let seconds: Vec<f32> = (0..20).map(|k| (k / 5 + k % 5) as f32).collect();
-        let field = CostToGoView { geometry, seconds: &seconds };
+        let field = CostToGoView { geometry, seconds: &seconds, turning_s: &[] };
         let way = to_goal(&field, [4.5, 3.5, 0.7]);
         let places: Vec<[f64; 2]> = way.iter().map(|pose| [pose.x_m, pose.y_m]).collect();
         assert_eq!(places, [[4.5, 3.5], [3.5, 2.5], [2.5, 1.5], [1.5, 0.5], [0.5, 0.5]]);
         assert!(way.iter().all(|pose| pose.z_m == 0.7));
         assert!(to_goal(&field, [-1.0, 0.0, 0.0]).is_empty());
         let level = [1.0; 20];
-        assert_eq!(to_goal(&CostToGoView { geometry, seconds: &level }, [2.5, 2.5, 0.0]).len(), 1);
+        assert_eq!(
+            to_goal(&CostToGoView { geometry, seconds: &level, turning_s: &[] }, [2.5, 2.5, 0.0]).len(),
+            1
+        );
     }
 }

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::ops::Bound;
 use std::sync::Arc;
 
-use navigator::{Assessor, Belief, NavigatorError};
+use navigator::{Assessor, Belief, Destination, NavigatorError};
 use traversability::CvarLevel;
 
 use super::records::{Key, Records};
@@ -218,7 +218,7 @@ impl RemadeRiskMaps<'_> {
             }
         }
         let Some((_, maker)) = &mut self.maker else { return Ok(Err(Unmade { what: String::new() })) };
-        maker.set_goal(header.goal_m);
+        maker.set_destination(Destination { goal_m: header.goal_m, tolerance_m: header.tolerance_m });
         // As it was judged for; a number that is no share makes another map than was recorded.
         CvarLevel::new(header.alpha).map_or(Ok(()), |level| maker.judge_at(level))?;
         let until = Key::from(header.stuck);

@@ -161,7 +161,7 @@ impl Drive {
         let scan = scanned();
         let surface = surveyed(&scan);
         let mut maker = judge();
-        maker.set_goal(goal().goal_m);
+        maker.set_destination(goal());
         maker.update(&surface.0, &surface.1).unwrap().unwrap();
         let (header, elements) = Self::risk_of(&mut maker).unwrap();
         let risk = (RiskHeader { stamp: stamped(1), ..header }, elements);

@@ -12,7 +12,7 @@ use bus::message::{
     OrderHeader, PlanRecord, RiskHeader, ScanHeader, StatusRecord, StuckRecord, SurfaceHeader, TrackRecord,
     TracksHeader, layouts,
 };
-use bus::payload::{RiskParts, surface_map};
+use bus::payload::{HEADINGS, RiskParts, surface_map};
 use bus::status::Role;
 use bus::watchdog::Watchdog;
 use bytemuck::{AnyBitPattern, NoUninit};
@@ -244,7 +244,7 @@ pub fn read_surface() -> Reader {
     let (drive, topics) = (Drive::get(), DriveTopics::new(&Context::new()));
     reader(channel::SURFACE, move |header: &SurfaceHeader, cells| {
         let mut maker = judge();
-        maker.set_goal(goal().goal_m);
+        maker.set_destination(goal());
         for (header, cells) in
             [(&drive.surface.0, drive.surface.1.as_slice()), (header, cells), drive.surface()]
         {
@@ -268,8 +268,10 @@ pub fn risk(rng: &mut Rng) -> Vec<u8> {
     if once_in(rng, 2) {
         any_shape(rng, &mut header.grid);
         header.n_yaws = rng.random_range(1..4);
+        header.n_headings = [0, HEADINGS as u64][rng.random_range(0..2)];
     }
-    let parts = RiskParts::new(&header.grid.geometry().unwrap(), header.n_yaws as usize);
+    let [n_yaws, n_headings] = [header.n_yaws, header.n_headings].map(|n| n as usize);
+    let parts = RiskParts::new(&header.grid.geometry().unwrap(), n_yaws, n_headings);
     RISK.under(&header, parts.n_elements()).broken(rng)
 }
 
@@ -362,7 +364,7 @@ pub fn read_mission() -> Reader {
     let drive = Drive::get();
     reader(channel::MISSION, move |stamp, records: &[MissionRecord]| {
         let mut maker = judge();
-        maker.set_goal(goal().goal_m);
+        maker.set_destination(goal());
         maker.follow(stamp, &records[0]).unwrap();
         let (header, cells) = drive.surface();
         maker.update(header, cells).unwrap().unwrap();
@@ -449,7 +451,7 @@ pub fn read_stuck() -> Reader {
     let drive = Drive::get();
     reader(channel::STUCK, move |stamp, records: &[StuckRecord]| {
         let mut maker = judge();
-        maker.set_goal(goal().goal_m);
+        maker.set_destination(goal());
         maker.note_stuck(stamp, &records[0]);
         let (header, cells) = drive.surface();
         maker.update(header, cells).unwrap().unwrap();

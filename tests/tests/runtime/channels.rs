@@ -4,7 +4,7 @@ use bicycle::Model;
 use bus::channel::{Bus, Inlet, MISSION, ODOMETRY, RISK};
 use bus::message::{Grid, MissionRecord, OdometryRecord, RiskHeader, Stamp, SurfaceHeader};
 use bus::payload::{RiskParts, cell_numbers, risk_views};
-use navigator::{Assessor, Belief};
+use navigator::{Assessor, Belief, Destination};
 use runtime::mapping::{LEARNED, send_risk};
 use runtime::risk_maker::RiskMaker;
 use terrain::{GridGeometry, SurfaceCell, TerrainClass};
@@ -18,7 +18,7 @@ fn a_risk_map_is_written_once_and_read_where_it_was_written() {
     let bus = Bus::join(&run.name).unwrap();
     let geometry = GridGeometry { resolution_m: 0.2, origin: [-4, 9], n_rows: 30, n_cols: 40 };
     let map = RiskMap::constant(geometry, 16, Risk::NONE);
-    let (known, parts) = (map.view(), RiskParts::new(&geometry, 16));
+    let (known, parts) = (map.view(), RiskParts::new(&geometry, 16, 0));
     let mut inlet = bus.inlet(&RISK).unwrap();
     let mut outlet = bus.outlet(&RISK, parts.n_elements()).unwrap();
     let mut n_written = vec![0u8; parts.n_elements()];
@@ -57,7 +57,7 @@ fn a_risk_map_is_sent_and_read_without_memory_of_its_own() {
     let level = CvarLevel::new(ALPHA).unwrap();
     let assessor = Assessor::new(&vehicle, &limits, &config, &Belief::Physics, level).unwrap();
     let mut maker = RiskMaker::new(assessor, LEARNED, 0);
-    maker.set_goal([8.0, 0.0]);
+    maker.set_destination(Destination { goal_m: [8.0, 0.0], tolerance_m: 0.5 });
     let (n_rows, n_cols) = (config.elevation.n_rows, config.elevation.n_cols);
     let origin = [n_cols, n_rows].map(|n| -(n as i64) / 2);
     let geometry = GridGeometry { resolution_m: config.elevation.resolution_m, origin, n_rows, n_cols };
@@ -74,12 +74,13 @@ fn a_risk_map_is_sent_and_read_without_memory_of_its_own() {
         allocation_counter::measure(|| {
             send_risk(&mut maker, outlet, 1).unwrap();
             let message = inlet.newest().unwrap();
-            let (map, seconds) = risk_views(message.header(), message.payload()).unwrap();
+            let (map, times) = risk_views(message.header(), message.payload()).unwrap();
             let place = message.payload().as_ptr_range();
             assert!(
                 place.contains(&map.risks.as_ptr().cast()) && place.contains(&map.ground.as_ptr().cast())
             );
-            assert!(place.contains(&seconds.as_ptr().cast()));
+            assert!(place.contains(&times.seconds.as_ptr().cast()));
+            assert!(place.contains(&times.turning_s[0..].as_ptr().cast()));
             n_bytes = size_of_val(message.payload());
         })
     });

@@ -27,7 +27,7 @@ const GEOMETRY: GridGeometry = GridGeometry { resolution_m: 0.5, origin: [-48, -
 const N_YAWS: usize = 8;
 
 fn parts() -> RiskParts {
-    RiskParts::new(&GEOMETRY, N_YAWS)
+    RiskParts::new(&GEOMETRY, N_YAWS, 0)
 }
 
 fn header() -> RiskHeader {
@@ -45,7 +45,7 @@ fn send_map(outlet: &mut Outlet<RiskHeader, [f32; 4]>) {
     let map = RiskMap::constant(GEOMETRY, N_YAWS, Risk::NONE);
     let known = map.view();
     let mut loan = outlet.write(parts().n_elements(), |place| parts().element(&known, place)).unwrap();
-    let seconds = parts().seconds_mut(loan.payload_mut());
+    let [seconds, _] = parts().times_mut(loan.payload_mut());
     // The goal lies in the east.
     seconds
         .iter_mut()
@@ -90,7 +90,7 @@ impl Memory {
     /// Says of a message that it has so many elements, and a grid and yaws for as many.
     fn lengthen(&self, [n_at, header_at]: [u64; 2], n_edge: u64, n_yaws: u64) {
         let grid = Grid { n_rows: n_edge, n_cols: n_edge, ..header().grid }.geometry().unwrap();
-        self.write_word(n_at, RiskParts::new(&grid, n_yaws as usize).n_elements() as u64);
+        self.write_word(n_at, RiskParts::new(&grid, n_yaws as usize, 0).n_elements() as u64);
         self.write_word(header_at + offset_of!(RiskHeader, grid.n_rows) as u64, n_edge);
         self.write_word(header_at + offset_of!(RiskHeader, grid.n_cols) as u64, n_edge);
         self.write_word(header_at + offset_of!(RiskHeader, n_yaws) as u64, n_yaws);
@@ -341,8 +341,8 @@ fn what_is_written_after_sending_is_read() {
     let at = memory.messages[0][1] + size_of::<RiskHeader>() as u64;
     memory.write(at, &vec![0xff; 16 * parts().n_elements()]);
     let read = |message: &bus::channel::Message<RiskHeader, [f32; 4]>| -> [bool; 2] {
-        let (map, seconds) = risk_views(message.header(), message.payload()).unwrap();
-        [map.risks[0].roll_rad.is_nan(), seconds[seconds.len() - 1].is_nan()]
+        let (map, times) = risk_views(message.header(), message.payload()).unwrap();
+        [map.risks[0].roll_rad.is_nan(), times.seconds[times.seconds.len() - 1].is_nan()]
     };
     assert_eq!(read(&message), [true, true]);
 }

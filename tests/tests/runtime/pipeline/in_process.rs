@@ -127,17 +127,19 @@ pub fn risk(told: &mut u64, map_source: u64, message: &RiskMessage<'_>) -> Optio
         return None;
     }
     let (map, times) = message.content.unwrap();
-    let parts = RiskParts::new(&map.geometry, map.n_yaws);
+    let parts = RiskParts::new(&map.geometry, map.n_yaws, times.turning_s.len() / map.ground.len());
     let mut payload: Vec<[f32; 4]> =
         (0..parts.n_elements()).map(|place| parts.element(&map, place)).collect();
-    parts.seconds_mut(&mut payload).copy_from_slice(times.seconds);
+    let [seconds, turning_s] = parts.times_mut(&mut payload);
+    seconds.copy_from_slice(times.seconds);
+    turning_s.copy_from_slice(times.turning_s);
     Some(Made::Risk {
         map_source,
         content: content_hash(&payload),
         surface: header.surface.sequence,
         stuck: header.stuck.sequence,
         times_ns: [header.valid_at_ns, header.frame_at_ns],
-        goal: header.goal_m.map(f64::to_bits),
+        goal: header.destination.goal_m.map(f64::to_bits),
     })
 }
 
