@@ -203,7 +203,7 @@ record! {
         stuck: Source,
         /// Where the time to the goal leads [m].
         goal_m: [f64; 2],
-        /// Distance from there at which it ends [m].
+        /// Distance from there within which the straight line counts [m].
         tolerance_m: f64,
         /// Headings for which is told what turning adds to it: 16, or 0 for a vehicle that turns on the spot.
         n_headings: u64,

@@ -241,7 +241,7 @@ typedef struct SurefootRiskHeader {
     SurefootSource stuck;
     /* Where the time to the goal leads [m]. */
     double goal_m[2];
-    /* Distance from there at which it ends [m]. */
+    /* Distance from there within which the straight line counts [m]. */
     double tolerance_m;
     /* Headings for which is told what turning adds to it: 16, or 0 for a vehicle that turns on the spot. */
     uint64_t n_headings;

@@ -49,8 +49,8 @@ pub struct CostToGo {
     queue: BucketQueue,
     /// The result [s], shape [row, col].
     seconds: Vec<f32>,
-    /// Places of the cells where the goal counts as reached, of `seconds`.
-    reached: Vec<usize>,
+    /// Cells where the goal counts as reached: places, of `seconds`, and the time of the straight line to it [s].
+    reached: Vec<(usize, f32)>,
     /// Places of the cells from which a way leads out of the window, of `seconds`.
     exits: Vec<usize>,
     /// What a turning circle adds, for maps of the last one's resolution.
@@ -97,8 +97,8 @@ impl CostToGo {
         })
     }
 
-    /// Solves for the times over `map` to within `tolerance_m` of `goal_m`, which may lie beyond it. Allocates nothing
-    /// after the first map of a resolution.
+    /// Solves for the times over `map` to `goal_m`, which may lie beyond it; within `tolerance_m` of it the straight line
+    /// counts. Allocates nothing after the first map of a resolution.
     ///
     /// # Errors
     /// A map of another shape than the field's, or a goal that is not finite; the field then stays as it was.
@@ -131,13 +131,15 @@ impl CostToGo {
         Ok(())
     }
 
+    /// Searches over poses what the turning circle adds, if there is one.
     fn keep_to_turning_circle(&mut self, goal_m: [f64; 2], border_slowness: f32) {
         let radius_cells = self.config.turning_radius_m / self.geometry.resolution_m;
         if radius_cells <= 0.0 {
             return;
         }
         let radius_cells = radius_cells.min(RADIUS_MAX_CELLS);
-        let fitting = self.turning.take().filter(|turning| turning.radius_cells() == radius_cells);
+        let is_fitting = |turning: &Turning| turning.radius_cells().to_bits() == radius_cells.to_bits();
+        let fitting = self.turning.take().filter(is_fitting);
         let mut turning = fitting.unwrap_or_else(|| self.turning_circle(radius_cells));
         let corner_m = self.geometry.south_west_m();
         turning.update(&Ground {
@@ -237,16 +239,20 @@ impl CostToGo {
         self.slowness_at(1.0 / self.config.forbidden_slowdown)
     }
 
-    /// The goal's cell, and those whose centres are within the tolerance, but for the border.
+    /// The goal's cell, and those whose centres are within the tolerance, but for the border. From there the straight line
+    /// counts, whatever is in its way: the middle draws, and nobody has to come there.
     fn find_reached(&mut self, goal_m: [f64; 2], tolerance_m: f64) {
         self.reached.clear();
         let goal = self.geometry.cell_at(goal_m[0], goal_m[1]);
+        let slowness = self.slowness_at(1.0);
         for index in 0..self.n_rows * self.n_cols {
             let cell = self.geometry.cell(index);
             let [x_m, y_m] = self.geometry.centre_m(cell);
-            let is_near = libm::hypot(goal_m[0] - x_m, goal_m[1] - y_m) <= tolerance_m;
-            if (is_near || goal == Some(cell)) && !self.is_border(cell) {
-                self.reached.push(index);
+            let distance_m = libm::hypot(goal_m[0] - x_m, goal_m[1] - y_m);
+            if goal == Some(cell) && !self.is_border(cell) {
+                self.reached.push((index, 0.0));
+            } else if distance_m <= tolerance_m && !self.is_border(cell) {
+                self.reached.push((index, distance_m as f32 * slowness));
             }
         }
     }
@@ -274,8 +280,9 @@ impl CostToGo {
                 }
             }
         }
-        for place in 0..self.reached.len() {
-            self.improve(self.padded(self.geometry.cell(self.reached[place])), 0.0);
+        for k in 0..self.reached.len() {
+            let (index, time_s) = self.reached[k];
+            self.improve(self.padded(self.geometry.cell(index)), time_s);
         }
         border_slowness
     }

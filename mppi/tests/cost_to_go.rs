@@ -535,5 +535,6 @@ fn bad_input_is_refused_with_its_numbers() {
     let headless = RiskMap::constant(geometry(9, 9), 0, Risk::NONE);
     assert!(matches!(field.update(headless.view(), [0.0; 2], 0.0), Err(CostToGoError::MapShape { .. })));
     assert!(matches!(field.update(map.view(), [f64::NAN, 0.0], 0.0), Err(CostToGoError::Goal { .. })));
+    assert!(matches!(field.update(map.view(), [0.0; 2], f64::NAN), Err(CostToGoError::Goal { .. })));
     assert!(CostToGo::new(good, &limits(), 2, 9).is_err());
 }

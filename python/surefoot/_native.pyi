@@ -48,8 +48,9 @@ class CostToGo:
         """
 
     def update(self, risk_map: RiskMap, goal_m: _Floats, tolerance_m: SupportsFloat | SupportsIndex=0.0) -> None:
-        """Solves for the times over the map to within a tolerance of the goal, two numbers, x_m, y_m, which may lie beyond it.
-        Raises `ValueError` for a map of another shape or a goal that is no place; the field is then as it was.
+        """Solves for the times over the map to the goal, two numbers, x_m, y_m, which may lie beyond it; within the tolerance of
+        it the straight line counts. Raises `ValueError` for a map of another shape or a goal that is no place; the field is
+        then as it was.
         """
 
 @final

@@ -330,7 +330,7 @@ class RiskHeader(ctypes.Structure):
         ("stuck", Source),
         # Where the time to the goal leads [m].
         ("goal_m", ctypes.c_double * 2),
-        # Distance from there at which it ends [m].
+        # Distance from there within which the straight line counts [m].
         ("tolerance_m", ctypes.c_double),
         # Headings for which is told what turning adds to it: 16, or 0 for a vehicle that turns on the spot.
         ("n_headings", ctypes.c_uint64),

@@ -24,8 +24,8 @@ pub struct Ground<'a> {
     pub field_s: &'a [f32],
     /// Where the goal lies, column and row counted from the south-west cell's centre.
     pub goal_cells: [f64; 2],
-    /// Places of the cells where it counts as reached.
-    pub reached: &'a [usize],
+    /// Cells where it counts as reached: places, and the time that is left there [s].
+    pub reached: &'a [(usize, f32)],
     /// Places of the cells from which the field leads on beyond the window.
     pub exits: &'a [usize],
     /// Time per metre on the window's border and beyond [s/m].
@@ -171,12 +171,12 @@ impl Turning {
         self.moves_s = moves_s;
     }
 
-    /// Where the goal counts as reached nothing is left; from an exit it is the field, and what it takes to turn to the
-    /// goal from there.
+    /// Where the goal counts as reached nobody has to turn any more; from an exit it is the field, and what it takes to turn
+    /// to the goal from there.
     fn seed(&mut self, ground: &Ground<'_>) {
         let radius_s = self.radius_cells as f32 * ground.border_slowness * ground.resolution_m as f32;
-        for &cell in ground.reached {
-            self.seed_cell(cell, |_| 0.0);
+        for &(cell, time_s) in ground.reached {
+            self.seed_cell(cell, |_| time_s);
         }
         for &cell in ground.exits {
             let (row, col) = (cell / self.n_cols, cell % self.n_cols);

@@ -7,7 +7,8 @@ use traversability::GridGeometry;
 pub struct CostToGoView<'a> {
     /// Where the cells lie.
     pub geometry: GridGeometry,
-    /// Least time from the cell's centre to where the goal counts as reached [s], finite, shape [row, col].
+    /// Least time from the cell's centre to the goal [s], finite, shape [row, col]; within its tolerance that of the straight
+    /// line.
     pub seconds: &'a [f32],
     /// What keeping to the turning circle takes beyond that [s], shape [heading, row, col]; empty for a vehicle that turns
     /// on the spot. The 16 headings are those of the edges to the 8 adjacent cells and to the 8 a knight's move away,

@@ -114,15 +114,16 @@ fn another_age_limit_or_another_order_makes_other_decisions() {
     ] {
         assert!(first_difference(schedule, other, made).is_some(), "{other:?}");
     }
-    // Once, a decision is made before the odometry that came just before it.
-    let place = schedule
-        .windows(2)
-        .position(|pair| matches!((&pair[0].1, &pair[1].1), (Step::Odometry(..), Step::Decide)))
-        .unwrap();
+    // Once, a decision is made before the odometry that came shortly before it.
+    let before = |decide: usize| {
+        let is_odometry = |place: &usize| matches!(schedule[*place].1, Step::Odometry(..));
+        (decide.saturating_sub(3)..decide).rev().find(is_odometry)
+    };
+    let mut decisions = (0..schedule.len()).filter(|place| matches!(schedule[*place].1, Step::Decide));
+    let (place, decide) = decisions.find_map(|decide| Some((before(decide)?, decide))).unwrap();
     let mut swapped = schedule.clone();
-    let [first_ns, second_ns] = [place, place + 1].map(|place| swapped[place].0);
-    swapped.swap(place, place + 1);
-    (swapped[place].0, swapped[place + 1].0) = (first_ns, second_ns);
+    swapped[place..=decide].rotate_right(1);
+    (place..=decide).for_each(|k| swapped[k].0 = schedule[k].0);
     let (differs_at, _) = first_difference(&swapped, usual, made).expect("another order");
     assert_eq!(differs_at, place);
 }

@@ -39,12 +39,12 @@ pub type Schedule = Vec<(u64, Step)>;
 pub mod plan {
     use std::ops::Range;
 
+    pub const IMU_IS_SILENT: Range<u64> = 2300..2700;
     pub const NOT_A_NUMBER: Range<u64> = 3000..3200;
     pub const LEARNING_IS_SILENT: Range<u64> = 4000..6000;
     pub const JUMPS_FROM: u64 = 5010;
     pub const PAUSED: Range<u64> = 6500..7000;
     pub const BOLDER_FROM: u64 = 7300;
-    pub const IMU_IS_SILENT: Range<u64> = 7500..7900;
     pub const HELD: Range<u64> = 8000..10_500;
     pub const MISSION_IS_SILENT: Range<u64> = 11_000..14_200;
 }
