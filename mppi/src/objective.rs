@@ -295,7 +295,7 @@ fn along_row<K: Kernel>(table: &[f32], index: K::Bits, share: Real<K>) -> (Real<
 }
 
 /// Share of an octant, counted from an axis, at which the knight's move lies: atan(1/2) of 45 degrees.
-const KNIGHT_SHARE: f64 = 0.590_334_470_601_733_1;
+const KNIGHT_SHARE: f64 = 0.590_334_470_601_733;
 
 /// The headings of the search on either side of a yaw, and how far it is from the first to the second. Two lie in every
 /// octant: its beginning and a knight's move, nearer to its diagonal.

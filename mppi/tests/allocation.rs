@@ -3,13 +3,14 @@
 mod fixture;
 
 use bicycle::effect::{CATALOGUE, SpeedLag, SteerDelay};
-use bicycle::{Decision, Effect, State};
+use bicycle::{Decision, Effect, Limits, State};
 use mppi::{
     Config, Controller, CostToGo, CostToGoConfig, Costs, Disc, DiscPrices, Input, MovingDiscs, Objective,
     Outline, Terminal,
 };
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::atomic::{AtomicUsize, Ordering};
+use traversability::RiskMap;
 
 struct Counting;
 
@@ -31,6 +32,19 @@ unsafe impl GlobalAlloc for Counting {
 
 #[global_allocator]
 static ALLOCATOR: Counting = Counting;
+
+/// A field that keeps to a turning circle; the second time it takes no memory.
+#[allow(clippy::unwrap_used, reason = "a test that cannot be set up has failed")]
+fn solved_twice(limits: &Limits, map: &RiskMap) -> CostToGo {
+    let config =
+        CostToGoConfig { turning_radius_m: 3.0, reverse_speed_share: 0.25, ..CostToGoConfig::default() };
+    let mut field = CostToGo::new(config, limits, 160, 160).unwrap();
+    field.update(map.view(), [15.0, 10.0], 0.0).unwrap();
+    let before = N_ALLOCATIONS.load(Ordering::Relaxed);
+    field.update(map.view(), [15.0, 10.0], 0.5).unwrap();
+    assert_eq!(N_ALLOCATIONS.load(Ordering::Relaxed) - before, 0);
+    field
+}
 
 /// One test, because other tests of this process would be counted too.
 #[test]
@@ -57,13 +71,7 @@ fn a_decision_allocates_nothing() {
     ];
     let map = fixture::rough(3);
     for (config, model) in cases {
-        let turning =
-            CostToGoConfig { turning_radius_m: 3.0, reverse_speed_share: 0.25, ..CostToGoConfig::default() };
-        let mut field = CostToGo::new(turning, &model.limits, 160, 160).unwrap();
-        field.update(map.view(), [15.0, 10.0], 0.0).unwrap();
-        let before = N_ALLOCATIONS.load(Ordering::Relaxed);
-        field.update(map.view(), [15.0, 10.0], 0.5).unwrap();
-        assert_eq!(N_ALLOCATIONS.load(Ordering::Relaxed) - before, 0);
+        let field = solved_twice(&model.limits, &map);
         let prices = DiscPrices { touch_s: 1.0, near_s: 0.1, foresight_s: 0.5 };
         let discs = MovingDiscs::new(Outline::default(), prices, 4, config.n_steps);
         let mut controller = Controller::with_costs(config, model, (discs, ()), 1).unwrap();
