@@ -161,9 +161,9 @@ impl CostToGo {
         Turning::new(radius_cells, reverse_slowdown, self.n_rows, self.n_cols)
     }
 
-    /// Headings for which is found what turning adds: all of the search's, or none for who turns on the spot.
+    /// As [`CostToGoConfig::n_headings`].
     pub fn n_headings(&self) -> usize {
-        if self.config.turning_radius_m > 0.0 { N_HEADINGS } else { 0 }
+        self.config.n_headings()
     }
 
     /// The field of the last update.

@@ -2,7 +2,9 @@
 
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
-use bicycle::Limits;
+mod fixture;
+
+use fixture::block;
 use mppi::{CostToGo, CostToGoConfig, CostToGoView, N_HEADINGS};
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -13,19 +15,6 @@ const SPEED_MPS: f64 = 2.0;
 const RADIUS_M: f64 = 4.0;
 const RESOLUTION_M: f64 = 0.25;
 const REVERSE_SHARE: f64 = 0.25;
-
-fn limits() -> Limits {
-    Limits {
-        speed_max_mps: SPEED_MPS,
-        reverse_speed_max_mps: 1.0,
-        steering_max_rad: 0.5,
-        steering_rate_max_radps: 1.0,
-        acceleration_max_mps2: 2.0,
-        lateral_acceleration_max_mps2: 4.0,
-        roll_max_rad: 0.5,
-        pitch_max_rad: 0.6,
-    }
-}
 
 fn config(reverse_speed_share: f64) -> CostToGoConfig {
     CostToGoConfig { turning_radius_m: RADIUS_M, reverse_speed_share, ..CostToGoConfig::default() }
@@ -39,21 +28,9 @@ fn level() -> RiskMap {
 
 fn solved(map: &RiskMap, config: CostToGoConfig, goal_m: [f64; 2], tolerance_m: f64) -> CostToGo {
     let GridGeometry { n_rows, n_cols, .. } = *map.geometry();
-    let mut field = CostToGo::new(config, &limits(), n_rows, n_cols).unwrap();
+    let mut field = CostToGo::new(config, &fixture::model().limits, n_rows, n_cols).unwrap();
     field.update(map.view(), goal_m, tolerance_m).unwrap();
     field
-}
-
-/// Blocks every heading of the cells whose centres are in a set.
-fn block(map: &mut RiskMap, is_in: impl Fn([f64; 2]) -> bool) {
-    let (geometry, n_yaws) = (*map.geometry(), map.view().n_yaws);
-    map.fill(|risks, _| {
-        for (index, risks) in risks.chunks_exact_mut(n_yaws).enumerate() {
-            if is_in(geometry.centre_m(geometry.cell(index))) {
-                risks.iter_mut().for_each(|risk| *risk = risk.blocked());
-            }
-        }
-    });
 }
 
 /// Yaw of a heading: to the 8 adjacent cells and a knight's move away, counter-clockwise from east.
@@ -79,8 +56,8 @@ fn nearest_s(view: &CostToGoView<'_>, [x_m, y_m, yaw_rad_of]: [f64; 3]) -> f64 {
     time_s(view, view.geometry.index(cell), heading)
 }
 
-/// Shortest way of a vehicle that drives ahead and turns in circles of radius R at the tightest to a point farther away
-/// than their diameter: along one circle to its tangent through the point, then straight (Dubins, with a free heading at
+/// Shortest way of a vehicle that drives ahead and turns in circles of radius R at the tightest to a point outside
+/// both circles: along one circle to its tangent through the point, then straight (Dubins, with a free heading at
 /// the end). A circle whose centre is at distance d from the point leaves a tangent of sqrt(d^2 - R^2).
 fn dubins_m([x_m, y_m, yaw_rad]: [f64; 3], goal_m: [f64; 2]) -> f64 {
     let way_m = |side: f64| {
@@ -106,19 +83,14 @@ fn on_open_ground_the_way_is_that_of_dubins() {
     let (view, mut n, mut sum) = (field.view(), 0, 0.0);
     for index in 0..view.seconds.len() {
         let [x_m, y_m] = view.geometry.centre_m(view.geometry.cell(index));
-        let distance_m = (goal_m[0] - x_m).hypot(goal_m[1] - y_m);
-        // A circle beside the vehicle reaches 2 R to its side, which must be within the window.
-        let is_inside = [x_m, y_m].iter().all(|at_m| (8.5..15.5).contains(at_m));
-        if distance_m <= 2.0 * RADIUS_M && !is_inside || distance_m < 1.5 {
-            continue;
-        }
         for heading in 0..N_HEADINGS {
             let pose = [x_m, y_m, yaw_rad(heading)];
             let centres = [1.0, -1.0]
                 .map(|side| [x_m - side * RADIUS_M * pose[2].sin(), y_m + side * RADIUS_M * pose[2].cos()]);
             let off_m = centres.map(|centre| (goal_m[0] - centre[0]).hypot(goal_m[1] - centre[1]));
+            // Both circles are within the window, with room for the straight pieces of arcs, and the goal within neither.
             let has_room =
-                centres.iter().flatten().all(|at_m| (RADIUS_M + 0.5..23.5 - RADIUS_M).contains(at_m));
+                centres.iter().flatten().all(|at_m| (RADIUS_M + 1.5..22.5 - RADIUS_M).contains(at_m));
             if !has_room || off_m.iter().any(|off_m| *off_m < RADIUS_M + 0.5) {
                 continue;
             }
@@ -138,7 +110,7 @@ fn on_open_ground_the_way_is_that_of_dubins() {
 #[test]
 fn who_cannot_turn_backs_out() {
     let mut map = level();
-    block(&mut map, |[x_m, y_m]| x_m < 8.0 && !(12.0..12.25).contains(&y_m) || x_m < 2.0);
+    block(&mut map, |x_m, y_m| x_m < 8.0 && !(12.0..12.25).contains(&y_m) || x_m < 2.0);
     let goal_m = [20.0, 12.1];
     let lane = |field: &CostToGo, x_m: f64, heading: usize| {
         let view = field.view();
@@ -163,7 +135,7 @@ fn who_cannot_turn_backs_out() {
 #[test]
 fn a_way_that_no_turn_can_follow_is_not_promised() {
     let mut map = level();
-    block(&mut map, |[x_m, y_m]| {
+    block(&mut map, |x_m, y_m| {
         let first = (9.5..10.5).contains(&x_m) && !(14.0..15.0).contains(&y_m);
         let second = (12.0..13.0).contains(&x_m) && !(9.0..10.0).contains(&y_m);
         (first || second) && y_m > 3.0
@@ -186,7 +158,7 @@ fn a_way_that_no_turn_can_follow_is_not_promised() {
 fn within_the_tolerance_the_straight_line_counts() {
     let mut map = level();
     let goal_m = [12.1, 12.1];
-    block(&mut map, |[x_m, y_m]| (x_m - goal_m[0]).hypot(y_m - goal_m[1]) < 1.0);
+    block(&mut map, |x_m, y_m| (x_m - goal_m[0]).hypot(y_m - goal_m[1]) < 1.0);
     let [blocked, open] = [0.5, 1.5].map(|tolerance_m| solved(&map, config(0.0), goal_m, tolerance_m));
     let start = [4.0, 12.1, 0.0];
     assert!(
@@ -213,7 +185,8 @@ fn a_bicycle_that_follows_the_field_arrives_in_the_time_told() {
         let is_near =
             |[x_m, y_m]: [f64; 2], at: &[f64; 2], radius_m: f64| (x_m - at[0]).hypot(y_m - at[1]) < radius_m;
         let mut map = level();
-        block(&mut map, |at| {
+        block(&mut map, |x_m, y_m| {
+            let at = [x_m, y_m];
             let is_stone = stones.iter().any(|stone| is_near(at, stone, 1.0));
             is_stone && !is_near(at, &goal_m, 3.0) && !is_near(at, &[4.0, 4.0], 6.0)
         });
@@ -275,7 +248,7 @@ fn a_goal_beyond_the_window_is_turned_to() {
 #[test]
 fn the_result_does_not_depend_on_what_was_solved_before() {
     let mut map = level();
-    block(&mut map, |[x_m, y_m]| (x_m - 12.0).hypot(y_m - 10.0) < 2.0);
+    block(&mut map, |x_m, y_m| (x_m - 12.0).hypot(y_m - 10.0) < 2.0);
     let fresh = solved(&map, config(REVERSE_SHARE), [20.0, 10.0], 0.5);
     let mut used = solved(&level(), config(REVERSE_SHARE), [-5.0, 3.0], 2.0);
     let coarse = GridGeometry { resolution_m: 0.5, ..*map.geometry() };

@@ -3,7 +3,6 @@
 use std::collections::VecDeque;
 
 use bicycle::{Model, SensorModel, Vehicle};
-use mppi::N_HEADINGS;
 use navigator::{Assessor, Belief, Config, MessageId, StandIn, Surface, Surveyor, TracksMessage};
 use traversability::CvarLevel;
 
@@ -229,8 +228,7 @@ pub(crate) fn risk_elements(config: &Config) -> usize {
         n_rows: window.n_rows,
         n_cols: window.n_cols,
     };
-    let n_headings = if config.cost_to_go.turning_radius_m > 0.0 { N_HEADINGS } else { 0 };
-    RiskParts::new(&geometry, window.n_yaws, n_headings).n_elements()
+    RiskParts::new(&geometry, window.n_yaws, config.cost_to_go.n_headings()).n_elements()
 }
 
 /// Writes a maker's map where its readers will read it; nothing before there is one.

@@ -1,5 +1,6 @@
 //! What the field assumes beyond the risk map, and why there is none.
 
+use super::lattice::N_HEADINGS;
 use bicycle::MotionLimits;
 use serde::{Deserialize, Serialize};
 
@@ -33,6 +34,13 @@ pub struct CostToGoConfig {
     /// Speed in reverse over the vehicle's speed limit, the less the more else a metre in reverse costs, in [0.01, 1];
     /// 0 = the field never leads backwards.
     pub reverse_speed_share: f64,
+}
+
+impl CostToGoConfig {
+    /// Headings for which is found what turning adds: all of the search's, or none for who turns on the spot.
+    pub fn n_headings(&self) -> usize {
+        if self.turning_radius_m > 0.0 { N_HEADINGS } else { 0 }
+    }
 }
 
 impl Default for CostToGoConfig {
