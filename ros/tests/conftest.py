@@ -1,5 +1,6 @@
 """Robots and runs as processes, whose words are kept."""
 
+import itertools
 import json
 import os
 import signal
@@ -68,18 +69,21 @@ class Robot(Process):
         super().__init__([sys.executable, str(FOLDER / "robot.py")])
         until(lambda: self.state() is not None, 30, "the robot tells where it is")
 
+    def states(self, n: int) -> list[dict]:
+        """The last `n` it told, newest first."""
+        told = (line for line in reversed(self.lines) if line.startswith("{"))
+        return [json.loads(line) for line in itertools.islice(told, n)]
+
     def state(self):
-        for line in reversed(self.lines):
-            if line.startswith("{"):
-                return json.loads(line)
-        return None
+        return next(iter(self.states(1)), None)
 
     @property
     def speed_mps(self) -> float:
         return abs(self.state()["speed_mps"])
 
     def stands(self) -> bool:
-        return self.speed_mps < 0.02
+        """For half a second: a robot that changes from reverse to forward has no speed for a moment."""
+        return all(abs(state["speed_mps"]) < 0.02 for state in self.states(5))
 
     def drives(self) -> bool:
         return self.speed_mps > 0.3
