@@ -32,7 +32,8 @@ const PADDING: usize = 2;
 ///
 /// The risk map's outermost ring, which has no traction by construction, is the way out of the window when the goal
 /// lies beyond it: ring cells that see the goal without looking through the window start with the straight line to it
-/// at the speed assumed outside, the others lead around the window. With the goal inside, the ring is forbidden.
+/// at the speed assumed outside. The others, and all with the goal inside, lead around the window at that speed: what
+/// blocks the window may have an end beyond it.
 pub struct CostToGo {
     config: CostToGoConfig,
     speed_max_mps: f32,
@@ -121,18 +122,18 @@ impl CostToGo {
         }
         self.queue.restart((self.geometry.resolution_m / f64::from(self.speed_max_mps)) as f32);
         self.find_reached(goal_m, tolerance_m);
-        let border_slowness = self.seed(goal_m);
+        self.seed(goal_m);
         self.search_outwards();
         for (row, seconds) in self.seconds.chunks_exact_mut(self.n_cols).enumerate() {
             let start = (row + PADDING) * (self.n_cols + 2 * PADDING) + PADDING;
             seconds.copy_from_slice(&self.labels_s[start..start + self.n_cols]);
         }
-        self.keep_to_turning_circle(goal_m, border_slowness);
+        self.keep_to_turning_circle(goal_m);
         Ok(())
     }
 
     /// Searches over poses what the turning circle adds, if there is one.
-    fn keep_to_turning_circle(&mut self, goal_m: [f64; 2], border_slowness: f32) {
+    fn keep_to_turning_circle(&mut self, goal_m: [f64; 2]) {
         let radius_cells = self.config.turning_radius_m / self.geometry.resolution_m;
         if radius_cells <= 0.0 {
             return;
@@ -150,7 +151,7 @@ impl CostToGo {
             goal_cells: [0, 1].map(|axis| (goal_m[axis] - corner_m[axis]) / self.geometry.resolution_m - 0.5),
             reached: &self.reached,
             exits: &self.exits,
-            border_slowness,
+            border_slowness: self.slowness_at(self.config.outside_speed_share),
         });
         self.turning = Some(turning);
     }
@@ -257,12 +258,11 @@ impl CostToGo {
         }
     }
 
-    /// Puts the first known times into the queue and decides what the border ring is: its time per metre [s/m].
-    fn seed(&mut self, goal_m: [f64; 2]) -> f32 {
+    /// Puts the first known times into the queue, and the speed assumed outside on the border ring.
+    fn seed(&mut self, goal_m: [f64; 2]) {
         let goal = self.geometry.cell_at(goal_m[0], goal_m[1]);
         let is_inside = goal.is_some_and(|cell| !self.is_border(cell));
         let outside_slowness = self.slowness_at(self.config.outside_speed_share);
-        let border_slowness = if is_inside { self.forbidden_slowness() } else { outside_slowness };
         self.exits.clear();
         for index in 0..self.n_rows * self.n_cols {
             let cell = self.geometry.cell(index);
@@ -271,7 +271,7 @@ impl CostToGo {
                     self.exits.push(index);
                 }
                 let place = self.padded(cell);
-                self.slowness[place] = [border_slowness; 16];
+                self.slowness[place] = [outside_slowness; 16];
                 // From the goal's own cell the line is too short to say where it passes.
                 if !is_inside && (goal == Some(cell) || !self.crosses_inside(cell, goal_m)) {
                     let [x_m, y_m] = self.geometry.centre_m(cell);
@@ -284,7 +284,6 @@ impl CostToGo {
             let (index, time_s) = self.reached[k];
             self.improve(self.padded(self.geometry.cell(index)), time_s);
         }
-        border_slowness
     }
 
     /// Whether the straight line from a cell of the border to the goal passes through the window's inside: the

@@ -131,9 +131,14 @@ fn the_way_through_a_gap_is_the_sum_of_its_parts() {
 #[test]
 fn a_diagonal_wall_has_no_gaps() {
     let mut map = RiskMap::constant(geometry(21, 21), 16, Risk::NONE);
-    (1..20).for_each(|i| block(&mut map, i, 20 - i));
-    let field = field(Neighbourhood::Sixteen, &map, map.geometry().centre_m(Cell { row: 15, col: 15 }));
-    let beyond_s = at(&field.view(), 5, 5);
+    let middle = Cell { row: 10, col: 10 };
+    for cell in inside(&geometry(21, 21)) {
+        if cell.row.abs_diff(middle.row) + cell.col.abs_diff(middle.col) == 6 {
+            block(&mut map, cell.row, cell.col);
+        }
+    }
+    let field = field(Neighbourhood::Sixteen, &map, map.geometry().centre_m(middle));
+    let beyond_s = at(&field.view(), 3, 3);
     // The cheapest way through spends at least half a cell, at the slowdown, in the wall.
     assert!(beyond_s > 0.5 * SLOWDOWN * RESOLUTION_M / SPEED_MPS, "slipped through in {beyond_s} s");
 }
@@ -267,14 +272,31 @@ fn shut_off_from_a_goal_outside_the_way_leads_around_the_window() {
 }
 
 #[test]
+fn a_wall_across_the_window_is_driven_around_beyond_it() {
+    let mut map = RiskMap::constant(geometry(11, 31), 13, Risk::NONE);
+    (1..10).for_each(|row| block(&mut map, row, 15));
+    let field = field(Neighbourhood::Eight, &map, map.geometry().centre_m(Cell { row: 5, col: 3 }));
+    // Lower bound, a taut string over the wall's end, and a cell of the ring at the assumed speed. Upper bound, such a way
+    // on the grid: four diagonals and two cells to (1, 17), a diagonal into the ring, half of it at either speed, two
+    // cells in the ring, and the same from there on but for six cells instead of two.
+    let slow = 1.0 / OUTSIDE_SPEED_SHARE;
+    let shortest_cells = 2.0 * 7.5_f64.hypot(4.5) + slow;
+    let longest_cells = 8.0 * 2_f64.sqrt() + 8.0 + 2.0 * 2_f64.sqrt() * (0.5 + 0.5 * slow) + 2.0 * slow;
+    let found_cells = at(&field.view(), 5, 23) * SPEED_MPS / RESOLUTION_M;
+    assert!((shortest_cells..=longest_cells + 1e-4).contains(&found_cells), "{found_cells}");
+}
+
+#[test]
 fn unknown_ground_takes_the_assumed_share_of_the_speed() {
     let mut map = RiskMap::constant(geometry(11, 31), 13, Risk { roll_rad: 1.0, ..Risk::OUTSIDE });
     let unknown: Vec<Cell> = inside(map.geometry()).collect();
     unknown.iter().for_each(|cell| flag(&mut map, cell.row, cell.col, GroundFlags::UNKNOWN));
     let field = field(Neighbourhood::Eight, &map, map.geometry().centre_m(Cell { row: 5, col: 3 }));
     close(at(&field.view(), 5, 23), 20.0 * RESOLUTION_M / (SPEED_MPS * UNKNOWN_SPEED_SHARE));
-    // A footprint that touches an obstacle forbids an unknown cell too: a wall of such poses costs one cell of it.
-    (1..10).for_each(|row| block(&mut map, row, 15));
+    // A footprint that touches an obstacle forbids an unknown cell too: to get behind a wall of such poses costs one cell
+    // of it.
+    (1..16).for_each(|col| [3, 7].into_iter().for_each(|row| block(&mut map, row, col)));
+    (3..8).for_each(|row| [1, 15].into_iter().for_each(|col| block(&mut map, row, col)));
     let walled = self::field(Neighbourhood::Eight, &map, map.geometry().centre_m(Cell { row: 5, col: 3 }));
     let expected_cells = 19.0 / UNKNOWN_SPEED_SHARE + SLOWDOWN;
     close(at(&walled.view(), 5, 23), expected_cells * RESOLUTION_M / SPEED_MPS);
@@ -293,9 +315,10 @@ fn attitudes_over_the_limits_and_broken_values_are_forbidden_but_finite() {
         Risk { pitch_rad: f32::INFINITY, ..Risk::NONE },
     ];
     for risk in forbidden {
-        let map = RiskMap::constant(geometry(5, 12), 13, risk);
-        let field = field(Neighbourhood::Eight, &map, map.geometry().centre_m(Cell { row: 2, col: 2 }));
-        close(at(&field.view(), 2, 9), 7.0 * SLOWDOWN * RESOLUTION_M / SPEED_MPS);
+        // To the border it is farther than to the goal.
+        let map = RiskMap::constant(geometry(21, 24), 13, risk);
+        let field = field(Neighbourhood::Eight, &map, map.geometry().centre_m(Cell { row: 10, col: 8 }));
+        close(at(&field.view(), 10, 15), 7.0 * SLOWDOWN * RESOLUTION_M / SPEED_MPS);
     }
     let within = Risk {
         roll_rad: limits.roll_max_rad as f32,
@@ -358,7 +381,7 @@ impl Oracle<'_> {
         let flags = self.map.ground[self.map.geometry.index(cell)].flags;
         let risk = self.map.risk_at(x_m, y_m, yaw_rad);
         let speed_mps = if self.on_ring(cell) {
-            if self.goal_inside() { 0.0 } else { SPEED_MPS * OUTSIDE_SPEED_SHARE }
+            SPEED_MPS * OUTSIDE_SPEED_SHARE
         } else if flags.contains(GroundFlags::OBSTACLE) {
             0.0
         } else if flags.contains(GroundFlags::UNKNOWN) && risk.roll_rad < 3.0 {
