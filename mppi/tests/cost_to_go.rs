@@ -288,18 +288,18 @@ fn a_wall_across_the_window_is_driven_around_beyond_it() {
 
 #[test]
 fn unknown_ground_takes_the_assumed_share_of_the_speed() {
-    let mut map = RiskMap::constant(geometry(11, 31), 13, Risk { roll_rad: 1.0, ..Risk::OUTSIDE });
+    let mut map = RiskMap::constant(geometry(41, 31), 13, Risk { roll_rad: 1.0, ..Risk::OUTSIDE });
     let unknown: Vec<Cell> = inside(map.geometry()).collect();
     unknown.iter().for_each(|cell| flag(&mut map, cell.row, cell.col, GroundFlags::UNKNOWN));
-    let field = field(Neighbourhood::Eight, &map, map.geometry().centre_m(Cell { row: 5, col: 3 }));
-    close(at(&field.view(), 5, 23), 20.0 * RESOLUTION_M / (SPEED_MPS * UNKNOWN_SPEED_SHARE));
+    let field = field(Neighbourhood::Eight, &map, map.geometry().centre_m(Cell { row: 20, col: 3 }));
+    close(at(&field.view(), 20, 23), 20.0 * RESOLUTION_M / (SPEED_MPS * UNKNOWN_SPEED_SHARE));
     // A footprint that touches an obstacle forbids an unknown cell too: to get behind a wall of such poses costs one cell
     // of it.
-    (1..16).for_each(|col| [3, 7].into_iter().for_each(|row| block(&mut map, row, col)));
-    (3..8).for_each(|row| [1, 15].into_iter().for_each(|col| block(&mut map, row, col)));
-    let walled = self::field(Neighbourhood::Eight, &map, map.geometry().centre_m(Cell { row: 5, col: 3 }));
+    (1..16).for_each(|col| [18, 22].into_iter().for_each(|row| block(&mut map, row, col)));
+    (18..23).for_each(|row| [1, 15].into_iter().for_each(|col| block(&mut map, row, col)));
+    let walled = self::field(Neighbourhood::Eight, &map, map.geometry().centre_m(Cell { row: 20, col: 3 }));
     let expected_cells = 19.0 / UNKNOWN_SPEED_SHARE + SLOWDOWN;
-    close(at(&walled.view(), 5, 23), expected_cells * RESOLUTION_M / SPEED_MPS);
+    close(at(&walled.view(), 20, 23), expected_cells * RESOLUTION_M / SPEED_MPS);
 }
 
 #[test]

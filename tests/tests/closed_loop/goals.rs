@@ -40,11 +40,22 @@ fn goal_behind_walls_on_all_sides_ends_in_time_and_touches_none() {
     let ends = [Outcome::Timeout, Outcome::Stuck, Outcome::Stopped];
     assert!(ends.contains(&driven.outcome), "{:?}", driven.outcome);
     assert!(driven.closed.episode.time_s() <= 15.0 + 1e-9);
-    // The bumper is the length less the rear overhang ahead of the axle; the wall begins at x = 9.5 m.
+    // Whoever looks for a way in stays outside of the walls: the ends of the axle and of the bumper, which is the length
+    // less the rear overhang ahead of it, and what lies between them on either side.
     let geometry = &course.vehicle.geometry;
-    let ahead_m = geometry.length_m - geometry.rear_overhang_m;
-    let bumper_m = driven.trace().iter().map(|row| row.motion.pose.x_m + ahead_m).fold(0.0, f64::max);
-    assert!(bumper_m < 9.5, "{bumper_m} m");
+    let (ahead_m, aside_m) = (geometry.length_m - geometry.rear_overhang_m, 0.5 * geometry.width_m);
+    let outline_m: Vec<[f64; 2]> = (0..=8)
+        .flat_map(|i| [-1.0, 1.0].map(|side| [ahead_m * f64::from(i) / 8.0, side * aside_m]))
+        .collect();
+    for row in driven.trace() {
+        let pose = &row.motion.pose;
+        let (sine, cosine) = pose.yaw_rad.sin_cos();
+        for [ahead_m, left_m] in &outline_m {
+            let x_m = pose.x_m + cosine * ahead_m - sine * left_m;
+            let y_m = pose.y_m + sine * ahead_m + cosine * left_m;
+            assert!((x_m - 14.0).abs().max(y_m.abs()) > 4.5, "in the wall at ({x_m}, {y_m}) m");
+        }
+    }
 }
 
 /// A ridge of 0.7 m across the straight line at x = 12 m, from y = -4 to 1.25 m, with flanks of atan(0.7 / 0.75) = 43
