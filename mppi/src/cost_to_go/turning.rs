@@ -353,14 +353,15 @@ fn correct(labels_s: &mut [f32], (own, there): (usize, usize), times_s: &[f32], 
     let (low, high) = labels_s.split_at_mut(own.max(there));
     let (own_s, there_s) =
         if own < there { (&mut low[own..][..n], &high[..n]) } else { (&mut high[..n], &low[there..][..n]) };
-    // Counted, because compilers make lanes of sums and not of "any".
-    let mut n_better = 0_u32;
+    // A number, because compilers make lanes of "or" over numbers and not over truths; nor of sums where they look for
+    // overflow.
+    let mut better = 0_u32;
     for ((own_s, there_s), time_s) in own_s.iter_mut().zip(there_s).zip(times_s) {
         let label_s = there_s + slowdown * time_s;
-        n_better += u32::from(label_s < *own_s);
+        better |= u32::from(label_s < *own_s);
         *own_s = if label_s < *own_s { label_s } else { *own_s };
     }
-    n_better > 0
+    better > 0
 }
 
 /// The same along a row itself, from the label before the first cell on, with the time of the move from each cell to the
