@@ -40,13 +40,13 @@ fn goal_behind_walls_on_all_sides_ends_in_time_and_touches_none() {
     let ends = [Outcome::Timeout, Outcome::Stuck, Outcome::Stopped];
     assert!(ends.contains(&driven.outcome), "{:?}", driven.outcome);
     assert!(driven.closed.episode.time_s() <= 15.0 + 1e-9);
-    // Whoever looks for a way in stays outside of the walls: the ends of the axle and of the bumper, which is the length
-    // less the rear overhang ahead of it, and what lies between them on either side.
+    // Whoever looks for a way in, or backs up for it, stays outside of the walls: both sides from the rear overhang behind
+    // the axle on, all along the length.
     let geometry = &course.vehicle.geometry;
-    let (ahead_m, aside_m) = (geometry.length_m - geometry.rear_overhang_m, 0.5 * geometry.width_m);
-    let outline_m: Vec<[f64; 2]> = (0..=8)
-        .flat_map(|i| [-1.0, 1.0].map(|side| [ahead_m * f64::from(i) / 8.0, side * aside_m]))
-        .collect();
+    let ahead_m = |i: i32| geometry.length_m * f64::from(i) / 8.0 - geometry.rear_overhang_m;
+    let aside_m = 0.5 * geometry.width_m;
+    let outline_m: Vec<[f64; 2]> =
+        (0..=8).flat_map(|i| [-1.0, 1.0].map(|side| [ahead_m(i), side * aside_m])).collect();
     for row in driven.trace() {
         let pose = &row.motion.pose;
         let (sine, cosine) = pose.yaw_rad.sin_cos();
