@@ -303,6 +303,23 @@ impl Vehicle {
             if left * LEAN_MOST < stiffness { LEAN_MOST } else { stiffness / left }
         })
     }
+
+    /// Angular acceleration with which weight alone turns the vehicle back when the wheels of one side, or of one end, have
+    /// left the ground: about those that stay, the body and the wheels in the air as one [rad/s2]. Of the ends that of the
+    /// slower.
+    pub fn righting_radps2(&self) -> [f64; 2] {
+        let Geometry { wheelbase_m, track_m, .. } = self.geometry;
+        let Body { mass_kg, inertia_kgm2, cog_ahead_m, cog_height_m } = self.body;
+        let lifted_kg = 2.0 * self.wheel.mass_kg;
+        let turned_back = |inertia_kgm2: f64, arm_m: f64, lifted_m: f64| {
+            let moment_nm = STANDARD_GRAVITY_MPS2 * (mass_kg * arm_m + lifted_kg * lifted_m);
+            let body_kgm2 = inertia_kgm2 + mass_kg * (arm_m * arm_m + cog_height_m * cog_height_m);
+            moment_nm / (body_kgm2 + lifted_kg * lifted_m * lifted_m)
+        };
+        let over_end = |arm_m: f64| turned_back(inertia_kgm2[1], arm_m, wheelbase_m);
+        let over_side = turned_back(inertia_kgm2[0], 0.5 * track_m, track_m);
+        [over_side, over_end(cog_ahead_m).min(over_end(wheelbase_m - cog_ahead_m))]
+    }
 }
 
 impl Geometry {

@@ -94,7 +94,7 @@ impl RiskParts {
                     ground.class,
                     ground.flags.0,
                     ground.friction.hundredths(),
-                    0,
+                    ground.speed.tenths(),
                 ])),
             }
         })
@@ -183,7 +183,7 @@ mod tests {
         CheckpointHeader, CommandRecord, FutureRecord, Grid, ImuRecord, MissionRecord, OrderHeader,
         PlanRecord, PointRecord, ScanHeader, Stamp, StuckRecord, TRACKS_MAX, TrackRecord, TracksHeader,
     };
-    use traversability::{FrictionLimit, GroundFlags, RiskMap};
+    use traversability::{FrictionLimit, GroundFlags, RiskMap, SpeedLimit};
 
     /// A map of odd sizes, so that every part ends within an element, and its message.
     fn told() -> (RiskMap, RiskHeader, Vec<[f32; 4]>) {
@@ -199,6 +199,7 @@ mod tests {
                     class: (k % 4) as u8,
                     flags: GroundFlags(k as u8),
                     friction: FrictionLimit::new(0.01 * (k % 90 + 1) as f32),
+                    speed: SpeedLimit::new(0.1 * (k % 200 + 1) as f32),
                 };
             }
         });

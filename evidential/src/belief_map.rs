@@ -14,7 +14,7 @@ use bicycle::lanes::Instructions;
 use physics_prior::{ASKED, Assumption, PoseLine, PriorConfig, PriorField, PriorMapError};
 use rayon::prelude::*;
 use terrain::{GridGeometry, GridMap, SurfaceCell};
-use traversability::{CvarLevel, FrictionLimit, Ground, PartialMoments, Risk, RiskMap};
+use traversability::{CvarLevel, Ground, PartialMoments, Risk, RiskMap};
 
 use crate::predictor::{Predictor, PredictorError};
 use crate::{Checkpoint, FeatureLayout, Prior, VehicleMismatch};
@@ -193,9 +193,9 @@ impl BeliefMap {
         &self.map
     }
 
-    /// Says of every cell how much it holds, until the next update, which may forget it.
-    pub fn fill_friction(&mut self, friction: impl Fn([f64; 2], &Ground) -> FrictionLimit) {
-        self.map.fill_friction(friction);
+    /// What is told of the ground [row, col], to be changed in place; the next update may forget it.
+    pub fn ground_mut(&mut self) -> &mut [Ground] {
+        self.map.ground_mut()
     }
 
     /// Moves the window to another origin on the lattice of risk cells; the next update makes the map whole again.

@@ -126,6 +126,10 @@ pub struct Costs {
     /// asked.
     #[serde(default)]
     pub grip_s: f64,
+    /// Of a step at twice the fastest speed that the map allows there [s]; in proportion to what is too much; 0 = the map is
+    /// not asked.
+    #[serde(default)]
+    pub overspeed_s: f64,
     /// Of a step in reverse [s].
     pub reverse_s: f64,
     /// Of a metre of distance across a reference path, squared, per step [s/m2].
@@ -172,6 +176,7 @@ impl Default for Config {
                 attitude_s: 20.0,
                 lateral_s: 20.0,
                 grip_s: 0.0,
+                overspeed_s: 0.0,
                 reverse_s: 0.1,
                 path_across_s_per_m2: 0.5,
                 path_along_s_per_m2: 0.1,
@@ -284,6 +289,7 @@ impl Config {
             ("costs.attitude_s", costs.attitude_s, &weight),
             ("costs.lateral_s", costs.lateral_s, &weight),
             ("costs.grip_s", costs.grip_s, &weight),
+            ("costs.overspeed_s", costs.overspeed_s, &weight),
             ("costs.reverse_s", costs.reverse_s, &weight),
             ("costs.path_across_s_per_m2", costs.path_across_s_per_m2, &weight),
             ("costs.path_along_s_per_m2", costs.path_along_s_per_m2, &weight),

@@ -208,14 +208,15 @@ impl CostToGo {
     fn fill_slowness(&mut self, map: &RiskMapView<'_>) {
         let yaw_bins = EDGES.map(|edge| map.yaw_bin(edge.yaw_rad()));
         for (index, risks) in map.risks.chunks_exact(map.n_yaws).enumerate() {
-            let flags = map.ground[index].flags;
+            let ground = map.ground[index];
             let place = self.padded(map.geometry.cell(index));
-            self.slowness[place] = yaw_bins.map(|bin| self.slowness_of(flags, risks[bin]));
+            self.slowness[place] = yaw_bins.map(|bin| self.slowness_of(&ground, risks[bin]));
         }
     }
 
     /// Time per metre of one pose [s/m].
-    fn slowness_of(&self, flags: GroundFlags, risk: Risk) -> f32 {
+    fn slowness_of(&self, ground: &traversability::Ground, risk: Risk) -> f32 {
+        let flags = ground.flags;
         if flags.contains(GroundFlags::OBSTACLE) {
             return self.forbidden_slowness();
         }
@@ -226,7 +227,7 @@ impl CostToGo {
         let upright = risk.roll_rad <= self.roll_max_rad && risk.pitch_rad <= self.pitch_max_rad;
         let moves = risk.linear_traction * self.config.forbidden_slowdown as f32 > 1.0;
         if upright && moves {
-            1.0 / (self.speed_max_mps * risk.linear_traction.min(1.0))
+            1.0 / (self.speed_max_mps * risk.linear_traction.min(1.0)).min(ground.speed.mps())
         } else {
             self.forbidden_slowness()
         }

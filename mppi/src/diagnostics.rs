@@ -12,7 +12,8 @@ pub enum CostTerm {
     Running,
     /// Steps beyond the limits of roll or pitch.
     Attitude,
-    /// Steps beyond the limit of lateral acceleration, or beyond what the ground is known to hold.
+    /// Steps beyond the limit of lateral acceleration, beyond what the ground is known to hold, or faster than it may be
+    /// driven over.
     Lateral,
     /// Steps in reverse.
     Reverse,

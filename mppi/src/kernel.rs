@@ -103,6 +103,12 @@ pub(crate) trait Kernel: Lanes {
         [0, 1, 2, 3].map(|column| self.load_lanes(&rows.map(|row| row[column])))
     }
 
+    /// Fastest speed that the ground at these indices allows [m/s]; beyond the table, of its last entry.
+    #[inline(always)]
+    fn fastest_mps(self, table: &[Ground], indices: Self::Bits) -> Self::Value {
+        self.load_lanes(&lookup::fastest_mps(table, self.words(indices)))
+    }
+
     /// Exponent and mantissa less one: value = 2^exponent (1 + rest), for normal value > 0.
     #[inline(always)]
     fn split(self, value: Self::Value) -> (Self::Value, Self::Value) {

@@ -2,11 +2,12 @@
 //!
 //! Positions are kept in cells of the map and yaws in turns, so that the map index is a truncation. Pack after pack
 //! of rollouts walks through all steps; a rollout that leaves the map creeps on, as on
-//! any ground that lets nothing through.
+//! any ground that lets nothing through. On the way to a goal its time ends there: what is left counts from the border on.
 
 mod motion;
 mod stage;
 pub(crate) mod together;
+mod window;
 
 use crate::chunk::Chunk;
 use crate::cost::{Frame, Place, Step, StepCost};
@@ -18,8 +19,9 @@ use crate::trace::TraceRows;
 use bicycle::lanes::{Constant, Instructions, Real};
 use bicycle::{Extent, GroundSample, LaneState, MotionStepper, Rates};
 use motion::{Bare, Leaving, Motion, Plain, Whole};
-use stage::{Grip, Lateral, PathTask, Reverse, Stage};
-use traversability::{FrictionLimit, Ground, Risk};
+use stage::{Grip, Lateral, Overspeed, PathTask, Reverse, Stage};
+use traversability::{FrictionLimit, Ground, Risk, SpeedLimit};
+pub(crate) use window::Window;
 
 /// Most numbers per rollout that the effects may carry from step to step.
 pub(crate) const MAX_SLOTS: usize = 64;
@@ -87,11 +89,17 @@ pub(crate) struct Prices {
     pub(crate) reverse_s: Constant,
     /// Of a step that asks twice as much of the ground as it is known to hold [s].
     pub(crate) grip_s: Constant,
+    /// Of a step at twice the fastest speed that the map allows [s].
+    pub(crate) overspeed_s: Constant,
 }
 
 impl Prices {
     fn has_manoeuvres(&self) -> bool {
-        self.lateral_s.value() > 0.0 || self.reverse_s.value() > 0.0
+        self.lateral_s.value() > 0.0 || self.reverse_s.value() > 0.0 || self.has_overspeed()
+    }
+
+    fn has_overspeed(&self) -> bool {
+        self.overspeed_s.value() > 0.0
     }
 
     fn has_grip(&self) -> bool {
@@ -122,6 +130,8 @@ pub(crate) struct GoalTask<'a> {
     /// Of a cell of distance at the end [s].
     pub(crate) rest_s: Constant,
     pub(crate) rest: Rest<'a>,
+    /// Where time counts, if some rollouts leave it.
+    pub(crate) window: Option<Window>,
 }
 
 /// What the rest of the way costs where a rollout ends.
@@ -344,6 +354,8 @@ struct Met<K: Kernel> {
     ground: GroundSample<Real<K>>,
     /// Friction that the ground is known to hold [-].
     friction: Real<K>,
+    /// Fastest that it may be driven over [m/s].
+    fastest_mps: Real<K>,
 }
 
 /// What the packs in flight share in one step.
@@ -392,6 +404,10 @@ impl<K: Kernel, P: MotionStepper, C: StepCost, S: Stage<K>> Fly<'_, K, P, C, S> 
         if M::HAS_EFFECTS && self.scene.prices.has_grip() {
             let grip = Grip { price_s: self.scene.prices.grip_s, met };
             flight.lateral = flight.lateral.add_where(flight.under_way, grip.step(&step));
+        }
+        if M::HAS_MANOEUVRES && self.scene.prices.has_overspeed() {
+            let overspeed = Overspeed { price_s: self.scene.prices.overspeed_s, met };
+            flight.lateral = flight.lateral.add_where(flight.under_way, overspeed.step(&step));
         }
         self.pay::<M>(flight, &step);
     }
@@ -457,7 +473,11 @@ fn look_up<K: Kernel, P: MotionStepper, C, M: Motion>(
     let zero = kernel.real(0.0);
     let ground = GroundSample { linear_traction, angular_traction, gradient: [zero; 2], class: zero };
     let friction = kernel.real(f64::from(FrictionLimit::UNLIMITED));
-    let mut met = Met { risk, ground, friction };
+    let fastest_mps = kernel.real_single(SpeedLimit::UNLIMITED_MPS);
+    let mut met = Met { risk, ground, friction, fastest_mps };
+    if M::HAS_MANOEUVRES && scene.prices.has_overspeed() {
+        met.fastest_mps = Real(kernel, kernel.fastest_mps(scene.grid.ground, cell));
+    }
     if M::HAS_EFFECTS && (scene.stepper.uses_ground() || scene.prices.has_grip()) {
         let grounds = kernel.grounds(scene.grid.ground, cell).map(|value| Real(kernel, value));
         let [east, north, class, friction] = grounds;

@@ -6,7 +6,7 @@ use bicycle::Limits;
 use mppi::{CostToGo, CostToGoConfig, CostToGoError, CostToGoView, Neighbourhood};
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
-use traversability::{Cell, GridGeometry, GroundFlags, Risk, RiskMap, RiskMapView};
+use traversability::{Cell, GridGeometry, GroundFlags, Risk, RiskMap, RiskMapView, SpeedLimit};
 
 const SPEED_MPS: f64 = 2.0;
 const RESOLUTION_M: f64 = 0.5;
@@ -300,6 +300,23 @@ fn unknown_ground_takes_the_assumed_share_of_the_speed() {
     let walled = self::field(Neighbourhood::Eight, &map, map.geometry().centre_m(Cell { row: 20, col: 3 }));
     let expected_cells = 19.0 / UNKNOWN_SPEED_SHARE + SLOWDOWN;
     close(at(&walled.view(), 20, 23), expected_cells * RESOLUTION_M / SPEED_MPS);
+}
+
+/// Full traction is worth three quarters of the vehicle's speed where no more is allowed, half of the traction half of it.
+#[test]
+fn ground_is_crossed_no_faster_than_it_may_be() {
+    let mut map = RiskMap::constant(geometry(41, 61), 13, Risk::NONE);
+    let limit_mps = SpeedLimit::new(0.75 * SPEED_MPS as f32);
+    map.ground_mut().iter_mut().for_each(|ground| ground.speed = limit_mps);
+    map.fill(|risks, _| {
+        for (index, risk) in risks.iter_mut().enumerate() {
+            risk.linear_traction = if index / 13 % 61 < 10 { 0.5 } else { 1.0 };
+        }
+    });
+    let field = field(Neighbourhood::Eight, &map, map.geometry().centre_m(Cell { row: 20, col: 3 }));
+    // From the middle of column 3 to the end of column 9, 6.5 cells; from there to the middle of column 30, 20.5.
+    let expected_s = RESOLUTION_M * (6.5 / (0.5 * SPEED_MPS) + 20.5 / f64::from(limit_mps.mps()));
+    close(at(&field.view(), 20, 30), expected_s);
 }
 
 #[test]

@@ -269,7 +269,7 @@ fn ground_that_is_known_to_be_slippery_is_turned_on_slowly() {
     };
     let model = Model { limits, ..model() };
     let mut slippery = level();
-    slippery.fill_friction(|_, _| FrictionLimit::new(0.2));
+    slippery.ground_mut().iter_mut().for_each(|ground| ground.friction = FrictionLimit::new(0.2));
     let most_mps2 = |grip_s: f64, map: &RiskMap| {
         let config = Config { costs: mppi::Costs { grip_s, ..smooth().costs }, ..smooth() };
         let start = State { speed_mps: 3.0, ..standing() };

@@ -6,7 +6,7 @@ use bicycle::lanes::Instructions;
 use bicycle::{Geometry, MotionLimits};
 use mppi::{CostToGo, CostToGoView};
 use terrain::{DistantPosition, GridMap, SurfaceCell};
-use traversability::{CvarLevel, Risk, RiskMapView};
+use traversability::{CvarLevel, Risk, RiskMapView, SpeedLaw};
 
 use crate::areas::Barrier;
 use crate::frame::Frame;
@@ -23,6 +23,7 @@ pub struct Assessor {
     layer: RiskLayer,
     barrier: Barrier,
     friction: KnownFriction,
+    speed_law: Option<SpeedLaw>,
     recipe: Recipe,
     cost_to_go: CostToGo,
     /// What the map of the ground that was judged last said of itself.
@@ -64,6 +65,7 @@ impl Assessor {
     ) -> Result<Self, NavigatorError> {
         config.validate()?;
         let window = config.risk_map;
+        let limits = limits.into().with_attitude_share(config.attitude_share);
         let instructions = Instructions::find(config.controller.isa).map_err(mppi::ConfigError::from)?;
         let recipe = Recipe {
             geometry: *vehicle.as_ref(),
@@ -76,13 +78,9 @@ impl Assessor {
             layer: recipe.layer()?,
             barrier: Barrier::new(config.areas.clone()),
             friction: KnownFriction { by_class: config.friction.unwrap_or_default(), by_place: None },
+            speed_law: config.speed.map(|speed| speed.law(&limits, config.controller.step_s)),
             recipe,
-            cost_to_go: CostToGo::new(
-                config.cost_to_go,
-                limits.into().with_attitude_share(config.attitude_share),
-                window.n_rows,
-                window.n_cols,
-            )?,
+            cost_to_go: CostToGo::new(config.cost_to_go, limits, window.n_rows, window.n_cols)?,
             judged: None,
             shift: (0, Jump::NONE),
             frame: Frame::default(),
@@ -181,6 +179,9 @@ impl Assessor {
         self.layer.update([x_m, y_m], self.barrier.bar(surface))?;
         if !self.friction.is_empty() {
             self.layer.fill_friction(&self.friction);
+        }
+        if let Some(law) = &self.speed_law {
+            self.layer.fill_speeds(law);
         }
         self.judged = Some(*header);
         Ok(())

@@ -7,7 +7,8 @@ use physics_prior::{PriorConfig, SlopeLaw};
 use serde::{Deserialize, Serialize};
 use terrain::{BodyBox, ElevationConfig, Mount};
 
-use crate::{Areas, FrictionConfig, GuardConfig, MovingConfig, NavigatorError};
+use crate::speed::OVERSPEED_S;
+use crate::{Areas, FrictionConfig, GuardConfig, MovingConfig, NavigatorError, SpeedConfig};
 
 /// Of a step that asks twice as much of the ground as it holds [s].
 const GRIP_S: f64 = 0.5;
@@ -57,6 +58,9 @@ pub struct Config {
     /// How much the ground is known to hold: left out, nobody knows.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub friction: Option<FrictionConfig>,
+    /// How fast uneven ground may be driven over; left out, at any speed.
+    #[serde(default)]
+    pub speed: Option<SpeedConfig>,
     /// How far whoever corrects commands for the ground may go.
     #[serde(default)]
     pub correction: CorrectionConfig,
@@ -89,7 +93,10 @@ impl Config {
             reverse_speed_share: reverse_speed_share(&vehicle.limits, &fitting.controller),
             ..fitting.cost_to_go
         };
-        Self { prior, cost_to_go, ..fitting }
+        let speed = SpeedConfig::of(vehicle);
+        let mut controller = fitting.controller;
+        controller.costs.overspeed_s = if speed.is_some() { OVERSPEED_S } else { 0.0 };
+        Self { prior, cost_to_go, controller, speed, ..fitting }
     }
 
     /// Settings that fit a vehicle's lengths and its fastest speed: a window of at most 128 cells a side that holds twice
@@ -141,6 +148,7 @@ impl Config {
             sensors: Vec::new(),
             moving: None,
             friction: None,
+            speed: None,
             correction: CorrectionConfig::default(),
         }
     }
@@ -203,6 +211,10 @@ impl Config {
                 .map(|(field, found)| (field, "a finite number", found)))
             .or(self.moving.as_ref().and_then(MovingConfig::first_invalid))
             .or(self.friction.as_ref().and_then(FrictionConfig::first_invalid))
+            .or(self
+                .speed
+                .and_then(|speed| speed.first_invalid())
+                .map(|(field, found)| (field, "a finite number > 0", found)))
     }
 }
 

@@ -29,6 +29,7 @@ mod pilot;
 mod risk;
 mod risk_estimator;
 mod route;
+mod speed;
 mod surveyor;
 mod track;
 
@@ -52,5 +53,6 @@ pub use pilot::{Destination, Pilot, PilotAges};
 pub use risk::{Belief, RiskOracle, StuckPose};
 pub use risk_estimator::RiskEstimator;
 pub use route::{CORNERS_MAX, Route, RouteError};
+pub use speed::SpeedConfig;
 pub use surveyor::{ScanTally, Surveyor, assumed_ground};
 pub use track::Whereabouts;

@@ -9,7 +9,7 @@ use evidential::{BeliefMapError, Checkpoint, Learned, Unfamiliar};
 use physics_prior::Assumption;
 use rayon::prelude::*;
 use terrain::{GridGeometry, GridMap, SurfaceCell};
-use traversability::{CvarLevel, Risk, RiskMapView};
+use traversability::{CvarLevel, Risk, RiskMapView, SpeedLaw, SpeedLimit};
 
 use crate::Jump;
 use crate::friction::KnownFriction;
@@ -73,6 +73,8 @@ pub(crate) struct RiskLayer {
     length_m: f64,
     recentre_cells: i64,
     is_filled: bool,
+    /// Memory for the limits of a map.
+    speeds_mps: Vec<f32>,
 }
 
 impl RiskLayer {
@@ -119,6 +121,7 @@ impl RiskLayer {
             length_m: geometry.length_m,
             recentre_cells: (window.recentre_m / resolution_m).ceil() as i64,
             is_filled: false,
+            speeds_mps: Vec::new(),
         })
     }
 
@@ -181,7 +184,20 @@ impl RiskLayer {
 
     /// Says of every cell how much it is known to hold.
     pub fn fill_friction(&mut self, known: &KnownFriction) {
-        self.estimator.fill_friction(|centre_m, ground| known.limit(centre_m, ground));
+        let geometry = *self.estimator.risk_map().geometry();
+        for (index, ground) in self.estimator.ground_mut().iter_mut().enumerate() {
+            ground.friction = known.limit(geometry.centre_m(geometry.cell(index)), ground);
+        }
+    }
+
+    /// Says of every cell how fast it may be driven over, by whoever knows best.
+    pub fn fill_speeds(&mut self, law: &SpeedLaw) {
+        let known = self.estimator.risk_map().view();
+        let risks = self.oracle.as_ref().map_or(known.risks, |(_, answer)| answer);
+        law.limits(&known, risks, &mut self.speeds_mps);
+        for (ground, limit_mps) in self.estimator.ground_mut().iter_mut().zip(&self.speeds_mps) {
+            ground.speed = SpeedLimit::new(*limit_mps);
+        }
     }
 
     /// Returns whether the window moved.

@@ -5,7 +5,7 @@ use bicycle::lanes::Instructions;
 use evidential::{BeliefMap, BeliefMapError, Learned};
 use physics_prior::{Assumption, PriorMap};
 use terrain::{GridGeometry, GridMap, SurfaceCell};
-use traversability::{FrictionLimit, Ground, RiskMap};
+use traversability::{Ground, RiskMap};
 
 /// Makes a risk map of a surface and keeps it up to date, whoever judges the ground.
 pub enum RiskEstimator {
@@ -56,11 +56,11 @@ impl RiskEstimator {
         }
     }
 
-    /// See [`RiskMap::fill_friction`]; the next update may forget what was said.
-    pub fn fill_friction(&mut self, friction: impl Fn([f64; 2], &Ground) -> FrictionLimit) {
+    /// What is told of the ground [row, col], to be changed in place; the next update may forget it.
+    pub fn ground_mut(&mut self) -> &mut [Ground] {
         match self {
-            Self::Prior(map) => map.fill_friction(friction),
-            Self::Networks(map) => map.fill_friction(friction),
+            Self::Prior(map) => map.ground_mut(),
+            Self::Networks(map) => map.ground_mut(),
         }
     }
 

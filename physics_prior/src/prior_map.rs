@@ -4,7 +4,7 @@ use bicycle::Geometry;
 use bicycle::lanes::{BLOCK, Instructions};
 use rayon::prelude::*;
 use terrain::{GridGeometry, GridMap, SettingError, SurfaceCell};
-use traversability::{CvarLevel, FrictionLimit, Ground, Risk, RiskMap};
+use traversability::{CvarLevel, Ground, Risk, RiskMap};
 
 use crate::{BlockPrior, PoseLine, PriorBelief, PriorConfig, PriorField, stretches};
 
@@ -99,9 +99,9 @@ impl PriorMap {
         &self.map
     }
 
-    /// Says of every cell how much it holds, until the next update, which may forget it.
-    pub fn fill_friction(&mut self, friction: impl Fn([f64; 2], &Ground) -> FrictionLimit) {
-        self.map.fill_friction(friction);
+    /// What is told of the ground [row, col], to be changed in place; the next update may forget it.
+    pub fn ground_mut(&mut self) -> &mut [Ground] {
+        self.map.ground_mut()
     }
 
     /// Moves the window to another origin on the lattice of risk cells; the next update makes the map whole again.

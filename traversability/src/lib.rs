@@ -34,6 +34,7 @@ mod partial_moments;
 mod pmf;
 mod quad;
 mod risk_map;
+mod speed_limit;
 
 pub use bins::{Bins, N_BINS};
 pub use cvar::{CvarLevel, CvarLevelError, lower_tail_cvar, upper_tail_cvar};
@@ -45,4 +46,5 @@ pub use quad::PmfQuad;
 pub use risk_map::{
     FrictionLimit, Ground, GroundFlags, Risk, RiskMap, RiskMapError, RiskMapParts, RiskMapView,
 };
+pub use speed_limit::{SpeedLaw, SpeedLimit};
 pub use terrain::{Cell, GridGeometry, TerrainClass};

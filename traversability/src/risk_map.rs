@@ -1,5 +1,6 @@
 //! The risk map: worst expected traversability for every cell and yaw, and the ground under it.
 
+use crate::speed_limit::SpeedLimit;
 use std::ops::Deref;
 use terrain::{Cell, GridGeometry, TerrainClass};
 
@@ -121,7 +122,7 @@ impl FrictionLimit {
 }
 
 /// The ground of one cell, whatever the yaw.
-#[derive(Clone, Copy, Debug, PartialEq, bytemuck::AnyBitPattern)]
+#[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 pub struct Ground {
     /// Height change per metre east and north, signed [-].
@@ -132,6 +133,8 @@ pub struct Ground {
     pub flags: GroundFlags,
     /// How much it holds.
     pub friction: FrictionLimit,
+    /// How fast it may be driven over.
+    pub speed: SpeedLimit,
 }
 
 impl Default for Ground {
@@ -141,6 +144,7 @@ impl Default for Ground {
             class: TerrainClass::Open as u8,
             flags: GroundFlags::default(),
             friction: FrictionLimit::UNTOLD,
+            speed: SpeedLimit::NONE,
         }
     }
 }
@@ -216,11 +220,9 @@ impl RiskMap {
         result
     }
 
-    /// Says of every cell how much it holds, from its centre [m] and what is known of it.
-    pub fn fill_friction(&mut self, friction: impl Fn([f64; 2], &Ground) -> FrictionLimit) {
-        for (index, ground) in self.ground.iter_mut().enumerate() {
-            ground.friction = friction(self.geometry.centre_m(self.geometry.cell(index)), ground);
-        }
+    /// What is told of the ground [row, col], to be changed in place.
+    pub fn ground_mut(&mut self) -> &mut [Ground] {
+        &mut self.ground
     }
 
     fn close_border(&mut self) {
@@ -367,20 +369,8 @@ mod tests {
     }
 
     #[test]
-    fn ground_takes_no_more_room_for_its_friction() {
+    fn ground_takes_no_more_room_for_its_friction_and_speed() {
         assert_eq!(size_of::<Ground>(), 12);
-    }
-
-    #[test]
-    fn friction_is_told_by_place_and_class() {
-        let mut map = marked_map(1);
-        map.fill(|_, ground| ground[9].class = 2);
-        map.fill_friction(|[x_m, _], ground| {
-            if ground.class == 2 { FrictionLimit::new(0.4) } else { FrictionLimit::new((x_m + 3.0) as f32) }
-        });
-        let told = |index: usize| map.view().ground[index].friction.hundredths();
-        // Centres of columns 0 and 1 lie at -1.75 and -1.25 m.
-        assert_eq!([told(0), told(1), told(8), told(9)], [125, 175, 125, 40]);
     }
 
     #[test]

@@ -3,7 +3,9 @@
 use std::path::PathBuf;
 
 use ::bench::navigation::{PlannerName, PlannerNameError, Shard};
+use bicycle::Vehicle;
 use clap::{Args, Subcommand, ValueEnum};
+use scenarios::RockFieldConfig;
 
 use super::{Method, values};
 
@@ -290,6 +292,16 @@ pub enum NavigationGround {
     Rocks,
     /// Mounds to fly off, crests and a few boulders, in proportion to the vehicle: driving fast
     Fast,
+}
+
+impl NavigationGround {
+    /// The field for a vehicle.
+    pub fn field(self, vehicle: &Vehicle) -> RockFieldConfig {
+        match self {
+            Self::Rocks => RockFieldConfig::navigation(),
+            Self::Fast => RockFieldConfig::fast(vehicle.geometry.length_m),
+        }
+    }
 }
 
 fn pair_count(word: &str) -> Result<u32, String> {

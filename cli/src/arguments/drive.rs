@@ -17,14 +17,14 @@ const PLANNING: [&str; 10] =
 #[derive(Args, Clone, Debug)]
 #[command(after_long_help = AFTER_HELP)]
 pub struct DriveArguments {
-    /// Ground to drive on: rocks, arena, navigation:MAP,PAIR, or an elevation file (.npz, GeoTIFF, 16-bit PNG)
+    /// Ground to drive on: rocks, arena, navigation:MAP,PAIR, fast:MAP,PAIR, or an elevation file (.npz, GeoTIFF, 16-bit PNG)
     ///
     /// `rocks` is a generated field of 50 x 50 m, another one for every seed. `arena` is a hall of 9.6 x 8 m with a
     /// ramp and bushes. `navigation:7,3` is the third start and goal on the seventh map of `surefoot bench navigation`:
-    /// with the benchmark's --seed, one of its drives again. A file holds heights in metres; see "Elevation files" below.
+    /// with the benchmark's --seed, one of its drives again; `fast:7,3` that of its `--ground fast`. A file holds heights in metres; see "Elevation files" below.
     #[arg(
         long,
-        value_name = "rocks|arena|navigation:MAP,PAIR|FILE",
+        value_name = "rocks|arena|navigation:MAP,PAIR|fast:MAP,PAIR|FILE",
         default_value = "rocks",
         help_heading = "World"
     )]
@@ -79,6 +79,11 @@ pub struct DriveArguments {
     /// Names: pietra_full_size (3.4 x 1.8 m), rc_car (0.33 x 0.25 m), buggy_fifth (1/5 scale), sedan.
     #[arg(long, value_name = "NAME|FILE", help_heading = "Vehicle and controller")]
     pub vehicle: Option<String>,
+
+    /// Fastest speed that is commanded [m/s] [default: the machine's]
+    #[arg(long, value_name = "M/S", value_parser = values::speed_mps, allow_hyphen_values = true,
+          help_heading = "Vehicle and controller")]
+    pub speed: Option<f64>,
 
     /// How the simulated machine departs from its description, which the controller is not told: PART=NUMBER,.. as in
     /// steering_delay=0.2; repeatable, see "Deviations" below
@@ -333,6 +338,7 @@ Exit codes:
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::arguments::NavigationGround;
     use clap::Parser;
 
     #[derive(Parser)]
@@ -365,7 +371,10 @@ mod tests {
 
     #[test]
     fn places_of_the_benchmark_are_told_from_one() {
-        assert_eq!(parse(&["--world", "navigation:7,3"]).world, WorldSource::Navigation { map: 6, pair: 2 });
+        let navigation = |ground| WorldSource::Navigation { ground, map: 6, pair: 2 };
+        assert_eq!(parse(&["--world", "navigation:7,3"]).world, navigation(NavigationGround::Rocks));
+        assert_eq!(parse(&["--world", "fast:7,3"]).world, navigation(NavigationGround::Fast));
+        assert!("fast:0,1".parse::<WorldSource>().unwrap_err().contains("fast:MAP,PAIR, both from 1"));
         for wrong in
             ["navigation:0,1", "navigation:1,0", "navigation:1", "navigation:a,1", "navigation:1,1001"]
         {

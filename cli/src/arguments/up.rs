@@ -16,12 +16,13 @@ use super::{DriveArguments, Goal};
 pub const LIVE_DEFAULT: &str = "127.0.0.1:8765";
 
 /// What describes a simulated vehicle or its world, and what a robot's file says.
-const SIMULATION: [&str; 16] = [
+const SIMULATION: [&str; 17] = [
     "world",
     "bush_height",
     "walkers",
     "start",
     "vehicle",
+    "speed",
     "deviation",
     "model",
     "config",

@@ -4,6 +4,8 @@ use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
+use super::NavigationGround;
+
 /// Where the ground comes from.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum WorldSource {
@@ -11,6 +13,8 @@ pub enum WorldSource {
     Rocks,
     /// A map of the navigation benchmark, and a start with its goal on it, both from 0.
     Navigation {
+        /// What lies on it.
+        ground: NavigationGround,
         /// Map, from 0.
         map: u32,
         /// Start and goal on it, from 0.
@@ -31,17 +35,21 @@ impl FromStr for WorldSource {
             "arena" => return Ok(Self::Arena),
             _ => {}
         }
-        if let Some(place) = word.strip_prefix("navigation:") {
-            let [map, pair] = place_of_benchmark(place).ok_or_else(|| {
-                format!("expected navigation:MAP,PAIR, both from 1 to 1000, found {word:?}")
-            })?;
-            return Ok(Self::Navigation { map, pair });
+        for (name, ground) in [("navigation", NavigationGround::Rocks), ("fast", NavigationGround::Fast)] {
+            let place = word.strip_prefix(name).and_then(|place| place.strip_prefix(':'));
+            if let Some(place) = place {
+                let [map, pair] = place_of_benchmark(place).ok_or_else(|| {
+                    format!("expected {name}:MAP,PAIR, both from 1 to 1000, found {word:?}")
+                })?;
+                return Ok(Self::Navigation { ground, map, pair });
+            }
         }
         let extension = Path::new(word).extension().and_then(|extension| extension.to_str());
         match extension.map(str::to_ascii_lowercase).as_deref() {
             Some("npz" | "tif" | "tiff" | "png") => Ok(Self::File(PathBuf::from(word))),
             _ => Err(format!(
-                "expected rocks, arena, navigation:MAP,PAIR or a file ending in .npz, .tif or .png, found {word:?}"
+                "expected rocks, arena, navigation:MAP,PAIR, fast:MAP,PAIR or a file ending in .npz, .tif or .png, \
+                 found {word:?}"
             )),
         }
     }

@@ -9,11 +9,10 @@ use ::bench::navigation::{DriveResult, Plan, Report, Request, Shard};
 use ::bench::sweep::SweepError;
 use formats::{ConfigText, Journal, overlay, read_vehicle};
 use rustix::time::{ClockId, clock_gettime};
-use scenarios::RockFieldConfig;
 use traversability::CvarLevel;
 
 use super::sweep::told;
-use crate::arguments::{BenchNavigationArguments, NavigationGround};
+use crate::arguments::BenchNavigationArguments;
 use crate::output::WithRevision;
 use crate::{UsageError, progress, summary};
 use kept::{Header, JOURNAL};
@@ -80,10 +79,7 @@ fn cpu_s() -> f64 {
 fn request(arguments: &BenchNavigationArguments) -> Result<Request, UsageError> {
     let levels = arguments.alpha.iter().map(|&alpha| CvarLevel::new(alpha));
     let vehicle = read_vehicle(&arguments.vehicle).map_err(UsageError::from_input)?;
-    let mut field = match arguments.ground {
-        NavigationGround::Rocks => RockFieldConfig::navigation(),
-        NavigationGround::Fast => RockFieldConfig::fast(vehicle.geometry.length_m),
-    };
+    let mut field = arguments.ground.field(&vehicle);
     if let Some(path) = &arguments.field {
         let text = ConfigText::read(path).map_err(UsageError::from_input)?;
         field = overlay(&text, &field).map_err(UsageError::from_input)?;

@@ -39,10 +39,7 @@ pub(crate) struct Machine {
 
 /// Reads and builds everything; whatever cannot be is refused here, before anything drives.
 pub(super) fn prepare(arguments: &DriveArguments) -> Result<Scene, UsageError> {
-    let Machine { vehicle, model, mut config, knowledge } = machine(arguments, GuardConfig::default())?;
-    if matches!(arguments.world, WorldSource::Navigation { .. }) && config.areas.geofence_m.is_empty() {
-        config.areas.geofence_m = Place::fence_m(&RockFieldConfig::navigation());
-    }
+    let Machine { vehicle, model, config, knowledge } = machine(arguments, GuardConfig::default())?;
     let mut task = task(arguments, &vehicle)?;
     let read = |path: &PathBuf| Script::read(path, &vehicle.limits);
     let script = arguments.commands.as_ref().map(read).transpose()?;
@@ -51,7 +48,9 @@ pub(super) fn prepare(arguments: &DriveArguments) -> Result<Scene, UsageError> {
         task.goal_tolerance_m = 0.0;
     }
     let seed = match arguments.world {
-        WorldSource::Navigation { map, pair } => Place { seed: arguments.seed, map, pair }.seed_of_drive(),
+        WorldSource::Navigation { map, pair, .. } => {
+            Place { seed: arguments.seed, map, pair }.seed_of_drive()
+        }
         _ => arguments.seed,
     };
     Ok(Scene { vehicle, model, config, task, seed, knowledge, script })
@@ -59,7 +58,8 @@ pub(super) fn prepare(arguments: &DriveArguments) -> Result<Scene, UsageError> {
 
 /// The machine alone, with a guard that its configuration may change.
 pub(crate) fn machine(arguments: &DriveArguments, guard: GuardConfig) -> Result<Machine, UsageError> {
-    let vehicle = read_vehicle(arguments.vehicle_name_or_path()).map_err(UsageError::from_input)?;
+    let mut vehicle = read_vehicle(arguments.vehicle_name_or_path()).map_err(UsageError::from_input)?;
+    vehicle.limits.speed_max_mps = arguments.speed.unwrap_or(vehicle.limits.speed_max_mps);
     machine_of(vehicle, arguments, guard)
 }
 
@@ -77,6 +77,11 @@ pub(crate) fn machine_of(
     if let Some(path) = &arguments.config {
         let text = ConfigText::read(path).map_err(UsageError::from_input)?;
         config = overlay(&text, &config).map_err(UsageError::from_input)?;
+    }
+    if let WorldSource::Navigation { ground, .. } = arguments.world
+        && config.areas.geofence_m.is_empty()
+    {
+        config.areas.geofence_m = Place::fence_m(&ground.field(&vehicle));
     }
     if arguments.walkers > 0 {
         config.moving.get_or_insert_default();
@@ -130,9 +135,9 @@ fn task_of_world(arguments: &DriveArguments, vehicle: &Vehicle) -> Result<Task, 
         WorldSource::Rocks => {
             Task::rock_field(&RockFieldConfig::default(), arguments.seed).map_err(UsageError::from_input)?
         }
-        &WorldSource::Navigation { map, pair } => {
+        &WorldSource::Navigation { ground, map, pair } => {
             let place = Place { seed: arguments.seed, map, pair };
-            place.task(&RockFieldConfig::navigation()).map_err(UsageError::from_input)?
+            place.task(&ground.field(vehicle)).map_err(UsageError::from_input)?
         }
         WorldSource::Arena => arena(arguments)?,
         WorldSource::File(path) => return in_file(arguments, vehicle, path),

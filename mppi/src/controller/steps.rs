@@ -12,7 +12,7 @@ use crate::objective::{Input, Objective, ReferencePath, ReferenceStep, Terminal,
 use crate::plan::Plan;
 use crate::recovery::Mode;
 use crate::rollout::together::RollTogether;
-use crate::rollout::{GoalTask, Grid, Job, MAX_SLOTS, Prices, Rest, Scene, Start, Task};
+use crate::rollout::{GoalTask, Grid, Job, MAX_SLOTS, Prices, Rest, Scene, Start, Task, Window};
 use crate::sampling::{Control, Sample, Sampler};
 use crate::summary::Accumulate;
 use crate::trace::{Kept, Trace};
@@ -141,11 +141,13 @@ impl<M: Driven, S: StepCost, R: RolloutCost> Controller<M, S, R> {
         if let TaskOrder::Path(path) = order {
             self.lay_out(&path, &frame);
         }
+        let start_cells = frame.cells([self.start.x_m, self.start.y_m]);
         let terms = GoalTerms {
             config: &self.config,
             turning_s_per_rad: self.turning_s_per_rad,
             geometry,
             frame: &frame,
+            window: Window::of(geometry, start_cells, self.horizon_m() / geometry.resolution_m),
         };
         let task = match order {
             TaskOrder::Path(_) => Task::Path(&self.reference),
@@ -154,7 +156,7 @@ impl<M: Driven, S: StepCost, R: RolloutCost> Controller<M, S, R> {
                 Task::Goal(terms.onward(goal_m, tolerance_m, terminal))
             }
         };
-        let [x_cells, y_cells] = frame.cells([self.start.x_m, self.start.y_m]);
+        let [x_cells, y_cells] = start_cells;
         let leaning_rad = self.judge_over(input.map).leaning_start_rad(&self.start);
         let scene = Scene {
             stepper: &self.cell_stepper,
@@ -186,6 +188,12 @@ impl<M: Driven, S: StepCost, R: RolloutCost> Controller<M, S, R> {
         } else {
             crew.roll_out(&scene, &mut self.chunks, S::roll_out::<M>);
         }
+    }
+
+    /// Furthest way of a rollout [m].
+    fn horizon_m(&self) -> f64 {
+        let fastest_mps = self.limits.high[0].max(-self.limits.low[0]).max(self.start.speed_mps.abs());
+        fastest_mps * self.config.step_s * self.config.n_steps as f64
     }
 
     /// Where the reference is at the end of every step.
@@ -241,6 +249,7 @@ impl<M: Driven, S: StepCost, R: RolloutCost> Controller<M, S, R> {
             lateral_s: Constant::new(costs.lateral_s),
             reverse_s: Constant::new(reverse_s),
             grip_s: Constant::new(costs.grip_s),
+            overspeed_s: Constant::new(costs.overspeed_s),
         }
     }
 
@@ -316,6 +325,7 @@ struct GoalTerms<'a> {
     turning_s_per_rad: f64,
     geometry: &'a GridGeometry,
     frame: &'a Frame,
+    window: Option<Window>,
 }
 
 impl GoalTerms<'_> {
@@ -343,6 +353,7 @@ impl GoalTerms<'_> {
             distance_s: Constant::new(distance_s_per_m * cell_m),
             rest_s: Constant::new(cell_m / self.config.costs.rest_speed_mps),
             rest,
+            window: self.window,
         }
     }
 

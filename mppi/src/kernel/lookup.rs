@@ -37,6 +37,16 @@ pub(super) fn grounds<const N: usize>(table: &[Ground], indices: [u32; N]) -> [[
     })
 }
 
+/// Fastest speed that the ground at these indices allows [m/s]; beyond the table, of its last entry.
+#[inline(always)]
+pub(super) fn fastest_mps<const N: usize>(table: &[Ground], indices: [u32; N]) -> [f32; N] {
+    let last = last_index(table);
+    indices.map(|index| {
+        // SAFETY: `last_index` has checked that the table is not empty, and the index is at most its last one.
+        unsafe { table.get_unchecked((index as usize).min(last)) }.speed.mps()
+    })
+}
+
 /// Index of the last entry; panics for an empty table.
 #[inline(always)]
 fn last_index<T>(table: &[T]) -> usize {

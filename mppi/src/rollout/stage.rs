@@ -36,7 +36,10 @@ impl GoalTask<'_> {
 impl StepCost for GoalTask<'_> {
     #[inline(always)]
     fn step<L: Lanes>(&self, step: &Step<'_, L>) -> Real<L> {
-        let time = Real::constant(step.lanes(), self.step_s);
+        let mut time = Real::constant(step.lanes(), self.step_s);
+        if let Some(window) = &self.window {
+            time = window.within(&step.state, time);
+        }
         // A square root a step is a fifth of the rollouts' time: none is taken for what nobody prices.
         if self.distance_s.value() == 0.0 {
             return time;
@@ -141,6 +144,22 @@ impl<K: Kernel> Grip<'_, K> {
         let asked = ahead.mul_add(ahead, across * across).sqrt();
         let most = self.met.friction * lanes.real(GRIP_SHARE * GRAVITY_MPS2);
         (asked / most - lanes.real(1.0)).max(lanes.real(0.0)) * Real::constant(lanes, self.price_s)
+    }
+}
+
+/// Steps faster than the ground may be driven over.
+pub(super) struct Overspeed<'a, K: Kernel> {
+    /// Of a step that is twice as fast [s].
+    pub(super) price_s: Constant,
+    pub(super) met: &'a Met<K>,
+}
+
+impl<K: Kernel> Overspeed<'_, K> {
+    #[inline(always)]
+    pub(super) fn step(&self, step: &Step<'_, K>) -> Real<K> {
+        let (lanes, traction) = (step.lanes(), self.met.ground.linear_traction);
+        let share = (step.rates().speed * traction).abs() / self.met.fastest_mps;
+        (share - lanes.real(1.0)).max(lanes.real(0.0)) * Real::constant(lanes, self.price_s)
     }
 }
 

@@ -107,3 +107,45 @@ fn what_is_known_of_friction_is_told_cell_by_cell_and_outlives_another_judge() {
         assert_eq!(told(&mut knowing), [50, 12]);
     }
 }
+
+/// A crest across the way, of which physics knows, whoever believes in level ground does not, and who is told what the
+/// ground does to the vehicle knows it from there.
+#[test]
+fn the_ground_is_told_how_fast_it_may_be_driven_over_by_who_judges_it() {
+    let vehicle = formats::read_vehicle("buggy_fifth").unwrap();
+    let level = CvarLevel::new(0.5).unwrap();
+    let crested: crate::RiskOracle =
+        Arc::new(|geometry: &GridGeometry, n_yaws: usize, risks: &mut [Risk]| {
+            for (index, risk) in risks.iter_mut().enumerate() {
+                let [x_m, _] = geometry.centre_m(geometry.cell(index / n_yaws));
+                *risk = Risk { pitch_rad: (0.4 - 0.8 * (x_m - 0.5).abs()).max(0.0) as f32, ..Risk::NONE };
+            }
+        });
+    for (belief, n_heights, is_limited) in [
+        (Belief::Physics, 0.15, true),
+        (Belief::Physics, 0.0, false),
+        (Belief::Nominal, 0.15, false),
+        (Belief::Given(crested), 0.0, true),
+    ] {
+        let config = Config::for_vehicle(&vehicle);
+        let mut assessor = Assessor::new(&vehicle, &vehicle.limits, &config, &belief, level).unwrap();
+        let geometry = GridGeometry::centred(assessor.layer.resolution_m(), 120, 120, 0.0, 0.0);
+        let heights = (0..geometry.n_cells()).map(|index| {
+            let [x_m, _] = geometry.centre_m(geometry.cell(index));
+            SurfaceCell::certain(
+                (n_heights * (1.0 - 2.0 * (x_m - 0.5).abs()).max(0.0)) as f32,
+                TerrainClass::Open,
+                0.0,
+            )
+        });
+        let ground = GridMap::from_values(geometry, heights.collect()).unwrap();
+        assessor.judge(&surface(1, 100, Jump::NONE), &ground).unwrap();
+        let known = assessor.known().unwrap();
+        let limit_mps = |x_m: f64| {
+            known.ground[known.geometry.index(known.geometry.cell_at(x_m, 0.0).unwrap())].speed.mps()
+        };
+        let slowest_mps = (0..10).map(|k| limit_mps(0.1 * f64::from(k))).fold(f32::INFINITY, f32::min);
+        assert_eq!(slowest_mps < 8.0, is_limited, "{slowest_mps} m/s");
+        assert!(limit_mps(-2.5) > 8.0, "level ground behind it");
+    }
+}

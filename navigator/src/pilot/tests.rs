@@ -51,6 +51,7 @@ fn config() -> Config {
         sensors: Vec::new(),
         moving: None,
         friction: None,
+        speed: None,
         correction: kinodynamics::CorrectionConfig::default(),
     }
 }

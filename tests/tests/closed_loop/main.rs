@@ -9,4 +9,5 @@ mod missions;
 mod repeats;
 mod sensors;
 mod skid_steer;
+mod speeds;
 mod walkers;
