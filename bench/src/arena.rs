@@ -13,7 +13,7 @@ use std::collections::BTreeMap;
 use bicycle::Vehicle;
 use mppi::Isa;
 use navigator::Config;
-use scenarios::{ARENA_SIZE_M, ArenaWay, EpisodeConfig, Outcome};
+use scenarios::{ARENA_SIZE_M, ArenaWay, Bounds, EpisodeConfig, Outcome};
 use serde::Serialize;
 use traversability::CvarLevel;
 
@@ -203,17 +203,12 @@ fn settings(request: &Request, revision: &str) -> Result<Settings, ArenaTableErr
     let mut config = Config::for_vehicle(&vehicle);
     config.controller.n_threads = 1;
     config.controller.isa = request.isa;
-    config.areas.geofence_m = walls_m();
+    // Every planner is told where the walls of the hall are, which no map shows.
+    config.areas.geofence_m = Bounds { south_west_m: [0.0; 2], north_east_m: ARENA_SIZE_M }.corners_m();
     let mut episode = EpisodeConfig::for_vehicle(&vehicle);
     episode.rules.time_limit_s = request.time_limit_s;
     let networks = training::Networks::learn(&vehicle, request, revision)?;
     Ok(Settings { vehicle, config, episode, level: request.level, seed: request.seed, networks })
-}
-
-/// Corners of the hall [m]: every planner is told where the walls are, which no map shows.
-fn walls_m() -> Vec<[f64; 2]> {
-    let [east_m, north_m] = ARENA_SIZE_M;
-    vec![[0.0, 0.0], [east_m, 0.0], [east_m, north_m], [0.0, north_m]]
 }
 
 impl Row {

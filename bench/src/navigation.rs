@@ -108,6 +108,7 @@ mod tests {
             time_limit_s,
             isa: Isa::Portable,
             plant: scenarios::Engine::Rapier,
+            settings: String::new(),
         };
         Plan::new(&request).unwrap()
     }

@@ -17,9 +17,9 @@ pub enum SweepError {
         /// What there has to be at least one of.
         expected: &'static str,
     },
-    /// The vehicle cannot be read.
+    /// The vehicle cannot be read, or settings are none.
     #[error(transparent)]
-    Vehicle(#[from] formats::ConfigError),
+    File(#[from] formats::ConfigError),
     /// The configuration has no form in JSON, hence no hash.
     #[error("config_hash: {reason}")]
     Hash {

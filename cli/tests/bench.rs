@@ -386,7 +386,16 @@ fn correction_writes_table_and_picture_and_refuses_what_cannot_be_driven() {
 
 #[test]
 fn navigation_refuses_what_cannot_be_driven() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let settings = |name: &str, text: &str| {
+        let file = folder.path().join(name);
+        std::fs::write(&file, text).expect("written");
+        file.to_str().expect("UTF-8").to_owned()
+    };
+    let (unknown, slow) = (settings("a.toml", "[speed]\nx = 1"), settings("b.toml", "attitude_share = 2.0"));
     for (words, part) in [
+        (["--config", &unknown], "a.toml:2: speed.x: expected"),
+        (["--config", &slow], "attitude_share: expected a number in (0, 1], found 2"),
         (["--pairs", "0"], "--pairs: expected a number of pairs from 1 to 1000, found \"0\""),
         (["--maps", "1001"], "--maps: expected a number of maps from 1 to 1000, found \"1001\""),
         (

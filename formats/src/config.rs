@@ -79,6 +79,11 @@ impl ConfigText {
         Self { file: file.into(), text: text.into() }
     }
 
+    /// What it says.
+    pub fn text(&self) -> &str {
+        &self.text
+    }
+
     /// The values of the file. `T` should deny unknown fields. Errors: [`ConfigError::Syntax`] and
     /// [`ConfigError::Field`] for an unknown or missing key or a value of the wrong type.
     pub fn parse<T: DeserializeOwned>(&self) -> Result<T, ConfigError> {

@@ -9,7 +9,7 @@ use mppi::{
     Config, Controller, CostToGo, CostToGoConfig, Input, Objective, Recovery, ReferencePath, Rollout,
     Terminal,
 };
-use traversability::{FrictionLimit, GridGeometry, Risk, RiskMap, RiskMapView};
+use traversability::{FrictionLimit, GridGeometry, Risk, RiskMap, RiskMapView, SpeedLimit};
 
 fn smooth() -> Config {
     Config::default()
@@ -284,6 +284,30 @@ fn ground_that_is_known_to_be_slippery_is_turned_on_slowly() {
     let [told, untold, unpriced] =
         [(0.5, &slippery), (0.5, &level()), (0.0, &slippery)].map(|(grip_s, map)| most_mps2(grip_s, map));
     assert!(told < 0.5 * untold && told < 0.5 * unpriced, "{told} {untold} {unpriced} m/s2");
+}
+
+/// A stripe across the way that may be driven over with 0.8 m/s, of a vehicle that drives 2 m/s and slows down with 2 m/s2.
+#[test]
+fn ground_is_driven_over_no_faster_than_it_may_be() {
+    let mut map = level();
+    let stripe = |x_m: f64| (4.0..5.5).contains(&x_m);
+    let geometry = *map.geometry();
+    for (index, ground) in map.ground_mut().iter_mut().enumerate() {
+        let [x_m, _] = geometry.centre_m(geometry.cell(index));
+        ground.speed = if stripe(x_m) { SpeedLimit::new(0.8) } else { SpeedLimit::NONE };
+    }
+    let driven = |overspeed_s: f64| {
+        let config = Config { costs: mppi::Costs { overspeed_s, ..smooth().costs }, ..smooth() };
+        let drive = drive(&config, &model(), &map, goal([9.0, 0.0]), (standing(), 200));
+        assert_eq!(drive.decisions.last(), Some(&Decision::Hold(HoldReason::AtGoal)));
+        let fastest_mps = |is_within: bool| {
+            let there = drive.states.iter().filter(|state| stripe(state.x_m) == is_within);
+            there.map(|state| state.speed_mps).fold(0.0, f64::max)
+        };
+        [true, false].map(fastest_mps)
+    };
+    let ([on_stripe, beside], [unpriced, _]) = (driven(20.0), driven(0.0));
+    assert!(on_stripe < 0.9 && beside > 1.5 && unpriced > 1.5, "{on_stripe} {beside} {unpriced} m/s");
 }
 
 #[test]

@@ -159,6 +159,12 @@ impl Bounds {
         Self { south_west_m, north_east_m }
     }
 
+    /// Its corners [m], counter-clockwise from the south-west.
+    pub fn corners_m(&self) -> Vec<[f64; 2]> {
+        let ([west_m, south_m], [east_m, north_m]) = (self.south_west_m, self.north_east_m);
+        vec![[west_m, south_m], [east_m, south_m], [east_m, north_m], [west_m, north_m]]
+    }
+
     /// Whether the point lies inside or on the border.
     pub fn contains(&self, x_m: f64, y_m: f64) -> bool {
         (self.south_west_m[0]..=self.north_east_m[0]).contains(&x_m)

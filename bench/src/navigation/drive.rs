@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::fmt;
 
 use bicycle::{Decision, Model, StopReason};
-use scenarios::{Episode, Outcome, RockFieldConfig, RockFieldError, RockMap, Split, Task, seed_of};
+use scenarios::{Bounds, Episode, Outcome, RockFieldConfig, RockFieldError, RockMap, Split, Task, seed_of};
 use serde::{Deserialize, Serialize};
 use traversability::CvarLevel;
 
@@ -71,8 +71,7 @@ impl Place {
 
     /// Corners of the ground [m]: every planner is told where it ends, which no sensor shows.
     pub fn fence_m(field: &RockFieldConfig) -> Vec<[f64; 2]> {
-        let side_m = field.side_m;
-        vec![[0.0, 0.0], [side_m, 0.0], [side_m, side_m], [0.0, side_m]]
+        Bounds { south_west_m: [0.0; 2], north_east_m: [field.side_m; 2] }.corners_m()
     }
 
     /// Seed of the sensors' noise and the controller's samples.

@@ -5,6 +5,7 @@ use std::str::FromStr;
 
 use bicycle::Vehicle;
 use bicycle::lanes::Instructions;
+use formats::ConfigText;
 use mppi::Isa;
 use navigator::Config;
 use scenarios::{Engine, EpisodeConfig, RockFieldConfig};
@@ -44,6 +45,8 @@ pub struct Request {
     pub isa: Isa,
     /// What simulates the vehicle.
     pub plant: Engine,
+    /// Settings of the pipeline that differ from the machine's, as TOML; nothing where none do.
+    pub settings: String,
 }
 
 /// All drives of a table, and what they have in common: results of two plans that are equal belong into one table.
@@ -76,6 +79,9 @@ pub struct Plan {
     pub config_hash: String,
     /// What simulates the vehicle.
     pub plant: Engine,
+    /// Settings of the pipeline that differ from the machine's, as TOML.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub settings: String,
 }
 
 /// One of `n` equal parts of the work, by start and goal: a pair is driven with every method in the same part.
@@ -127,7 +133,7 @@ impl Plan {
     /// The plan of a request.
     ///
     /// # Errors
-    /// Nothing to drive, a field that cannot be, or an instruction set that the machine lacks.
+    /// Nothing to drive, a field or settings that cannot be, or an instruction set that the machine lacks.
     pub fn new(request: &Request) -> Result<Self, SweepError> {
         let machine = machine(&request.vehicle, request.speed_mps)?;
         request.field.validate()?;
@@ -144,8 +150,9 @@ impl Plan {
             n_pairs: request.n_pairs,
             time_limit_s: request.time_limit_s,
             isa: Instructions::find(request.isa)?.isa(),
-            config_hash: hash_of(&config_for(&machine, &request.field, Isa::Auto))?,
+            config_hash: hash_of(&config_for(&machine, &request.field, &request.settings, Isa::Auto)?)?,
             plant: request.plant,
+            settings: request.settings.clone(),
         };
         if plan.jobs(Shard::WHOLE).next().is_none() {
             return Err(SweepError::NoDrives {
@@ -213,7 +220,7 @@ impl Plan {
         Ok(Settings {
             field: self.field.clone(),
             seed: self.seed,
-            config: config_for(&vehicle, &self.field, self.isa),
+            config: config_for(&vehicle, &self.field, &self.settings, self.isa)?,
             episode,
             vehicle,
         })
@@ -227,13 +234,23 @@ fn machine(name_or_path: &str, speed_mps: Option<f64>) -> Result<Vehicle, SweepE
     Ok(vehicle)
 }
 
-/// What `surefoot drive` uses on this ground, on one thread.
-fn config_for(vehicle: &Vehicle, field: &RockFieldConfig, isa: Isa) -> Config {
+/// What `surefoot drive` uses on this ground with these settings, on one thread.
+fn config_for(
+    vehicle: &Vehicle,
+    field: &RockFieldConfig,
+    settings: &str,
+    isa: Isa,
+) -> Result<Config, SweepError> {
     let mut config = Config::for_vehicle(vehicle);
-    config.areas.geofence_m = Place::fence_m(field);
+    if !settings.is_empty() {
+        config = formats::overlay(&ConfigText::new("settings", settings), &config)?;
+    }
+    if config.areas.geofence_m.is_empty() {
+        config.areas.geofence_m = Place::fence_m(field);
+    }
     config.controller.n_threads = 1;
     config.controller.isa = isa;
-    config
+    Ok(config)
 }
 
 #[cfg(test)]
@@ -254,6 +271,7 @@ mod tests {
             time_limit_s: 1.0,
             isa: Isa::Portable,
             plant: Engine::Rapier,
+            settings: String::new(),
         })
     }
 
@@ -307,6 +325,24 @@ mod tests {
         ] {
             assert!(matches!(nothing, Err(SweepError::NoDrives { .. })));
         }
+    }
+
+    /// The settings are the machine's own but for what is said, the fence of the field included, and their hash tells them
+    /// apart.
+    #[test]
+    fn settings_of_ones_own_are_laid_over_those_of_the_machine() {
+        let vehicle = formats::read_vehicle("buggy_fifth").unwrap();
+        let field = RockFieldConfig::navigation();
+        let config = |settings: &str| config_for(&vehicle, &field, settings, Isa::Portable);
+        let own = config("").unwrap();
+        let mut other = config("[speed]\nleast_mps = 100.0").unwrap();
+        assert!(hash_of(&own).unwrap() != hash_of(&other).unwrap());
+        let speed = other.speed.as_mut().unwrap();
+        assert!((speed.least_mps - 100.0).abs() < 1e-9);
+        *speed = own.speed.unwrap();
+        assert_eq!(own, other);
+        let told = config("[speed]\nleast_mph = 3.0").unwrap_err().to_string();
+        assert!(told.starts_with("settings:2: speed.least_mph: expected"), "{told}");
     }
 
     #[test]

@@ -177,6 +177,11 @@ pub struct BenchNavigationArguments {
     #[arg(long, value_name = "FILE")]
     pub field: Option<PathBuf>,
 
+    /// Settings of the planner that differ from the machine's, as `surefoot drive --config` takes them (TOML): what one of
+    /// them is worth
+    #[arg(long, value_name = "FILE")]
+    pub config: Option<PathBuf>,
+
     /// Give up a drive after this much simulated time [s]
     #[arg(long, value_name = "SECONDS", value_parser = values::duration_s, default_value = "120",
           allow_hyphen_values = true)]
@@ -196,7 +201,7 @@ pub struct BenchNavigationArguments {
 
     /// Drive nothing and make the table of the drives in these folders, separated by commas
     #[arg(long, value_name = "DIR,..", value_delimiter = ',', help_heading = "Long work",
-          conflicts_with_all = ["methods", "planners", "vehicle", "speed", "ground", "alpha", "maps", "pairs", "seed", "field", "time_limit", "plant", "shard", "resume",
+          conflicts_with_all = ["methods", "planners", "vehicle", "speed", "ground", "alpha", "maps", "pairs", "seed", "field", "config", "time_limit", "plant", "shard", "resume",
                                 "threads", "isa"])]
     pub merge: Vec<PathBuf>,
 

@@ -8,6 +8,7 @@ use std::sync::{Mutex, PoisonError};
 use ::bench::navigation::{DriveResult, Plan, Report, Request, Shard};
 use ::bench::sweep::SweepError;
 use formats::{ConfigText, Journal, overlay, read_vehicle};
+use navigator::Config;
 use rustix::time::{ClockId, clock_gettime};
 use traversability::CvarLevel;
 
@@ -84,6 +85,13 @@ fn request(arguments: &BenchNavigationArguments) -> Result<Request, UsageError> 
         let text = ConfigText::read(path).map_err(UsageError::from_input)?;
         field = overlay(&text, &field).map_err(UsageError::from_input)?;
     }
+    let mut settings = String::new();
+    if let Some(path) = &arguments.config {
+        let text = ConfigText::read(path).map_err(UsageError::from_input)?;
+        let config = overlay(&text, &Config::for_vehicle(&vehicle)).map_err(UsageError::from_input)?;
+        config.validate().map_err(UsageError::from_input)?;
+        text.text().clone_into(&mut settings);
+    }
     Ok(Request {
         vehicle: arguments.vehicle.clone(),
         speed_mps: arguments.speed,
@@ -97,6 +105,7 @@ fn request(arguments: &BenchNavigationArguments) -> Result<Request, UsageError> 
         time_limit_s: arguments.time_limit,
         isa: arguments.kernels.isa.into(),
         plant: arguments.plant.into(),
+        settings,
     })
 }
 

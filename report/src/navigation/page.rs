@@ -8,8 +8,10 @@ use crate::{Picture, html, verdict};
 /// The page, with its pictures in their order.
 pub fn page(report: &Report, pictures: &[Picture], revision: &str) -> String {
     let plan = &report.plan;
+    let settings: Vec<&str> = plan.settings.split_whitespace().collect();
+    let settings = if settings.is_empty() { "its own".to_owned() } else { settings.join(" ") };
     let line = format!(
-        "{}, maps of seed {}: {}, starts and goals on each, 40 m apart: {}, time limit {} s, plant {}, {:?}, revision {revision}.",
+        "{}, maps of seed {}: {}, starts and goals on each, 40 m apart: {}, time limit {} s, plant {}, {:?}, settings {settings}, revision {revision}.",
         plan.vehicle,
         plan.seed,
         plan.n_maps,

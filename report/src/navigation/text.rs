@@ -71,6 +71,7 @@ mod tests {
             time_limit_s: 120.0,
             isa: mppi::Isa::Portable,
             plant: scenarios::Engine::Rapier,
+            settings: String::new(),
         };
         let drives = outcomes.iter().zip(0..).map(|(&outcome, k)| DriveResult {
             method: bench::closed_loop::Method::Physics.into(),
