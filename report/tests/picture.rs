@@ -256,6 +256,7 @@ fn made_up_table(n_maps: u32) -> Report {
         time_limit_s: 120.0,
         isa: mppi::Isa::Portable,
         plant: scenarios::Engine::Rapier,
+        settings: String::new(),
     };
     Plan::new(&request).expect("a plan").report(&drives)
 }
