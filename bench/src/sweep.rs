@@ -19,7 +19,7 @@ pub enum SweepError {
     },
     /// The vehicle cannot be read, or settings are none.
     #[error(transparent)]
-    File(#[from] formats::ConfigError),
+    Config(#[from] formats::ConfigError),
     /// The configuration has no form in JSON, hence no hash.
     #[error("config_hash: {reason}")]
     Hash {

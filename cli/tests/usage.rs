@@ -159,7 +159,7 @@ fn unknown_words_are_refused() {
     assert_refused(&[], &["expected a command", "--help"]);
     assert_refused(&["bench"], &["expected a command", "--help"]);
     assert_refused(&["fly"], &["fly"]);
-    assert_refused(&["drive", "--speed", "3"], &["--speed"]);
+    assert_refused(&["drive", "--hurry", "3"], &["--hurry"]);
     assert_refused(&["drive", "--alpha"], &["--alpha", "value"]);
     assert_refused(&["drive", "--seed", "1", "--seed", "2"], &["--seed"]);
 }

@@ -286,7 +286,7 @@ fn ground_that_is_known_to_be_slippery_is_turned_on_slowly() {
     assert!(told < 0.5 * untold && told < 0.5 * unpriced, "{told} {untold} {unpriced} m/s2");
 }
 
-/// A stripe across the way that may be driven over with 0.8 m/s, of a vehicle that drives 2 m/s and slows down with 2 m/s2.
+/// A stripe across the way that may be driven over with 1.3 m/s, of a vehicle that drives 2 m/s and slows down with 2 m/s2.
 #[test]
 fn ground_is_driven_over_no_faster_than_it_may_be() {
     let mut map = level();
@@ -294,7 +294,7 @@ fn ground_is_driven_over_no_faster_than_it_may_be() {
     let geometry = *map.geometry();
     for (index, ground) in map.ground_mut().iter_mut().enumerate() {
         let [x_m, _] = geometry.centre_m(geometry.cell(index));
-        ground.speed = if stripe(x_m) { SpeedLimit::new(0.8) } else { SpeedLimit::NONE };
+        ground.speed = if stripe(x_m) { SpeedLimit::new(1.3) } else { SpeedLimit::NONE };
     }
     let driven = |overspeed_s: f64| {
         let config = Config { costs: mppi::Costs { overspeed_s, ..smooth().costs }, ..smooth() };
@@ -307,7 +307,7 @@ fn ground_is_driven_over_no_faster_than_it_may_be() {
         [true, false].map(fastest_mps)
     };
     let ([on_stripe, beside], [unpriced, _]) = (driven(20.0), driven(0.0));
-    assert!(on_stripe < 0.9 && beside > 1.5 && unpriced > 1.5, "{on_stripe} {beside} {unpriced} m/s");
+    assert!(on_stripe < 1.4 && beside > 1.7 && unpriced > 1.7, "{on_stripe} {beside} {unpriced} m/s");
 }
 
 #[test]

@@ -78,7 +78,7 @@ impl Assessor {
             layer: recipe.layer()?,
             barrier: Barrier::new(config.areas.clone()),
             friction: KnownFriction { by_class: config.friction.unwrap_or_default(), by_place: None },
-            speed_law: config.speed.map(|speed| speed.law(&limits, config.controller.step_s)),
+            speed_law: config.speed.law(&limits, config.controller.step_s),
             recipe,
             cost_to_go: CostToGo::new(config.cost_to_go, limits, window.n_rows, window.n_cols)?,
             judged: None,
@@ -121,7 +121,7 @@ impl Assessor {
         self.layer.stuck().iter().for_each(|(at_ns, pose)| other.layer.note_stuck(*pose, *at_ns));
         other.friction.by_place = self.friction.by_place.take();
         (self.layer, self.barrier, self.recipe) = (other.layer, other.barrier, other.recipe);
-        self.friction = other.friction;
+        (self.friction, self.speed_law) = (other.friction, other.speed_law);
         Ok(())
     }
 

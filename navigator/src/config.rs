@@ -58,9 +58,9 @@ pub struct Config {
     /// How much the ground is known to hold: left out, nobody knows.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub friction: Option<FrictionConfig>,
-    /// How fast uneven ground may be driven over; left out, at any speed.
+    /// How fast uneven ground may be driven over.
     #[serde(default)]
-    pub speed: Option<SpeedConfig>,
+    pub speed: SpeedConfig,
     /// How far whoever corrects commands for the ground may go.
     #[serde(default)]
     pub correction: CorrectionConfig,
@@ -95,7 +95,8 @@ impl Config {
         };
         let speed = SpeedConfig::of(vehicle);
         let mut controller = fitting.controller;
-        controller.costs.overspeed_s = if speed.is_some() { OVERSPEED_S } else { 0.0 };
+        let is_fast = vehicle.limits.speed_max_mps > speed.least_mps;
+        controller.costs.overspeed_s = if is_fast { OVERSPEED_S } else { 0.0 };
         Self { prior, cost_to_go, controller, speed, ..fitting }
     }
 
@@ -148,7 +149,7 @@ impl Config {
             sensors: Vec::new(),
             moving: None,
             friction: None,
-            speed: None,
+            speed: SpeedConfig::default(),
             correction: CorrectionConfig::default(),
         }
     }
@@ -211,10 +212,7 @@ impl Config {
                 .map(|(field, found)| (field, "a finite number", found)))
             .or(self.moving.as_ref().and_then(MovingConfig::first_invalid))
             .or(self.friction.as_ref().and_then(FrictionConfig::first_invalid))
-            .or(self
-                .speed
-                .and_then(|speed| speed.first_invalid())
-                .map(|(field, found)| (field, "a finite number > 0", found)))
+            .or(self.speed.first_invalid().map(|(field, found)| (field, "a finite number > 0", found)))
     }
 }
 

@@ -25,24 +25,31 @@ pub struct SpeedConfig {
     pub least_mps: f64,
 }
 
+/// Any ground at any speed.
+impl Default for SpeedConfig {
+    fn default() -> Self {
+        Self { righting_radps2: [1.0; 2], least_mps: 1e3 }
+    }
+}
+
 impl SpeedConfig {
-    /// Of a vehicle; `None` for one that is nowhere fast enough.
-    pub fn of(vehicle: &Vehicle) -> Option<Self> {
+    /// Of a vehicle.
+    pub fn of(vehicle: &Vehicle) -> Self {
         let least_mps = libm::sqrt(QUASI_STATIC * GRAVITY_MPS2 * vehicle.geometry.wheelbase_m);
-        let righting_radps2 = vehicle.righting_radps2();
-        (vehicle.limits.speed_max_mps > least_mps).then_some(Self { righting_radps2, least_mps })
+        Self { righting_radps2: vehicle.righting_radps2(), least_mps }
     }
 
-    /// The law for these limits, for a controller that looks at the ground every `step_s`.
-    pub(crate) fn law(&self, limits: &MotionLimits, step_s: f64) -> SpeedLaw {
-        SpeedLaw {
+    /// The law for these limits, for a controller that looks at the ground every `step_s`; `None` for who is nowhere fast
+    /// enough.
+    pub(crate) fn law(&self, limits: &MotionLimits, step_s: f64) -> Option<SpeedLaw> {
+        (limits.high[0] > self.least_mps).then(|| SpeedLaw {
             righting_radps2: self.righting_radps2.map(|value| value as f32),
             most_rad: [limits.roll_max_rad as f32, limits.pitch_max_rad as f32],
             least_mps: self.least_mps as f32,
             most_mps: limits.high[0] as f32,
             // What lies between two looks is seen by one of them.
             reach_m: 0.5 * limits.high[0] * step_s,
-        }
+        })
     }
 
     pub(crate) fn first_invalid(&self) -> Option<(&'static str, f64)> {
@@ -93,14 +100,12 @@ mod tests {
         for (speed_mps, is_fast) in [(1.0, false), (1.2, true)] {
             vehicle.limits.speed_max_mps = speed_mps;
             let config = Config::for_vehicle(&vehicle);
-            assert_eq!(
-                (config.speed.is_some(), config.controller.costs.overspeed_s > 0.0),
-                (is_fast, is_fast)
-            );
+            let law = config.speed.law(&(&vehicle.limits).into(), 0.1);
+            assert_eq!((law.is_some(), config.controller.costs.overspeed_s > 0.0), (is_fast, is_fast));
         }
         let mut config = Config::for_vehicle(&vehicle);
         for broken in [0.0, -1.0, f64::NAN, f64::INFINITY] {
-            config.speed = Some(SpeedConfig { righting_radps2: [5.0, broken], least_mps: 1.0 });
+            config.speed = SpeedConfig { righting_radps2: [5.0, broken], least_mps: 1.0 };
             let told = config.validate().unwrap_err().to_string();
             assert!(told.contains("speed.righting_radps2") && told.contains("a finite number > 0"), "{told}");
         }

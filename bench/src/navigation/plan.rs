@@ -337,9 +337,8 @@ mod tests {
         let own = config("").unwrap();
         let mut other = config("[speed]\nleast_mps = 100.0").unwrap();
         assert!(hash_of(&own).unwrap() != hash_of(&other).unwrap());
-        let speed = other.speed.as_mut().unwrap();
-        assert!((speed.least_mps - 100.0).abs() < 1e-9);
-        *speed = own.speed.unwrap();
+        assert!((other.speed.least_mps - 100.0).abs() < 1e-9);
+        other.speed = own.speed;
         assert_eq!(own, other);
         let told = config("[speed]\nleast_mph = 3.0").unwrap_err().to_string();
         assert!(told.starts_with("settings:2: speed.least_mph: expected"), "{told}");

@@ -39,8 +39,12 @@ pub(crate) struct Machine {
 
 /// Reads and builds everything; whatever cannot be is refused here, before anything drives.
 pub(super) fn prepare(arguments: &DriveArguments) -> Result<Scene, UsageError> {
-    let Machine { vehicle, model, config, knowledge } = machine(arguments, GuardConfig::default())?;
+    let Machine { vehicle, model, mut config, knowledge } = machine(arguments, GuardConfig::default())?;
     let mut task = task(arguments, &vehicle)?;
+    if matches!(arguments.world, WorldSource::File(_)) && config.areas.geofence_m.is_empty() {
+        // Ground that was measured ends, and no sensor shows where.
+        config.areas.geofence_m = task.world.bounds().corners_m();
+    }
     let read = |path: &PathBuf| Script::read(path, &vehicle.limits);
     let script = arguments.commands.as_ref().map(read).transpose()?;
     if script.is_some() {

