@@ -131,7 +131,7 @@ pub(crate) struct GoalTask<'a> {
     pub(crate) rest_s: Constant,
     pub(crate) rest: Rest<'a>,
     /// Where time counts, if some rollouts leave it.
-    pub(crate) window: Option<Window>,
+    pub(crate) window: Option<&'a Window>,
 }
 
 /// What the rest of the way costs where a rollout ends.

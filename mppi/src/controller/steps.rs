@@ -142,12 +142,13 @@ impl<M: Driven, S: StepCost, R: RolloutCost> Controller<M, S, R> {
             self.lay_out(&path, &frame);
         }
         let start_cells = frame.cells([self.start.x_m, self.start.y_m]);
+        let window = Window::of(geometry, start_cells, self.horizon_m() / geometry.resolution_m);
         let terms = GoalTerms {
             config: &self.config,
             turning_s_per_rad: self.turning_s_per_rad,
             geometry,
             frame: &frame,
-            window: Window::of(geometry, start_cells, self.horizon_m() / geometry.resolution_m),
+            window: window.as_ref(),
         };
         let task = match order {
             TaskOrder::Path(_) => Task::Path(&self.reference),
@@ -325,11 +326,11 @@ struct GoalTerms<'a> {
     turning_s_per_rad: f64,
     geometry: &'a GridGeometry,
     frame: &'a Frame,
-    window: Option<Window>,
+    window: Option<&'a Window>,
 }
 
-impl GoalTerms<'_> {
-    fn onward<'a>(&self, goal_m: [f64; 2], tolerance_m: f64, terminal: Terminal<'a>) -> GoalTask<'a> {
+impl<'a> GoalTerms<'a> {
+    fn onward(&self, goal_m: [f64; 2], tolerance_m: f64, terminal: Terminal<'a>) -> GoalTask<'a> {
         let rest = self.field(terminal).map_or(Rest::Straight, Rest::Field);
         let tolerance_cells = tolerance_m / self.frame.cell_m;
         let tolerance_square = Constant::new(tolerance_cells * tolerance_cells.abs());
@@ -337,12 +338,12 @@ impl GoalTerms<'_> {
     }
 
     /// Nothing ends at the target, so it counts to be near early.
-    fn back<'a>(&self, target_m: [f64; 2], terminal: Terminal<'a>) -> GoalTask<'a> {
+    fn back(&self, target_m: [f64; 2], terminal: Terminal<'a>) -> GoalTask<'a> {
         let rest = self.field(terminal).map_or(Rest::Straight, Rest::StraightFacing);
         self.to(target_m, self.config.step_s / self.config.costs.rest_speed_mps, rest)
     }
 
-    fn to<'a>(&self, at_m: [f64; 2], distance_s_per_m: f64, rest: Rest<'a>) -> GoalTask<'a> {
+    fn to(&self, at_m: [f64; 2], distance_s_per_m: f64, rest: Rest<'a>) -> GoalTask<'a> {
         let [x_cells, y_cells] = self.frame.cells(at_m).map(Constant::new);
         let cell_m = self.frame.cell_m;
         GoalTask {
@@ -357,7 +358,7 @@ impl GoalTerms<'_> {
         }
     }
 
-    fn field<'a>(&self, terminal: Terminal<'a>) -> Option<TerminalField<'a>> {
+    fn field(&self, terminal: Terminal<'a>) -> Option<TerminalField<'a>> {
         match terminal {
             Terminal::StraightLine => None,
             Terminal::CostToGo(view) => TerminalField::new(view, self.geometry, self.turning_s_per_rad),

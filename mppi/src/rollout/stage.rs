@@ -37,7 +37,7 @@ impl StepCost for GoalTask<'_> {
     #[inline(always)]
     fn step<L: Lanes>(&self, step: &Step<'_, L>) -> Real<L> {
         let mut time = Real::constant(step.lanes(), self.step_s);
-        if let Some(window) = &self.window {
+        if let Some(window) = self.window {
             time = window.within(&step.state, time);
         }
         // A square root a step is a fifth of the rollouts' time: none is taken for what nobody prices.

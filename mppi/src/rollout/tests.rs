@@ -386,7 +386,7 @@ fn time_ends_where_a_rollout_leaves_the_map() {
     let task = GoalTask {
         x_cells: Constant::new(49.0 + 30.0 / 0.5),
         y_cells: Constant::new(30.2),
-        window,
+        window: window.as_ref(),
         ..goal(&map, 0.0, Rest::Straight)
     };
     let mut scene = scene(&map, &stepper, Task::Goal(task));
