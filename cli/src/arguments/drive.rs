@@ -21,7 +21,8 @@ pub struct DriveArguments {
     ///
     /// `rocks` is a generated field of 50 x 50 m, another one for every seed. `arena` is a hall of 9.6 x 8 m with a
     /// ramp and bushes. `navigation:7,3` is the third start and goal on the seventh map of `surefoot bench navigation`:
-    /// with the benchmark's --seed, one of its drives again; `fast:7,3` that of its `--ground fast`. A file holds heights in metres; see "Elevation files" below.
+    /// with the benchmark's --seed, one of its drives again; `fast:7,3` that of its `--ground fast`. A file holds heights
+    /// in metres, and where it ends the planner is told, as a fence; see "Elevation files" below.
     #[arg(
         long,
         value_name = "rocks|arena|navigation:MAP,PAIR|fast:MAP,PAIR|FILE",

@@ -103,12 +103,17 @@ fn the_plant_keeps_to_the_ground_up_to_the_limit_and_not_far_beyond() {
             let limit_mps = bump.limit_mps(&vehicle);
             let is_lost = |speed_mps: f32| {
                 let (lean_rad, flight_s) = bump.driven(&vehicle, speed_mps);
+                let [roll_deg, pitch_deg] = lean_rad.map(f64::to_degrees);
+                let share = speed_mps / limit_mps;
+                println!(
+                    "{name}, {bump:?}, {share:.2} of {limit_mps:.1} m/s: {roll_deg:.0} {pitch_deg:.0} deg, {flight_s:.2} s"
+                );
                 flight_s >= 0.1 || lean_rad[0] > most_rad[0] || lean_rad[1] > most_rad[1]
             };
             assert!(!is_lost(limit_mps), "{name}, {bump:?}: {limit_mps} m/s are too fast");
             // Whoever is faster still may run into the bump instead of over it.
-            let beyond_mps = [1.3, 1.45, 1.6].map(|share| share * limit_mps);
-            assert!(beyond_mps.into_iter().any(is_lost), "{name}, {bump:?}: {limit_mps} m/s are too slow");
+            let n_lost = [1.3, 1.45, 1.6].into_iter().filter(|share| is_lost(share * limit_mps)).count();
+            assert!(n_lost > 0, "{name}, {bump:?}: {limit_mps} m/s are too slow");
         }
     }
 }
