@@ -2,7 +2,8 @@
 //!
 //! Positions are kept in cells of the map and yaws in turns, so that the map index is a truncation. Pack after pack
 //! of rollouts walks through all steps; a rollout that leaves the map creeps on, as on
-//! any ground that lets nothing through. On the way to a goal its time ends there: what is left counts from the border on.
+//! any ground that lets nothing through. On the way to a goal beyond the map its time ends there: what is left
+//! counts from the border on.
 
 mod motion;
 mod stage;

@@ -344,7 +344,8 @@ impl<'a> GoalTerms<'a> {
     }
 
     fn to(&self, at_m: [f64; 2], distance_s_per_m: f64, rest: Rest<'a>) -> GoalTask<'a> {
-        let [x_cells, y_cells] = self.frame.cells(at_m).map(Constant::new);
+        let at_cells = self.frame.cells(at_m);
+        let [x_cells, y_cells] = at_cells.map(Constant::new);
         let cell_m = self.frame.cell_m;
         GoalTask {
             x_cells,
@@ -354,7 +355,7 @@ impl<'a> GoalTerms<'a> {
             distance_s: Constant::new(distance_s_per_m * cell_m),
             rest_s: Constant::new(cell_m / self.config.costs.rest_speed_mps),
             rest,
-            window: self.window,
+            window: self.window.filter(|window| window.leaves_out(at_cells)),
         }
     }
 

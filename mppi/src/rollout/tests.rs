@@ -383,6 +383,9 @@ fn time_ends_where_a_rollout_leaves_the_map() {
     let start_cells = [49.0 - 1.95 / 0.5, 30.2];
     let window = Window::of(map.geometry(), start_cells, 40.0);
     assert!(window.is_some() && Window::of(map.geometry(), start_cells, 3.8).is_none());
+    let leaves_out = [[48.9, 58.9], [49.1, 30.0], [1.1, 1.1], [25.0, 59.0]]
+        .map(|at_cells| window.is_some_and(|window| window.leaves_out(at_cells)));
+    assert_eq!(leaves_out, [false, true, false, true], "60 rows, 50 columns, a ring of one");
     let task = GoalTask {
         x_cells: Constant::new(49.0 + 30.0 / 0.5),
         y_cells: Constant::new(30.2),

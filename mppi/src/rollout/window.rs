@@ -4,8 +4,9 @@ use bicycle::LaneState;
 use bicycle::lanes::{Constant, Lanes, Real};
 use traversability::GridGeometry;
 
-/// The map without its border ring. What lies beyond is not known, and whoever leaves stays near the border; the rest of
-/// the way counts from there. If time went on, who is there soon would be no better off than who comes there late.
+/// The map without its border ring, where the way leads out of it. What lies beyond is not known, and whoever leaves stays
+/// near the border; the rest of the way counts from there. If time went on, who is there soon would be no better off than
+/// who comes there late. With the goal within, nobody has to leave, and who does pays for it.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Window {
     /// Column and row of its middle [cells].
@@ -24,6 +25,14 @@ impl Window {
             middle_cells: middle.map(Constant::new),
             reach_cells: middle.map(|half| Constant::new(half - 1.0)),
         })
+    }
+
+    /// Whether a place lies beyond it [cells].
+    pub(crate) fn leaves_out(&self, at_cells: [f64; 2]) -> bool {
+        let is_beyond = |axis: usize| {
+            (at_cells[axis] - self.middle_cells[axis].value()).abs() >= self.reach_cells[axis].value()
+        };
+        is_beyond(0) || is_beyond(1)
     }
 
     /// `value` within the window, 0 beyond.
