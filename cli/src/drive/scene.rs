@@ -39,12 +39,8 @@ pub(crate) struct Machine {
 
 /// Reads and builds everything; whatever cannot be is refused here, before anything drives.
 pub(super) fn prepare(arguments: &DriveArguments) -> Result<Scene, UsageError> {
-    let Machine { vehicle, model, mut config, knowledge } = machine(arguments, GuardConfig::default())?;
+    let Machine { vehicle, model, config, knowledge } = machine(arguments, GuardConfig::default())?;
     let mut task = task(arguments, &vehicle)?;
-    if matches!(arguments.world, WorldSource::File(_)) && config.areas.geofence_m.is_empty() {
-        // Ground that was measured ends, and no sensor shows where.
-        config.areas.geofence_m = task.world.bounds().corners_m();
-    }
     let read = |path: &PathBuf| Script::read(path, &vehicle.limits);
     let script = arguments.commands.as_ref().map(read).transpose()?;
     if script.is_some() {
@@ -82,10 +78,8 @@ pub(crate) fn machine_of(
         let text = ConfigText::read(path).map_err(UsageError::from_input)?;
         config = overlay(&text, &config).map_err(UsageError::from_input)?;
     }
-    if let WorldSource::Navigation { ground, .. } = arguments.world
-        && config.areas.geofence_m.is_empty()
-    {
-        config.areas.geofence_m = Place::fence_m(&ground.field(&vehicle));
+    if config.areas.geofence_m.is_empty() {
+        config.areas.geofence_m = end_of_ground_m(arguments, &vehicle)?;
     }
     if arguments.walkers > 0 {
         config.moving.get_or_insert_default();
@@ -97,6 +91,16 @@ pub(crate) fn machine_of(
     config.controller.isa = isa(arguments, config.controller.isa)?;
     let knowledge = Knowledge::choose(arguments, &vehicle)?;
     Ok(Machine { vehicle, model, config, knowledge })
+}
+
+/// Where the ground ends that a benchmark made or somebody measured, as corners of a fence [m]: no sensor shows it. None
+/// elsewhere.
+fn end_of_ground_m(arguments: &DriveArguments, vehicle: &Vehicle) -> Result<Vec<[f64; 2]>, UsageError> {
+    match arguments.world {
+        WorldSource::Navigation { ground, .. } => Ok(Place::fence_m(&ground.field(vehicle))),
+        WorldSource::File(_) => Ok(task(arguments, vehicle)?.world.bounds().corners_m()),
+        WorldSource::Rocks | WorldSource::Arena => Ok(Vec::new()),
+    }
 }
 
 /// The instruction set as asked, else as configured; by its name, so that whoever records the settings tells what was
