@@ -118,7 +118,7 @@ impl Case {
     ) -> Result<Self, DrivesError> {
         let (sim, real) = (sim.screened(&machine, doubts)?, real.screened(&machine, doubts)?);
         refuse_mixed_steering(&machine, [&sim, &real])?;
-        let found = screen_sets(&machine, &sim.logs, &real.logs);
+        let found = screen_sets(&sim.logs, &real.logs);
         if let Some(grave) = grave(&found) {
             return Err(DrivesError::Together { problem: grave.to_string() });
         }

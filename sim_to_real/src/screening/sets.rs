@@ -1,10 +1,9 @@
-//! What only several drives together show: no excitation, the same drive twice, simulator and robot swapped.
+//! What only several drives together show: no excitation, the same drive twice.
 
 use bicycle::DriveLog;
 
-use super::Machine;
 use super::signals::Signals;
-use super::statistics::{Pairs, mean_and_deviation};
+use super::statistics::mean_and_deviation;
 use super::suspicion::Suspicion;
 
 /// Below both there is nothing to learn from: steering [rad], speed as a share of its mean.
@@ -13,17 +12,12 @@ const SPEED_MIN_SHARE: f64 = 0.015;
 /// Below one of them that half of the catalogue is out of reach.
 const STEERING_LITTLE_RAD: f64 = 0.01;
 const SPEED_LITTLE_SHARE: f64 = 0.04;
-/// The real drives miss the kinematic bicycle by less than the simulated ones: this much in one of yaw rate and speed,
-/// and no more than this in the other.
-const SWAPPED_RATIO: f64 = 1.5;
-const SWAPPED_OTHER_RATIO: f64 = 0.95;
 
 /// What is suspicious in simulated and real drives together, gravest first.
-pub fn screen_sets(machine: &Machine, sim: &[DriveLog], real: &[DriveLog]) -> Vec<Suspicion> {
+pub fn screen_sets(sim: &[DriveLog], real: &[DriveLog]) -> Vec<Suspicion> {
     let mut found = same_drives(sim, real);
     let runs: Vec<Signals<'_>> = real.iter().flat_map(Signals::of).collect();
     found.extend(excitation(&runs));
-    found.extend(swapped(machine, sim, real));
     found.sort_by_key(Suspicion::gravity);
     found
 }
@@ -60,28 +54,4 @@ fn excitation(runs: &[Signals<'_>]) -> Option<Suspicion> {
     }
     let is_little = share < SPEED_LITTLE_SHARE && mean_mps != 0.0;
     is_little.then_some(Suspicion::LittleSpeedChange { share_percent: 100.0 * share })
-}
-
-fn swapped(machine: &Machine, sim: &[DriveLog], real: &[DriveLog]) -> Option<Suspicion> {
-    let ([sim_radps, sim_mps], [real_radps, real_mps]) = (misses(machine, sim)?, misses(machine, real)?);
-    let [yaw_rate, speed] = [sim_radps / real_radps, sim_mps / real_mps];
-    let is_swapped = yaw_rate.max(speed) > SWAPPED_RATIO && yaw_rate.min(speed) > SWAPPED_OTHER_RATIO;
-    is_swapped.then_some(Suspicion::Swapped { sim_radps, real_radps, sim_mps, real_mps })
-}
-
-/// By how much the kinematic bicycle with instant actuators misses yaw rate [rad/s] and speed [m/s].
-fn misses(machine: &Machine, logs: &[DriveLog]) -> Option<[f64; 2]> {
-    let runs: Vec<_> = logs.iter().flat_map(Signals::of).collect();
-    let yaw_rates = Pairs::of(runs.iter().flat_map(|run| {
-        let pairs = run.kinematic_radps(machine.wheelbase_m).zip(run.turning_radps());
-        let pairs = pairs.map(|(asked, turned)| asked.into_iter().zip(turned));
-        pairs.into_iter().flatten().map(|(asked, turned)| (turned - asked, 0.0))
-    }));
-    let speeds = Pairs::of(runs.iter().flat_map(|run| {
-        let pairs =
-            run.commanded_speed.zip(run.speed).map(|(asked, driven)| asked.values.iter().zip(driven.values));
-        pairs.into_iter().flatten().map(|(asked, driven)| (driven - asked, 0.0))
-    }));
-    let both = yaw_rates.are_enough() && speeds.are_enough();
-    both.then(|| [yaw_rates.size(0), speeds.size(0)])
 }

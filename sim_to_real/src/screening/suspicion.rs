@@ -273,21 +273,6 @@ pub enum Suspicion {
         /// And which.
         other: String,
     },
-    /// The robot follows the bare model better than the simulator does.
-    #[error(
-        "sim and real swapped? the kinematic bicycle misses the yaw rate of the sim drives by {sim_radps:.3} rad/s and of \
-         the real ones by {real_radps:.3}, their speed by {sim_mps:.2} and {real_mps:.2} m/s"
-    )]
-    Swapped {
-        /// Simulated drives [rad/s].
-        sim_radps: f64,
-        /// Real drives [rad/s].
-        real_radps: f64,
-        /// Simulated drives [m/s].
-        sim_mps: f64,
-        /// Real drives [m/s].
-        real_mps: f64,
-    },
 }
 
 impl Suspicion {
@@ -303,8 +288,7 @@ impl Suspicion {
             | Self::BeyondLimit { .. }
             | Self::OffMap { .. }
             | Self::LittleSteering { .. }
-            | Self::LittleSpeedChange { .. }
-            | Self::Swapped { .. } => Gravity::Doubtful,
+            | Self::LittleSpeedChange { .. } => Gravity::Doubtful,
             _ => Gravity::Refused,
         }
     }
