@@ -1,6 +1,7 @@
 //! The controller: one decision per cycle.
 
 mod settings;
+mod start;
 mod steps;
 #[cfg(test)]
 mod tests;
@@ -308,7 +309,7 @@ impl<M: Driven, S: StepCost, R: RolloutCost> Controller<M, S, R> {
         self.start.turn = self.start.turn.clamp(-self.limits.turn_domain, self.limits.turn_domain);
         self.recall_slots(self.start, 0.0);
         if std::mem::take(&mut self.is_fresh) {
-            self.plan.hold(steps::as_control(&self.start));
+            self.plan.hold(start::as_control(&self.start));
         }
         self.cell_stepper.rescale(input.map.geometry.resolution_m);
         let task = self.task(input, mode);
