@@ -101,10 +101,11 @@ impl Config {
     }
 
     /// Settings that fit a vehicle's lengths and its fastest speed: a window of at most 128 cells a side that holds twice
-    /// the controller's horizon if cells between a ninth and a quarter of the vehicle's width can do that.
+    /// the controller's horizon if cells between a ninth and a quarter of the vehicle's width can do that; where they
+    /// cannot, a shorter horizon.
     pub fn for_geometry(geometry: &Geometry, speed_max_mps: f64) -> Self {
         let length_m = geometry.length_m;
-        let controller = controller(length_m);
+        let mut controller = controller(length_m);
         let horizon_s = controller.n_steps as f64 * controller.step_s;
         let horizon_m = speed_max_mps * horizon_s;
         // Twice the horizon to either side sees around an obstacle at its end.
@@ -112,6 +113,8 @@ impl Config {
         let (finest_m, coarsest_m) = (geometry.width_m / 9.0, geometry.width_m / 4.0);
         let risk_m = round_to_two_digits((window_m / 128.0).clamp(finest_m, coarsest_m));
         let n = ((window_m / risk_m).ceil() as usize).min(128);
+        let seen_s = 0.5 * n as f64 * risk_m / speed_max_mps;
+        controller.n_steps = ((seen_s / controller.step_s) as usize).clamp(FEWEST_STEPS, controller.n_steps);
         // The ground under a footprint at the border must be inside the elevation window, and so must its drift.
         let margin_m = length_m + 2.0 * risk_m;
         // A body beyond all measure asks for more cells than there are numbers; such a window is refused on validation.
@@ -216,6 +219,9 @@ impl Config {
     }
 }
 
+/// Steps of the shortest horizon. A longer one than to the border of what is seen would spread the futures over ground
+/// that nobody has judged, and leave few for what is near.
+const FEWEST_STEPS: usize = 10;
 /// Margin around the vehicle, over its length: for the sensor's noise and for what is mounted on the body.
 const BODY_MARGIN: f64 = 0.03;
 /// Height of the vehicle over its length, which no description gives: about that of a car.
@@ -277,4 +283,22 @@ fn controller(length_m: f64) -> mppi::Config {
 fn round_to_two_digits(length_m: f64) -> f64 {
     let scale = libm::pow(10.0, 1.0 - libm::log10(length_m).floor());
     (length_m * scale).round() / scale
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
+
+    use super::*;
+
+    /// The buggy is 0.48 m wide. 128 cells of a quarter of that reach 7.68 m to either side: 1.54 s at 5 m/s, 2.56 s at 3, and
+    /// more than the five seconds of a plan at 1 m/s.
+    #[test]
+    fn plans_of_the_fast_end_where_the_map_does() {
+        let mut vehicle = formats::read_vehicle("buggy_fifth").unwrap();
+        for (speed_mps, n_steps) in [(1.0, 50), (3.0, 25), (5.0, 15), (100.0, FEWEST_STEPS)] {
+            vehicle.limits.speed_max_mps = speed_mps;
+            assert_eq!(Config::for_vehicle(&vehicle).controller.n_steps, n_steps, "{speed_mps} m/s");
+        }
+    }
 }
