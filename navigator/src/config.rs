@@ -101,8 +101,8 @@ impl Config {
     }
 
     /// Settings that fit a vehicle's lengths and its fastest speed: a window of at most 128 cells a side that holds twice
-    /// the controller's horizon if cells between a ninth and a quarter of the vehicle's width can do that; where they
-    /// cannot, a shorter horizon.
+    /// the controller's horizon if cells between a ninth and a quarter of the vehicle's width can do that, and a
+    /// horizon that ends within it.
     pub fn for_geometry(geometry: &Geometry, speed_max_mps: f64) -> Self {
         let length_m = geometry.length_m;
         let mut controller = controller(length_m);
