@@ -35,9 +35,9 @@ impl Pairs {
         self.variance(which).sqrt()
     }
 
-    /// Root mean square of the first or second values.
-    pub(super) fn size(&self, which: usize) -> f64 {
-        (self.squares[which] / self.n).sqrt()
+    /// Root mean square of the second values.
+    pub(super) fn size_of_second(&self) -> f64 {
+        (self.squares[1] / self.n).sqrt()
     }
 
     /// Size of the second values over that of the first; NaN when those are all 0.

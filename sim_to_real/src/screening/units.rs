@@ -187,7 +187,7 @@ fn commanded_speed(runs: &[Signals<'_>]) -> Option<Suspicion> {
     }));
     let ratio = pairs.ratio();
     let unit = unit(ratio)?;
-    let is_told = pairs.are_enough() && pairs.size(1) > 0.05;
+    let is_told = pairs.are_enough() && pairs.size_of_second() > 0.05;
     let evidence = format!("the vehicle drives {ratio:.4} times as fast as commanded");
     is_told.then_some(Suspicion::Unit { column: "cmd_speed", unit, evidence })
 }
