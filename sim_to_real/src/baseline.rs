@@ -7,9 +7,11 @@ use crate::comparison::{Comparison, Yardstick, root_mean_square};
 use crate::conditions::StartRecord;
 use crate::drive::{Drive, DriveError};
 use crate::explanation::{best_pair, single_explanations};
+use crate::familiarity::Familiarity;
 use crate::findings::ResidualCell;
 use crate::limits_shown::LimitsShown;
 use crate::machine::Machine;
+use crate::nuisance::Information;
 use crate::residual_table::residual_cells;
 use crate::whitening::Whitening;
 use bicycle::{DriveLog, Effect};
@@ -52,6 +54,7 @@ pub struct Baseline {
     pub(crate) proportional: Vec<Effect>,
     pub(crate) yardstick: Yardstick,
     pub(crate) whitening: Whitening,
+    pub(crate) experience: Experience,
     pub(crate) null: Null,
 }
 
@@ -93,22 +96,34 @@ impl Baseline {
         share(1);
         let mut folds = Vec::new();
         for out in 0..drives.len() {
-            let rest: Vec<&Drive> = (0..drives.len()).filter(|&i| i != out).map(|i| &drives[i]).collect();
-            let effects = recalibrated(wheelbase_m, &rest, (&effects, &yardstick));
-            let comparison = Comparison::new(wheelbase_m, vec![&drives[out]], &yardstick);
-            folds.push((comparison.residuals(&effects), comparison, effects));
+            folds.push(Fold::of(wheelbase_m, (&all, out), (&effects, &yardstick)));
             share(out + 2);
         }
-        let whitening = Whitening::of(&folds.iter().flat_map(|fold| fold.0.clone()).collect::<Vec<_>>());
-        let left_out = folds.into_iter().map(|(residuals, comparison, effects)| {
-            let comparison = comparison.whitened_by(&whitening);
-            LeftOut::new(&Trial { comparison, baseline: &effects }, residuals)
-        });
-        let comparison = Comparison::new(wheelbase_m, all.clone(), &yardstick).whitened_by(&whitening);
-        let limits_shown = LimitsShown::of(&Trial { comparison, baseline: &effects });
-        let null = Null::of(&left_out.collect::<Vec<_>>(), limits_shown);
+        let whitening =
+            Whitening::of(&folds.iter().flat_map(|fold| fold.residuals.clone()).collect::<Vec<_>>());
+        let left_out: Vec<LeftOut> =
+            folds.into_iter().map(|fold| fold.judged(wheelbase_m, (&yardstick, &whitening))).collect();
+        let nominal = Comparison::new(wheelbase_m, all.clone(), &yardstick);
+        let nominal = nominal.judged_by(&whitening, &Familiarity::unlimited());
+        let experience = Experience::of(&nominal, &effects);
+        let null = Null::of(&left_out, LimitsShown::of(&Trial::fixed(nominal, &effects)));
         let proportional = proportional(wheelbase_m, &all, &yardstick);
-        Ok(Self { wheelbase_m, effects, proportional, yardstick, whitening, null })
+        Ok(Self { wheelbase_m, effects, proportional, yardstick, whitening, experience, null })
+    }
+
+    /// Other drives against the calibrated model, which gives way to them as far as nominal drives let it.
+    pub(crate) fn trial<'a>(&'a self, drives: &[&'a Drive]) -> Trial<'a> {
+        Trial::given_way(self.comparison(drives), &self.effects, &self.experience.information)
+    }
+
+    /// Other drives against the calibrated model as it is.
+    pub(crate) fn held_trial<'a>(&'a self, drives: &[&'a Drive]) -> Trial<'a> {
+        Trial::fixed(self.comparison(drives), &self.effects)
+    }
+
+    fn comparison<'a>(&'a self, drives: &[&'a Drive]) -> Comparison<'a> {
+        let comparison = Comparison::new(self.wheelbase_m, drives.to_vec(), &self.yardstick);
+        comparison.judged_by(&self.whitening, &self.experience.familiarity)
     }
 
     /// The ordinary physics of this machine, calibrated for a controller's model, which needs it beside what is announced.
@@ -130,6 +145,58 @@ pub(crate) fn drives_of(
         Drive::of(&run, machine).map_err(|source| GapError::Drive { set, number: i + 1, source })
     })
     .collect()
+}
+
+/// What nominal drives tell of the model that was calibrated on them: where it was tried, and how well its parameters are
+/// known.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct Experience {
+    familiarity: Familiarity,
+    information: Information,
+}
+
+impl Experience {
+    /// Of a model that nothing was calibrated in.
+    pub(crate) fn none() -> Self {
+        Self { familiarity: Familiarity::unlimited(), information: Information::none() }
+    }
+
+    fn of(nominal: &Comparison<'_>, effects: &[Effect]) -> Self {
+        let drives: Vec<&Drive> = nominal.drives().collect();
+        Self { familiarity: Familiarity::with(&drives), information: Information::of(nominal, effects) }
+    }
+}
+
+/// A nominal run, the others, and the model that was fitted to these.
+struct Fold<'a> {
+    own: &'a Drive,
+    others: Vec<&'a Drive>,
+    effects: Vec<Effect>,
+    /// Of that model on the run.
+    residuals: Vec<f32>,
+}
+
+impl<'a> Fold<'a> {
+    fn of(
+        wheelbase_m: f64,
+        (drives, out): (&[&'a Drive], usize),
+        (effects, yardstick): (&[Effect], &Yardstick),
+    ) -> Self {
+        let mut others = drives.to_vec();
+        let own = others.remove(out);
+        let effects = recalibrated(wheelbase_m, &others, (effects, yardstick));
+        let residuals = Comparison::new(wheelbase_m, vec![own], yardstick).residuals(&effects);
+        Self { own, others, effects, residuals }
+    }
+
+    fn judged(self, wheelbase_m: f64, (yardstick, whitening): (&Yardstick, &Whitening)) -> LeftOut {
+        let of = |drives| Comparison::new(wheelbase_m, drives, yardstick);
+        let others = of(self.others).judged_by(whitening, &Familiarity::unlimited());
+        let experience = Experience::of(&others, &self.effects);
+        let own = of(vec![self.own]).judged_by(whitening, &experience.familiarity);
+        LeftOut::new(&Trial::given_way(own, &self.effects, &experience.information), self.residuals)
+    }
 }
 
 /// One nominal run against a model of the others.

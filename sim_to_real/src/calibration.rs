@@ -217,6 +217,12 @@ fn refined(comparison: &Comparison<'_>, effects: &[Effect], held: &[&str]) -> Ve
     with_values(effects, &found.values)
 }
 
+/// The parameters of calibrated effects as they would be fitted again; what is held has no room.
+pub(crate) fn free_coordinates(effects: &[Effect]) -> Vec<Coordinate> {
+    let held = held_of(effects);
+    effects.iter().flat_map(|own| coordinates_of(own, held.contains(&own.description().id))).collect()
+}
+
 fn coordinates_of(effect: &Effect, is_held: bool) -> Vec<Coordinate> {
     let own = |(parameter, value): (&Parameter, f64)| {
         let own = coordinate(parameter, value, Some(PULL));

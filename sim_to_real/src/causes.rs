@@ -2,7 +2,8 @@
 
 use crate::calibration::{coordinate, is_limit, with_values};
 use crate::comparison::Comparison;
-use crate::least_squares::fit;
+use crate::least_squares::{fit, mean_loss};
+use crate::nuisance::{Information, Nuisance};
 use bicycle::Effect;
 use bicycle::effect::{CATALOGUE, Description, Role, add_in_order};
 
@@ -54,12 +55,29 @@ pub fn composed(baseline: &[Effect], causes: &[Effect]) -> Vec<Effect> {
 #[derive(Clone, Debug)]
 pub(crate) struct Trial<'a> {
     pub(crate) comparison: Comparison<'a>,
-    pub(crate) baseline: &'a [Effect],
+    baseline: &'a [Effect],
+    /// The baseline's parameters where nominal drives tell how much they are known.
+    nuisance: Option<Nuisance>,
 }
 
-impl Trial<'_> {
+impl<'a> Trial<'a> {
+    /// With a baseline that is taken as it is.
+    pub(crate) fn fixed(comparison: Comparison<'a>, baseline: &'a [Effect]) -> Self {
+        Self { comparison, baseline, nuisance: None }
+    }
+
+    /// With a baseline that gives way as far as nominal drives let it.
+    pub(crate) fn given_way(
+        comparison: Comparison<'a>,
+        baseline: &'a [Effect],
+        nominal: &Information,
+    ) -> Self {
+        let nuisance = Nuisance::of(&comparison, baseline, nominal);
+        Self { comparison, baseline, nuisance }
+    }
+
     pub(crate) fn loss(&self, causes: &[Effect]) -> f64 {
-        self.comparison.loss(&composed(self.baseline, causes))
+        mean_loss(&self.judged_residuals(causes))
     }
 
     pub(crate) fn residuals(&self, causes: &[Effect]) -> Vec<f32> {
@@ -68,7 +86,11 @@ impl Trial<'_> {
 
     /// The residuals as the loss judges them.
     pub(crate) fn judged_residuals(&self, causes: &[Effect]) -> Vec<f32> {
-        self.comparison.judged_residuals(&composed(self.baseline, causes))
+        let judged = self.comparison.judged_residuals(&composed(self.baseline, causes));
+        match &self.nuisance {
+            Some(nuisance) => nuisance.profiled_out(judged),
+            None => judged,
+        }
     }
 
     /// The best of `known` with one effect more: the values that the catalogue tries, then the best of them refined

@@ -1,6 +1,7 @@
 //! Drives, what a model foretells on them, and the difference in standard deviations.
 
 use crate::drive::{Drive, HORIZONS};
+use crate::familiarity::Familiarity;
 use crate::least_squares::mean_loss;
 use crate::rollout::{N_QUANTITIES, PER_START, Simulator};
 use crate::whitening::Whitening;
@@ -18,19 +19,30 @@ pub(crate) struct Comparison<'a> {
     drives: Vec<&'a Drive>,
     measured: Vec<Vec<f32>>,
     per_sigma: Vec<f32>,
-    whitening: Option<&'a Whitening>,
+    judge: Option<Judge<'a>>,
+}
+
+/// How residuals are judged.
+#[derive(Clone, Debug)]
+struct Judge<'a> {
+    whitening: &'a Whitening,
+    /// One over the standard deviation of every start's residuals, their mean square 1.
+    weights: Vec<f32>,
 }
 
 impl<'a> Comparison<'a> {
     pub(crate) fn new(wheelbase_m: f64, drives: Vec<&'a Drive>, yardstick: &Yardstick) -> Self {
         let measured = drives.iter().map(|drive| outcomes(drive)).collect();
         let per_sigma = yardstick.0.iter().map(|sigma| (1.0 / sigma) as f32).collect();
-        Self { wheelbase_m, drives, measured, per_sigma, whitening: None }
+        Self { wheelbase_m, drives, measured, per_sigma, judge: None }
     }
 
-    /// The same with residuals judged by what belongs together in them.
-    pub(crate) fn whitened_by(self, whitening: &'a Whitening) -> Self {
-        Self { whitening: Some(whitening), ..self }
+    /// The same with residuals judged by what belongs together in them, and by how familiar the driving is.
+    pub(crate) fn judged_by(self, whitening: &'a Whitening, familiarity: &Familiarity) -> Self {
+        let squares: Vec<f32> = self.drives.iter().flat_map(|drive| familiarity.weights(drive)).collect();
+        let mean = (squares.iter().sum::<f32>() / squares.len().max(1) as f32).max(f32::MIN_POSITIVE);
+        let weights = squares.iter().map(|square| (square / mean).sqrt()).collect();
+        Self { judge: Some(Judge { whitening, weights }), ..self }
     }
 
     /// Foretold less measured, in standard deviations: drive by drive, start by start, [`PER_START`] numbers each;
@@ -57,6 +69,10 @@ impl<'a> Comparison<'a> {
         self.drives.iter().copied()
     }
 
+    pub(crate) fn n_starts(&self) -> usize {
+        self.drives.iter().map(|drive| drive.starts.len()).sum()
+    }
+
     /// Whether every drive can judge this effect.
     pub(crate) fn judges(&self, id: &str) -> bool {
         self.drives.iter().all(|drive| drive.evidence.judges(id))
@@ -78,13 +94,17 @@ impl<'a> Comparison<'a> {
     /// The residuals as they are judged.
     pub(crate) fn judged_residuals(&self, effects: &[Effect]) -> Vec<f32> {
         let residuals = self.residuals(effects);
-        self.whitening.map_or_else(|| residuals.clone(), |whitening| whitening.applied(&residuals))
+        let Some(Judge { whitening, weights }) = &self.judge else { return residuals };
+        let mut judged = whitening.applied(&residuals);
+        for (start, weight) in judged.chunks_mut(PER_START).zip(weights) {
+            start.iter_mut().for_each(|residual| *residual *= weight);
+        }
+        judged
     }
 
-    /// Mean robust loss of a model; infinite where a rollout runs away beyond all numbers.
+    /// Mean robust loss of a model.
     pub(crate) fn loss(&self, effects: &[Effect]) -> f64 {
-        let loss = mean_loss(&self.judged_residuals(effects));
-        if loss.is_finite() { loss } else { f64::INFINITY }
+        mean_loss(&self.judged_residuals(effects))
     }
 }
 

@@ -57,35 +57,30 @@ impl Halves {
 }
 
 /// The halves between which the causes differ most, if they do.
-pub(crate) fn differing_halves(
-    baseline: &Baseline,
-    drives: &[Drive],
-    (causes, foretold_loss): (&[Effect], f64),
-) -> Option<Halves> {
+pub(crate) fn differing_halves(baseline: &Baseline, drives: &[Drive], causes: &[Effect]) -> Option<Halves> {
     if causes.is_empty() {
         return None;
     }
-    let gains = Halves::ALL.map(|halves| (halves, gain(baseline, drives, halves, (causes, foretold_loss))));
-    let most = gains.into_iter().max_by(|a, b| a.1.total_cmp(&b.1))?;
+    let whole = foretold_loss(baseline, &[drives.to_vec()], causes);
+    let gain = |halves: Halves| {
+        let parts = halves.of(drives)?;
+        Some((halves, (whole / foretold_loss(baseline, &parts, causes)).ln()))
+    };
+    let most = Halves::ALL.into_iter().filter_map(gain).max_by(|a, b| a.1.total_cmp(&b.1))?;
     (most.1 > NOT_THE_SAME).then_some(most.0)
 }
 
-/// How much better each drive is foretold when the others' halves are fitted apart.
-pub(crate) fn gain(
-    baseline: &Baseline,
-    drives: &[Drive],
-    halves: Halves,
-    (causes, foretold_loss): (&[Effect], f64),
-) -> f64 {
-    let Some(parts) = halves.of(drives) else { return 0.0 };
+/// Mean loss of the drives, each foretold by the others, where the causes are fitted to every part of them apart. The
+/// calibration is held: what it could be to blame for would differ from part to part as well.
+fn foretold_loss(baseline: &Baseline, parts: &[Vec<Drive>], causes: &[Effect]) -> f64 {
     let (mut sum, mut n) = (0.0, 0.0);
     for part in parts {
-        let n_starts: Vec<f64> = part.iter().map(|drive| drive.starts.len() as f64).collect();
-        let validation = CrossValidation::of(&part);
-        for (split, n_starts) in validation.splits(baseline).iter().zip(n_starts) {
+        let validation = CrossValidation::of(part);
+        for split in validation.splits(|drives| baseline.held_trial(drives)) {
+            let n_starts = split.own.comparison.n_starts() as f64;
             sum += split.own.loss(&split.refitted(causes)) * n_starts;
             n += n_starts;
         }
     }
-    (foretold_loss * n / sum).ln()
+    sum / n
 }

@@ -1,6 +1,5 @@
 //! How well an explanation foretells drives that it was not fitted to.
 
-use crate::baseline::Baseline;
 use crate::causes::{Explanation, Trial};
 use crate::drive::Drive;
 use bicycle::Effect;
@@ -25,11 +24,12 @@ impl CrossValidation {
         Self { drives: if let [drive] = drives { drive.halves() } else { drives.to_vec() } }
     }
 
-    pub(crate) fn splits<'a>(&'a self, baseline: &'a Baseline) -> Vec<Split<'a>> {
+    /// Every split with both of its sides on trial.
+    pub(crate) fn splits<'a>(&'a self, on_trial: impl Fn(&[&'a Drive]) -> Trial<'a>) -> Vec<Split<'a>> {
         let split = |out: usize| {
             let rest: Vec<&Drive> =
                 self.drives.iter().enumerate().filter(|(i, _)| *i != out).map(|(_, drive)| drive).collect();
-            Split { learned: baseline.trial(&rest), own: baseline.trial(&[&self.drives[out]]) }
+            Split { learned: on_trial(&rest), own: on_trial(&[&self.drives[out]]) }
         };
         (0..self.drives.len()).map(split).collect()
     }

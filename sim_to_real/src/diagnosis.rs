@@ -3,7 +3,7 @@
 use crate::answer::{Answer, NamedEffect, Ranked, SCHEMA_VERSION, Shrink, Verdict};
 use crate::baseline::{Baseline, GapError, drives_of};
 use crate::causes::{Explanation, Trial};
-use crate::comparison::{Comparison, root_mean_square};
+use crate::comparison::root_mean_square;
 use crate::conditions::{StartRecord, condition_tables, ground_residuals, places};
 use crate::constancy::differing_halves;
 use crate::cross_validation::{CrossValidation, Split, foretold};
@@ -55,12 +55,12 @@ pub fn diagnose(baseline: &Baseline, machine: &Machine, real: &[DriveLog]) -> Re
     let trial = baseline.trial(&all);
     let before = trial.residuals(&[]);
     let cross_validation = CrossValidation::of(&drives);
-    let splits = cross_validation.splits(baseline);
+    let splits = cross_validation.splits(|drives| baseline.trial(drives));
     let mut judgement = judged(baseline, &trial, &splits);
     let causes = judgement.announced.clone();
     let mut notes = of_evidence(&all);
     if drives.len() > 1
-        && let Some(halves) = differing_halves(baseline, &drives, (&causes, judgement.foretold_loss))
+        && let Some(halves) = differing_halves(baseline, &drives, &causes)
     {
         judgement.verdict = Verdict::EffectsAndUnknown;
         notes.push(halves.told().to_owned());
@@ -89,12 +89,6 @@ pub fn diagnose(baseline: &Baseline, machine: &Machine, real: &[DriveLog]) -> Re
 }
 
 impl Baseline {
-    pub(crate) fn trial<'a>(&'a self, drives: &[&'a Drive]) -> Trial<'a> {
-        let comparison =
-            Comparison::new(self.wheelbase_m, drives.to_vec(), &self.yardstick).whitened_by(&self.whitening);
-        Trial { comparison, baseline: &self.effects }
-    }
-
     /// [`closed`] with the null's error for a floor.
     pub(crate) fn closed(&self, before: f64, after: f64) -> Option<f64> {
         closed(self.null.error, before, after)

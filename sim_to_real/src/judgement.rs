@@ -21,7 +21,7 @@ const ACTUATORS: [&[&str]; 2] = [
 pub(crate) const TEMPERATURE: f64 = 0.035;
 /// An effect is announced only when it takes this share off the loss, or off the null's where that is larger, beyond what it
 /// takes off between nominal drives.
-const BEYOND_DOUBT: f64 = 0.13;
+const BEYOND_DOUBT: f64 = 0.1;
 /// Explanations this much less probable than the best are told apart from it.
 const TOLD_APART: f64 = 0.25;
 /// Where the data tell nothing apart, this many names are enough to say so.
@@ -50,8 +50,6 @@ pub(crate) struct Weighed {
 pub(crate) struct Judgement {
     pub(crate) verdict: Verdict,
     pub(crate) announced: Vec<Effect>,
-    /// Loss of what is announced on drives that it was not fitted to.
-    pub(crate) foretold_loss: f64,
     pub(crate) ranking: Vec<Ranked>,
     pub(crate) credible_set: Vec<String>,
 }
@@ -98,13 +96,7 @@ impl Weighed {
         let best = if self.is_beyond_doubt(all[0].1, null) { all[0].1 } else { &self.none };
         let (verdict, announced) = self.verdict(best, null);
         let credible_set = self.credible_set(best);
-        Judgement {
-            verdict,
-            announced,
-            foretold_loss: best.foretold_loss,
-            ranking: ranking(&all),
-            credible_set,
-        }
+        Judgement { verdict, announced, ranking: ranking(&all), credible_set }
     }
 
     fn takes_its_share(&self, pair: &Explanation) -> bool {

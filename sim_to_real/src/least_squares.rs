@@ -26,10 +26,11 @@ pub(crate) struct Fit {
     pub(crate) loss: f64,
 }
 
-/// Mean of 2 b^2 (sqrt(1 + (r / b)^2) - 1) over residuals r in standard deviations.
+/// Mean of 2 b^2 (sqrt(1 + (r / b)^2) - 1) over residuals r in standard deviations; infinite where a rollout runs away beyond
+/// all numbers.
 pub(crate) fn mean_loss(residuals: &[f32]) -> f64 {
     let sum: f64 = residuals.iter().map(|r| loss(f64::from(*r))).sum();
-    sum / residuals.len() as f64
+    if sum.is_finite() { sum / residuals.len() as f64 } else { f64::INFINITY }
 }
 
 fn loss(residual: f64) -> f64 {
@@ -83,6 +84,7 @@ fn total_loss(coordinates: &[Coordinate], values: &[f64], residuals: &[f32]) -> 
 }
 
 /// The residuals at a point and their weighted derivatives.
+#[derive(Clone, Debug)]
 pub(crate) struct Linearised {
     columns: Vec<Vec<f32>>,
     weights: Vec<f32>,
@@ -132,6 +134,25 @@ impl Linearised {
             }
         }
         normal
+    }
+
+    /// Of half the loss of all residuals, by each two parameters.
+    pub(crate) fn curvature(&self) -> DMatrix<f64> {
+        self.normal(0..self.here.len()).matrix
+    }
+
+    /// Derivatives of half the loss that other residuals have, weighted as those at the point.
+    pub(crate) fn gradient(&self, residuals: &[f32]) -> DVector<f64> {
+        let weighed: Vec<f32> = residuals.iter().zip(&self.weights).map(|(r, weight)| r * weight).collect();
+        DVector::from_iterator(self.columns.len(), self.columns.iter().map(|column| dot(column, &weighed)))
+    }
+
+    /// What residuals become where the parameters change.
+    pub(crate) fn move_by(&self, change: &DVector<f64>, residuals: &mut [f32]) {
+        for (column, change) in self.columns.iter().zip(change.iter()) {
+            let change = *change as f32;
+            residuals.iter_mut().zip(column).for_each(|(residual, column)| *residual += column * change);
+        }
     }
 
     /// Standard error of each parameter, by leaving out one of `n` stretches after the other and taking the step that

@@ -1,7 +1,7 @@
 //! Which effects the real drives could not have shown, by what each would change in their predictions.
 
 use crate::baseline::Baseline;
-use crate::causes::{candidates, composed};
+use crate::causes::candidates;
 use crate::diagnosis::Diagnosis;
 use crate::drive::Drive;
 use crate::least_squares::mean_loss;
@@ -20,15 +20,13 @@ const VEGETATION: f32 = 2.0;
 /// The effects that would not show at any of the sizes that the catalogue tries, each at its largest one.
 pub(crate) fn unseen(baseline: &Baseline, drives: &[&Drive], announced: &[Effect]) -> Vec<Effect> {
     let trial = baseline.trial(drives);
-    let with_known = composed(trial.baseline, announced);
-    let comparison = &trial.comparison;
-    let before = comparison.residuals(&with_known);
+    let before = trial.residuals(announced);
     let is_announced = |own: &Description| announced.iter().any(|effect| effect.description().id == own.id);
     let mut unseen = Vec::new();
     for description in candidates().filter(|own| !is_announced(own)) {
         let shows = |effect: &Effect| {
             let with: Vec<Effect> = announced.iter().copied().chain([*effect]).collect();
-            let after = comparison.residuals(&composed(trial.baseline, &with));
+            let after = trial.residuals(&with);
             let change: Vec<f32> = before.iter().zip(&after).map(|(a, b)| a - b).collect();
             (1.0 + mean_loss_of_all(&change) / baseline.null.loss).ln() > SHOWS
         };

@@ -9,7 +9,7 @@ mod notes;
 mod selection;
 
 use crate::answer::Verdict;
-use crate::baseline::{Baseline, GapError, Null, drives_of};
+use crate::baseline::{Baseline, Experience, GapError, Null, drives_of};
 use crate::causes::Trial;
 use crate::comparison::{Comparison, Yardstick, root_mean_square};
 use crate::conditions::{StartRecord, condition_tables, ground_residuals};
@@ -61,11 +61,11 @@ pub fn diagnose_without_simulator(
     }
     let few = stretches(&drives, N_STARTS_TO_SELECT);
     let folds = Folds::of(&few);
-    let rough = Trial { comparison: folds.comparison(machine, &Yardstick::rough()), baseline: &[] };
+    let rough = Trial::fixed(folds.comparison(machine, &Yardstick::rough()), &[]);
     let known = grown(&rough, None, N_FOR_YARDSTICK);
     let yardstick = Yardstick::of(&rough.residuals(&known.explanation.causes), &Yardstick::rough());
     let left_out = LeftOut { folds: &folds, machine, yardstick: &yardstick };
-    let trial = Trial { comparison: folds.comparison(machine, &yardstick), baseline: &[] };
+    let trial = Trial::fixed(folds.comparison(machine, &yardstick), &[]);
     let grown = grown(&trial, Some(&left_out), usize::MAX);
     let mut selection = Selection::of(&trial, grown, &left_out);
     let many = stretches(&drives, N_STARTS);
@@ -94,6 +94,7 @@ fn bare_baseline(machine: &Machine, drives: &[&Drive], yardstick: Yardstick) -> 
         proportional: Vec::new(),
         yardstick,
         whitening: Whitening::none(),
+        experience: Experience::none(),
         null,
     }
 }

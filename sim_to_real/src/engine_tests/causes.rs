@@ -16,7 +16,7 @@ fn on<T>(made: Made, told: impl Fn(&Trial<'_>) -> T) -> T {
     let noise = Comparison::new(1.0, vec![&nominal], &rough).residuals(&[]);
     let yardstick = Yardstick::of(&noise, &rough);
     let comparison = Comparison::new(1.0, drives.iter().collect(), &yardstick);
-    told(&Trial { comparison, baseline: &[] })
+    told(&Trial::fixed(comparison, &[]))
 }
 
 #[test]

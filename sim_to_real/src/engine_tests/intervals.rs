@@ -51,7 +51,7 @@ fn intervals_of_a_steering_ratio_hold_it_and_are_no_wider_than_they_need_be() {
     for seed in 0..12 {
         let drive = arcs(Made { curvature_ratio: truth, left_ratio: 1.0, speed_ratio: 1.0 }, 100 + seed);
         let comparison = Comparison::new(1.0, vec![&drive], &Yardstick::rough());
-        let trial = Trial { comparison, baseline: &[] };
+        let trial = Trial::fixed(comparison, &[]);
         let found = trial.with_one_more(&[], description).unwrap();
         let named = named_effects(&trial, &found.causes);
         let ratio = named[0].parameters["ratio"];
@@ -69,7 +69,7 @@ fn intervals_shrink_with_more_drives_down_to_the_error_of_the_form() {
     let drives: Vec<_> = (0..4).map(|seed| arcs(made, 200 + seed)).collect();
     let width = |n: usize| {
         let comparison = Comparison::new(1.0, drives.iter().take(n).collect(), &Yardstick::rough());
-        let trial = Trial { comparison, baseline: &[] };
+        let trial = Trial::fixed(comparison, &[]);
         let ratio = named_effects(&trial, &[effect("steer_gain", 0.88)])[0].parameters["ratio"];
         ratio.high - ratio.low
     };

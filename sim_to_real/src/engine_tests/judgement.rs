@@ -61,11 +61,11 @@ fn a_gain_below_its_price_is_nothing_and_one_well_above_is_announced() {
     let at = |gain: f64| judged(1.3, &[1.3 * (-gain).exp(), 1.3, 1.3, 1.3, 1.3], None);
     assert_eq!(at(0.0).verdict, Verdict::None);
     assert_eq!(at(0.01).verdict, Verdict::None);
-    // A little more than its price is likelier than nothing, and not beyond doubt: 1 - exp(-0.13) is 0.122 of the loss,
-    // 1 - exp(-0.15) is 0.139.
+    // A little more than its price is likelier than nothing, and not beyond doubt: 1 - exp(-0.1) is 0.095 of the loss,
+    // 1 - exp(-0.11) is 0.104.
     assert!(score(&at(0.08), "steer_lag") > 0.5);
-    assert_eq!(at(0.13).verdict, Verdict::None);
-    assert_eq!(announced(&at(0.15)), ["steer_lag"]);
+    assert_eq!(at(0.1).verdict, Verdict::None);
+    assert_eq!(announced(&at(0.11)), ["steer_lag"]);
     // Once announced, it stays so for every larger gain.
     let first = (0..60).find(|k| at(0.01 * f64::from(*k)).verdict != Verdict::None).unwrap();
     assert!((first..60).all(|k| announced(&at(0.01 * f64::from(k))) == ["steer_lag"]), "from {first}");

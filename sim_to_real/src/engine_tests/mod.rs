@@ -16,7 +16,7 @@ use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 /// The effect with this one parameter.
-fn effect(id: &str, value: f64) -> Effect {
+pub(crate) fn effect(id: &str, value: f64) -> Effect {
     Effect::from_values(id, [value, 0.0, 0.0, 0.0]).unwrap()
 }
 
@@ -28,17 +28,17 @@ fn normal(seed: u64) -> impl FnMut() -> f64 {
 
 /// How a made-up machine differs from the kinematic bicycle of wheelbase 1 m.
 #[derive(Clone, Copy)]
-struct Made {
+pub(crate) struct Made {
     /// Curvature over that of the commanded angle's tangent.
-    curvature_ratio: f64,
+    pub(crate) curvature_ratio: f64,
     /// The same once more to the left.
-    left_ratio: f64,
+    pub(crate) left_ratio: f64,
     /// Speed over the commanded one.
-    speed_ratio: f64,
+    pub(crate) speed_ratio: f64,
 }
 
 /// Drives of 24 s in arcs of 0.02 s, with noise: speeds and angles that change every second and a half.
-fn arcs(made: Made, seed: u64) -> Drive {
+pub(crate) fn arcs(made: Made, seed: u64) -> Drive {
     let mut noise = normal(seed);
     let [mut x, mut y, mut yaw] = [0.0_f64; 3];
     let n = (24.0 / STEP_S) as usize;

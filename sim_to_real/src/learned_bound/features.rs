@@ -36,7 +36,7 @@ impl Examples {
     pub(super) fn of(baseline: &Baseline, effects: &[Effect], drives: &[Drive], machine: &Machine) -> Self {
         let all: Vec<&Drive> = drives.iter().collect();
         let comparison = Comparison::new(baseline.wheelbase_m, all, &baseline.yardstick);
-        let residuals = Trial { comparison, baseline: effects }.residuals(&[]);
+        let residuals = Trial::fixed(comparison, effects).residuals(&[]);
         let simulator = Simulator::new(baseline.wheelbase_m, effects);
         let mut examples = Self {
             features: Vec::new(),

@@ -64,8 +64,7 @@ impl LeftOut<'_> {
     /// Mean loss of each group under parameters that the other groups give, and these parameters.
     fn judge(&self, causes: &[Effect]) -> (f64, Vec<Vec<Effect>>) {
         let length = self.machine.wheelbase_m;
-        let trial =
-            |drives| Trial { comparison: Comparison::new(length, drives, self.yardstick), baseline: &[] };
+        let trial = |drives| Trial::fixed(Comparison::new(length, drives, self.yardstick), &[]);
         let mut sum = 0.0;
         let mut elsewhere = Vec::new();
         for (out, own) in self.folds.groups.iter().enumerate() {
