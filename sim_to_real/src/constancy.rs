@@ -1,12 +1,12 @@
-//! Whether what was found is the same throughout: early and late in the drives, to the left and to the right.
+//! Whether what separates the drives is the same throughout: early and late in them, to the left and to the right.
 
 use crate::baseline::Baseline;
 use crate::cross_validation::CrossValidation;
 use crate::drive::Drive;
 use bicycle::Effect;
 
-/// Causes that foretell other drives better by this in the logarithm of the loss, once their parameters may differ from
-/// one half to the other, are not the same throughout.
+/// Causes that foretell other drives better by this in the logarithm of the loss than anything constant does, once their
+/// parameters may differ from one half to the other, are not the same throughout.
 const NOT_THE_SAME: f64 = 0.055;
 /// Rollouts that each drive must have in each half.
 const FEWEST: usize = 15;
@@ -24,14 +24,6 @@ pub(crate) enum Halves {
 
 impl Halves {
     const ALL: [Self; 2] = [Self::EarlyAndLate, Self::LeftAndRight];
-
-    /// What an announced effect that differs between the halves is told to be.
-    pub(crate) fn told(self) -> &'static str {
-        match self {
-            Self::EarlyAndLate => "what was found changes during the drives",
-            Self::LeftAndRight => "what was found is not the same to the left and to the right",
-        }
-    }
 
     fn is_in_first(self, drive: &Drive, place: usize) -> bool {
         match self {
@@ -56,18 +48,50 @@ impl Halves {
     }
 }
 
-/// The halves between which the causes differ most, if they do.
-pub(crate) fn differing_halves(baseline: &Baseline, drives: &[Drive], causes: &[Effect]) -> Option<Halves> {
-    if causes.is_empty() {
-        return None;
+/// Causes that are not the same throughout.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Changing {
+    pub(crate) causes: Vec<Effect>,
+    /// Between which they differ.
+    pub(crate) halves: Halves,
+}
+
+impl Changing {
+    /// In words.
+    pub(crate) fn told(&self) -> String {
+        let names: Vec<&str> = self.causes.iter().map(|cause| cause.description().cause).collect();
+        let how = match self.halves {
+            Halves::EarlyAndLate => "not the same early and late in the drives",
+            Halves::LeftAndRight => "not the same to the left and to the right",
+        };
+        format!(
+            "{} foretells the drives better than anything constant once it is {how}",
+            names.join(" with ")
+        )
     }
-    let whole = foretold_loss(baseline, &[drives.to_vec()], causes);
-    let gain = |halves: Halves| {
-        let parts = halves.of(drives)?;
-        Some((halves, (whole / foretold_loss(baseline, &parts, causes)).ln()))
-    };
-    let most = Halves::ALL.into_iter().filter_map(gain).max_by(|a, b| a.1.total_cmp(&b.1))?;
-    (most.1 > NOT_THE_SAME).then_some(most.0)
+}
+
+/// Of explanations that come into question, the one that foretells the drives best once its parameters may differ from one
+/// half to the other, if it does better so than all of them do as they are.
+pub(crate) fn changing(
+    baseline: &Baseline,
+    drives: &[Drive],
+    explanations: &[Vec<Effect>],
+) -> Option<Changing> {
+    let whole = [drives.to_vec()];
+    let constant = |causes: &[Effect]| foretold_loss(baseline, &whole, causes);
+    let least = explanations.iter().map(|causes| constant(causes)).fold(constant(&[]), f64::min);
+    let mut best: Option<(f64, Changing)> = None;
+    for halves in Halves::ALL {
+        let Some(parts) = halves.of(drives) else { continue };
+        for causes in explanations {
+            let loss = foretold_loss(baseline, &parts, causes);
+            if best.as_ref().is_none_or(|(least, _)| loss < *least) {
+                best = Some((loss, Changing { causes: causes.clone(), halves }));
+            }
+        }
+    }
+    best.filter(|(loss, _)| (least / loss).ln() > NOT_THE_SAME).map(|(_, changing)| changing)
 }
 
 /// Mean loss of the drives, each foretold by the others, where the causes are fitted to every part of them apart. The

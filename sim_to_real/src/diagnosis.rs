@@ -5,13 +5,13 @@ use crate::baseline::{Baseline, GapError, drives_of};
 use crate::causes::{Explanation, Trial};
 use crate::comparison::root_mean_square;
 use crate::conditions::{StartRecord, condition_tables, ground_residuals, places};
-use crate::constancy::differing_halves;
+use crate::constancy::changing;
 use crate::cross_validation::{CrossValidation, Split, foretold};
 use crate::drive::Drive;
 use crate::explanation::{pairs, single_explanations};
 use crate::findings::Findings;
 use crate::intervals::named_effects;
-use crate::judgement::{Judgement, Weighed};
+use crate::judgement::Weighed;
 use crate::machine::Machine;
 use crate::residual_table::residual_cells;
 use crate::steering::Steering;
@@ -39,6 +39,8 @@ pub struct Diagnosis {
 
 /// Metric of [`Shrink`].
 pub(crate) const METRIC: &str = "normalised held-out rollout error";
+/// So many of the best single effects may turn out not to be constant.
+const N_IN_QUESTION: usize = 5;
 /// Below this many floors there is no gap to close.
 pub(crate) const GAP_IN_FLOORS: f64 = 1.2;
 
@@ -56,14 +58,15 @@ pub fn diagnose(baseline: &Baseline, machine: &Machine, real: &[DriveLog]) -> Re
     let before = trial.residuals(&[]);
     let cross_validation = CrossValidation::of(&drives);
     let splits = cross_validation.splits(|drives| baseline.trial(drives));
-    let mut judgement = judged(baseline, &trial, &splits);
+    let weighed = weighed(baseline, &trial, &splits);
+    let mut judgement = weighed.judge(&baseline.null);
     let causes = judgement.announced.clone();
     let mut notes = of_evidence(&all);
     if drives.len() > 1
-        && let Some(halves) = differing_halves(baseline, &drives, &causes)
+        && let Some(changing) = changing(baseline, &drives, &in_question(&weighed, &causes))
     {
-        judgement.verdict = Verdict::EffectsAndUnknown;
-        notes.push(halves.told().to_owned());
+        judgement.verdict = if causes.is_empty() { Verdict::Unknown } else { Verdict::EffectsAndUnknown };
+        notes.push(changing.told());
     }
     let after = trial.residuals(&causes);
     let (own, repaired) = (StartRecord::of(&all, &before), StartRecord::of(&all, &after));
@@ -100,14 +103,24 @@ pub(crate) fn closed(floor: f64, before: f64, after: f64) -> Option<f64> {
     (before >= GAP_IN_FLOORS * floor).then(|| (before - after) / (before - floor))
 }
 
-fn judged(baseline: &Baseline, trial: &Trial<'_>, splits: &[Split<'_>]) -> Judgement {
+fn weighed(baseline: &Baseline, trial: &Trial<'_>, splits: &[Split<'_>]) -> Weighed {
     let none = Explanation::new(Vec::new(), trial.loss(&[]));
     let singles = foretold(splits, single_explanations(trial));
     let mut weighed = Weighed { none, pairs: Vec::new(), singles };
     if weighed.may_hold_pairs(&baseline.null) {
         weighed.pairs = foretold(splits, pairs(trial, &weighed.singles));
     }
-    weighed.judge(&baseline.null)
+    weighed
+}
+
+/// Explanations that may turn out not to be constant: the best single effects, and what is announced.
+fn in_question(weighed: &Weighed, announced: &[Effect]) -> Vec<Vec<Effect>> {
+    let singles = weighed.singles.iter().take(N_IN_QUESTION);
+    let mut explanations: Vec<Vec<Effect>> = singles.map(|single| single.causes.clone()).collect();
+    if announced.len() > 1 {
+        explanations.push(announced.to_vec());
+    }
+    explanations
 }
 
 /// What is closed on each real drive by the parameters that the others give.

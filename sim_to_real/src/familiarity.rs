@@ -120,7 +120,7 @@ mod tests {
     use super::*;
     use crate::comparison::{Comparison, Yardstick};
     use crate::engine_tests::{Made, arcs};
-    use crate::least_squares::mean_loss;
+    use crate::rollout::PER_START;
     use crate::whitening::Whitening;
 
     fn driven(seed: u64) -> Drive {
@@ -159,18 +159,27 @@ mod tests {
         assert!(weights.iter().all(|weight| *weight == 1.0), "{weights:?}");
     }
 
-    /// A drive whose rollouts are all as unfamiliar as one another is judged like any: weights have a mean square of 1.
+    /// Whatever is unfamiliar, weights have a mean square of 1: they tell which rollouts count for more, and never that all
+    /// count for less.
     #[test]
-    fn weights_do_not_make_a_drive_better() {
+    fn weights_have_a_mean_square_of_one() {
         let (nominal, other) = ([3, 4].map(driven), driven(6));
         let familiarity = Familiarity::with(&nominal.each_ref());
-        let far = faster(&other, 3.0);
-        let whitening = Whitening::none();
-        let comparison = Comparison::new(1.0, vec![&far], &Yardstick::rough());
-        let plain = comparison.residuals(&[]);
-        let judged = comparison.judged_by(&whitening, &familiarity).judged_residuals(&[]);
-        let squares = |residuals: &[f32]| residuals.iter().map(|r| r * r).sum::<f32>();
-        assert!(squares(&judged) > 0.2 * squares(&plain) && squares(&judged) < 5.0 * squares(&plain));
-        assert!(mean_loss(&judged).is_finite());
+        for drive in [faster(&other, 3.0), faster(&other, 1.3)] {
+            let whitening = Whitening::none();
+            let comparison = Comparison::new(1.0, vec![&drive], &Yardstick::rough());
+            let plain = comparison.residuals(&[]);
+            let judged = comparison.judged_by(&whitening, &familiarity).judged_residuals(&[]);
+            let square = |(judged, plain): (&[f32], &[f32])| {
+                let measured = plain.iter().position(|residual| residual.abs() > 0.0).unwrap();
+                f64::from(judged[measured] / plain[measured]).powi(2)
+            };
+            let starts = judged.chunks(PER_START).zip(plain.chunks(PER_START));
+            let squares: Vec<f64> = starts.map(square).collect();
+            let [least, most] = [f64::min, f64::max].map(|of| squares.iter().copied().reduce(of).unwrap());
+            assert!(most > 2.0 * least, "rollouts of one weight tell nothing: {least} to {most}");
+            let mean = squares.iter().sum::<f64>() / squares.len() as f64;
+            assert!((mean - 1.0).abs() < 1e-4, "{mean}");
+        }
     }
 }

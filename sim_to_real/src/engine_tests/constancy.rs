@@ -1,12 +1,13 @@
 //! Whether what was found is the same throughout.
 
-use super::{Made, arcs};
+use super::{Made, arcs, effect};
 use crate::baseline::{Baseline, Experience, Null};
 use crate::comparison::{Comparison, Yardstick};
-use crate::constancy::{Halves, differing_halves};
+use crate::constancy::{Changing, Halves, changing};
 use crate::explanation::single_explanations;
 use crate::limits_shown::LimitsShown;
 use crate::whitening::Whitening;
+use bicycle::Effect;
 use std::collections::BTreeMap;
 
 /// The bicycle with the noise of a drive of its own.
@@ -34,20 +35,43 @@ fn bicycle() -> Baseline {
     }
 }
 
-/// The best single effect of a machine, and between which halves of its drives it differs.
-fn found(left_ratio: f64) -> (&'static str, Option<Halves>) {
+/// The best single effects of a machine, and which of them is not the same throughout.
+fn found(left_ratio: f64) -> (Vec<Vec<Effect>>, Option<Changing>) {
     let baseline = bicycle();
     let drives = [1, 2].map(|seed| arcs(Made { curvature_ratio: 0.85, left_ratio, speed_ratio: 1.0 }, seed));
-    let best = single_explanations(&baseline.trial(&drives.each_ref())).swap_remove(0);
-    (best.ids()[0], differing_halves(&baseline, &drives, &best.causes))
+    let singles = single_explanations(&baseline.trial(&drives.each_ref()));
+    let best: Vec<Vec<Effect>> = singles.into_iter().take(3).map(|single| single.causes).collect();
+    let changing = changing(&baseline, &drives, &best);
+    (best, changing)
 }
 
 #[test]
 fn a_gain_that_is_the_same_on_both_sides_is_constant() {
-    assert_eq!(found(1.0), ("steer_gain", None));
+    let (best, changing) = found(1.0);
+    assert_eq!((best[0][0].description().cause, changing), ("steer_gain", None));
 }
 
+/// 0.85 to the right and 0.85 * 0.9 to the left.
 #[test]
 fn a_gain_of_one_side_is_told_to_differ() {
-    assert_eq!(found(0.9).1, Some(Halves::LeftAndRight));
+    let changing = found(0.9).1.unwrap();
+    assert_eq!(changing.halves, Halves::LeftAndRight);
+    let told = changing.told();
+    assert!(
+        told.starts_with("steer_gain foretells") && told.ends_with("to the left and to the right"),
+        "{told}"
+    );
+}
+
+/// A gain of 0.85 is a bias to one side where one steers left and to the other where one steers right; beside the gain
+/// itself, which is the same on both, that tells nothing.
+#[test]
+fn what_something_constant_foretells_as_well_is_constant() {
+    let baseline = bicycle();
+    let drives =
+        [1, 2].map(|seed| arcs(Made { curvature_ratio: 0.85, left_ratio: 1.0, speed_ratio: 1.0 }, seed));
+    let wrong = vec![vec![effect("steer_bias", 0.01)], vec![effect("gyro_bias", 0.01)]];
+    let right = [wrong.clone(), vec![vec![effect("steer_gain", 0.85)]]].concat();
+    assert_eq!(changing(&baseline, &drives, &wrong).map(|found| found.halves), Some(Halves::LeftAndRight));
+    assert_eq!(changing(&baseline, &drives, &right), None);
 }
