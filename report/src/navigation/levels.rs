@@ -14,8 +14,12 @@ const LEFT: f64 = 90.0;
 const GAP: f64 = 90.0;
 const HEIGHT: f64 = 460.0;
 const BELOW: f64 = 90.0;
-/// Marks of the same tolerance stand so far apart, method by method.
-const ASIDE: f64 = 0.012;
+/// Marks of the same tolerance stand so far apart, method by method, in widths of a panel.
+const ASIDE: f64 = 0.016;
+/// What is left free beside the outermost marks, in widths and heights of what they span,
+const BESIDE: f64 = 0.1;
+/// and of tolerances, where there is one alone, this much.
+const LEAST_SPAN: f64 = 0.1;
 const TEXT: TextStyle = TextStyle::new(18, Anchor::Start);
 
 /// Of planners of other people's, in the order of their rows and then anew.
@@ -31,8 +35,8 @@ type Mark = (f64, Option<[f64; 2]>);
 struct Quantity {
     heading: &'static str,
     of: fn(&Row) -> Option<Mark>,
-    low: f64,
-    high: f64,
+    /// Of what is no share of drives.
+    most: f64,
 }
 
 /// Draws success, time and tilt over the risk tolerance, as a PNG 1600 px wide; `None` if no method was driven with two.
@@ -81,48 +85,73 @@ fn colour(method: Method) -> Rgb {
     }
 }
 
-fn quantities(report: &Report) -> [Quantity; 3] {
-    let most = |of: fn(&Row) -> Option<f64>| report.rows.iter().filter_map(of).fold(1.0, f64::max);
-    [
-        Quantity {
-            heading: "goal reached [%]",
-            of: |row| {
-                Some((100.0 * row.success, Some([row.wilson_low, row.wilson_high].map(|end| 100.0 * end))))
-            },
-            low: 0.0,
-            high: 103.0,
+const QUANTITIES: [Quantity; 3] = [
+    Quantity {
+        heading: "goal reached [%]",
+        of: |row| Some((100.0 * row.success, Some([100.0 * row.wilson_low, 100.0 * row.wilson_high]))),
+        most: 102.0,
+    },
+    Quantity {
+        heading: "median time to the goal [s]",
+        of: |row| row.median_time_to_goal_s.map(|time_s| (time_s, None)),
+        most: f64::INFINITY,
+    },
+    Quantity {
+        heading: "largest tilt, mean over drives [deg]",
+        of: |row| {
+            let Mean { value, low, high } = row.largest_tilt_deg;
+            Some((value, Some([low, high])))
         },
-        Quantity {
-            heading: "median time to the goal [s]",
-            of: |row| row.median_time_to_goal_s.map(|time_s| (time_s, None)),
-            low: 0.0,
-            high: 1.1 * most(|row| row.median_time_to_goal_s),
-        },
-        Quantity {
-            heading: "largest roll or pitch, mean over drives [deg]",
-            of: |row| {
-                let Mean { value, low, high } = row.largest_tilt_deg;
-                Some((value, Some([low, high])))
-            },
-            low: 0.0,
-            high: 1.1 * most(|row| Some(row.largest_tilt_deg.high)),
-        },
-    ]
+        most: f64::INFINITY,
+    },
+];
+
+/// From the least to the most of some values, and a little more; of none, from 0 to 1.
+fn around(values: impl Iterator<Item = f64>) -> Range {
+    let (low, high) = values
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)));
+    if low > high {
+        return Range { low: 0.0, high: 1.0 };
+    }
+    let beside = BESIDE * (high - low).max(LEAST_SPAN);
+    Range { low: low - beside, high: high + beside }
+}
+
+impl Quantity {
+    /// Of all rows with their intervals, but for those that are drawn without one.
+    fn range(&self, report: &Report) -> Range {
+        let ends = |row: &Row| {
+            let (value, interval) = (self.of)(row)?;
+            Some(interval.filter(|_| row.alpha.is_some()).unwrap_or([value; 2]))
+        };
+        let range = around(report.rows.iter().filter_map(ends).flatten());
+        Range { high: range.high.min(self.most), ..range }
+    }
+}
+
+/// "30 starts and goals", or how many the rows have at least and at most.
+fn n_driven(report: &Report) -> String {
+    let counts = report.rows.iter().map(|row| row.n);
+    match (counts.clone().min(), counts.max()) {
+        (Some(fewest), Some(most)) if fewest < most => format!("{fewest} to {most} starts and goals"),
+        (_, most) => format!("{} starts and goals", most.unwrap_or(0)),
+    }
 }
 
 fn drawn(report: &Report, lines: &[Line<'_>]) -> Canvas {
-    let n = report.plan.n_maps * report.plan.n_pairs;
     let told = format!(
-        "{}, seed {}, {n} starts and goals a point; bars are 95 % intervals; who knows no tolerance is a dashed line",
-        report.plan.vehicle, report.plan.seed
+        "{}, seed {}, {} a point; bars are 95 % intervals; who knows no tolerance is a dashed line",
+        report.plan.vehicle,
+        report.plan.seed,
+        n_driven(report)
     );
     let mut canvas = Canvas::titled(TOP + HEIGHT + BELOW, "What the risk tolerance does", &[&told]);
     draw_legend(lines, &mut canvas);
     let width = (PAGE_WIDTH - LEFT - MARGIN - 2.0 * GAP) / 3.0;
-    for (place, quantity) in quantities(report).into_iter().enumerate() {
+    let x = around(report.rows.iter().filter_map(|row| row.alpha));
+    for (place, quantity) in QUANTITIES.iter().enumerate() {
         let frame = Rect { x: LEFT + (width + GAP) * place as f64, y: TOP, width, height: HEIGHT };
-        let (x, y) = (Range { low: 0.0, high: 1.05 }, Range { low: quantity.low, high: quantity.high });
-        draw_panel(report, lines, &quantity, &Axes { frame, x, y }, &mut canvas);
+        draw_panel(report, lines, quantity, &Axes { frame, x, y: quantity.range(report) }, &mut canvas);
     }
     canvas
 }
@@ -144,7 +173,7 @@ fn draw_panel(report: &Report, lines: &[Line<'_>], quantity: &Quantity, axes: &A
     axes.draw_x_label(canvas, "risk tolerance alpha [-]");
     canvas.text((axes.frame.x, axes.frame.y - 14.0), quantity.heading, TEXT.bold());
     for (place, &(who, colour)) in lines.iter().enumerate() {
-        let aside = ASIDE * (place as f64 - 0.5 * (lines.len() - 1) as f64);
+        let aside = ASIDE * axes.x.span() * (place as f64 - 0.5 * (lines.len() - 1) as f64);
         let levels = levels_of(report, who);
         if levels.is_empty() {
             draw_level_line(report, (who, colour), quantity, axes, canvas);
