@@ -16,9 +16,9 @@ const HEIGHT: f64 = 460.0;
 const BELOW: f64 = 90.0;
 /// Marks of the same tolerance stand so far apart, method by method, in widths of a panel.
 const ASIDE: f64 = 0.016;
-/// What is left free beside the outermost marks, in widths and heights of what they span,
+/// What is left free beside the outermost marks, as a share of what they span.
 const BESIDE: f64 = 0.1;
-/// and of tolerances, where there is one alone, this much.
+/// Marks that are nearer to each other count as spanning so much, in the axis's unit.
 const LEAST_SPAN: f64 = 0.1;
 const TEXT: TextStyle = TextStyle::new(18, Anchor::Start);
 
@@ -35,7 +35,7 @@ type Mark = (f64, Option<[f64; 2]>);
 struct Quantity {
     heading: &'static str,
     of: fn(&Row) -> Option<Mark>,
-    /// Of what is no share of drives.
+    /// The axis ends here at the latest.
     most: f64,
 }
 
