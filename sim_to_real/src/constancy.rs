@@ -78,14 +78,13 @@ pub(crate) fn changing(
     drives: &[Drive],
     explanations: &[Vec<Effect>],
 ) -> Option<Changing> {
-    let whole = [drives.to_vec()];
-    let constant = |causes: &[Effect]| foretold_loss(baseline, &whole, causes);
-    let least = explanations.iter().map(|causes| constant(causes)).fold(constant(&[]), f64::min);
+    let with_none: Vec<Vec<Effect>> = explanations.iter().cloned().chain([Vec::new()]).collect();
+    let constant = foretold_losses(baseline, &[drives.to_vec()], &with_none);
+    let least = constant.into_iter().fold(f64::INFINITY, f64::min);
     let mut best: Option<(f64, Changing)> = None;
     for halves in Halves::ALL {
         let Some(parts) = halves.of(drives) else { continue };
-        for causes in explanations {
-            let loss = foretold_loss(baseline, &parts, causes);
+        for (loss, causes) in foretold_losses(baseline, &parts, explanations).into_iter().zip(explanations) {
             if best.as_ref().is_none_or(|(least, _)| loss < *least) {
                 best = Some((loss, Changing { causes: causes.clone(), halves }));
             }
@@ -94,17 +93,20 @@ pub(crate) fn changing(
     best.filter(|(loss, _)| (least / loss).ln() > NOT_THE_SAME).map(|(_, changing)| changing)
 }
 
-/// Mean loss of the drives, each foretold by the others, where the causes are fitted to every part of them apart. The
-/// calibration is held: what it could be to blame for would differ from part to part as well.
-fn foretold_loss(baseline: &Baseline, parts: &[Vec<Drive>], causes: &[Effect]) -> f64 {
-    let (mut sum, mut n) = (0.0, 0.0);
+/// Of every explanation the mean loss of the drives, each foretold by the others, where its parameters are fitted to every
+/// part of them apart. The calibration is held: what it could be to blame for would differ from part to part as well.
+fn foretold_losses(baseline: &Baseline, parts: &[Vec<Drive>], explanations: &[Vec<Effect>]) -> Vec<f64> {
+    let mut sums = vec![0.0; explanations.len()];
+    let mut n = 0.0;
     for part in parts {
         let validation = CrossValidation::of(part);
         for split in validation.splits(|drives| baseline.held_trial(drives)) {
             let n_starts = split.own.comparison.n_starts() as f64;
-            sum += split.own.loss(&split.refitted(causes)) * n_starts;
+            for (sum, causes) in sums.iter_mut().zip(explanations) {
+                *sum += split.own.loss(&split.refitted(causes)) * n_starts;
+            }
             n += n_starts;
         }
     }
-    sum / n
+    sums.into_iter().map(|sum| sum / n).collect()
 }
