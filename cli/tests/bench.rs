@@ -227,30 +227,33 @@ fn navigation_goes_on_where_it_was_broken_off_and_parts_make_the_same_table() {
     assert!(told.contains("one/navigation.jsonl: another folder has another end of physics"), "{told}");
 }
 
-/// The drives that a page's table is made of lie beside the page: a row that they do not say is not published.
+/// The drives that a page's tables are made of lie beside the page: a row that they do not say is not published.
 #[test]
-fn the_published_table_is_that_of_the_drives_beside_it() {
-    let folder = tempfile::tempdir().expect("a temporary folder");
+fn published_tables_are_those_of_the_drives_beside_the_page() {
     let docs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs");
-    let output = merged(&[&docs.join("navigation")], folder.path());
-    assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
-    let table: Value = serde_json::from_slice(&read(folder.path(), "navigation.json")).expect("JSON");
     let page = std::fs::read_to_string(docs.join("navigation.md")).expect("the page");
-    let rows = table["rows"].as_array().expect("rows");
-    assert_eq!(rows.len(), 20, "six methods at three alphas, and two that know none");
-    for row in rows {
-        let number = |key: &str| row[key].as_f64().expect("a number");
-        let method = row["method"].as_str().expect("a name");
-        let alpha = row["alpha"].as_f64().map_or("any".to_owned(), |alpha| alpha.to_string());
-        let [low, high] = ["wilson_low", "wilson_high"].map(|end| 100.0 * number(end));
-        let line = format!(
-            "| `{method}` | {alpha} | {} of {} [{low:.0}, {high:.0} %] | {:.1} |",
-            row["n_goal"],
-            row["n"],
-            number("median_time_to_goal_s")
-        );
-        assert!(page.contains(&line), "expected in docs/navigation.md: {line}");
+    // Six methods at three alphas and two that know none; in MuJoCo, at one alpha.
+    for (drives, n_rows) in [("navigation", 20), ("navigation/mujoco", 8)] {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let output = merged(&[&docs.join(drives)], folder.path());
+        assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+        let table: Value = serde_json::from_slice(&read(folder.path(), "navigation.json")).expect("JSON");
+        let rows = table["rows"].as_array().expect("rows");
+        assert_eq!(rows.len(), n_rows, "{drives}");
+        for line in rows.iter().map(row_of_page) {
+            assert!(page.contains(&line), "expected in docs/navigation.md, as {drives} says: {line}");
+        }
     }
+}
+
+fn row_of_page(row: &Value) -> String {
+    let number = |key: &str| row[key].as_f64().expect("a number");
+    let method = row["method"].as_str().expect("a name");
+    let alpha = row["alpha"].as_f64().map_or("any".to_owned(), |alpha| alpha.to_string());
+    let [low, high] = ["wilson_low", "wilson_high"].map(|end| 100.0 * number(end));
+    let [n_goal, n] = ["n_goal", "n"].map(|key| &row[key]);
+    let time_s = number("median_time_to_goal_s");
+    format!("| `{method}` | {alpha} | {n_goal} of {n} [{low:.0}, {high:.0} %] | {time_s:.1} |")
 }
 
 #[test]
