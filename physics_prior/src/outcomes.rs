@@ -9,13 +9,18 @@
 //! Slopes across the heading, which these equations leave out, are judged by the circle of friction. Of the friction
 //! mu, the slope t across takes t; the rest, `sqrt(1 - (t / mu)^2)` of it, drives and steers: s_max of the linear
 //! traction shrinks to that share, and so does the angular traction. Friction is equally likely anywhere in a range.
-//! What of it lies below t does not hold the vehicle, which slides; what lies above stands for its mean.
+//!
+//! Equation 15 makes an outcome of each wheel, so that of a vehicle with one wheel before a face it says three times in
+//! four that nothing is there. But a body goes where all its wheels go, and friction is one unknown for all of them: a
+//! wheel's slope s and t ask for `d = sqrt(s^2 + t^2)`, and friction below the largest d of the four moves nothing, up
+//! or down. Friction above it stands for its mean. Slopes are those of a ball in the wheel's place over about its
+//! diameter: one beyond friction is a step of about a radius, which is as much as driven wheels climb.
 //!
 //! That is the law of [`SlopeLaw::Linear`]. By [`SlopeLaw::Friction`] a slope s along the heading asks for the friction a(s)
-//! of the axle that slides first ([`bicycle::AxleDemand`]), together with t for `d = sqrt(a^2 + t^2)`, and that is what
-//! holds or slides. A wheel that holds slips by `3 mu / C (1 - cbrt(1 - d / mu))`, of which a / d lies along the heading,
-//! and the way up counts by its level part: `linear = (1 - slip) / sqrt(1 + s^2)`. A plane under all wheels turns nobody:
-//! what equation 15 takes of a turn, or gives to it, is the slope under a wheel less the mean of all.
+//! of the axle that slides first ([`bicycle::AxleDemand`]), in the place of s in d. A wheel slips by
+//! `3 mu / C (1 - cbrt(1 - d / mu))`, of which a / d lies along the heading, and the way up counts by its level part:
+//! `linear = (1 - slip) / sqrt(1 + s^2)`. A plane under all wheels turns nobody: what equation 15 takes of a turn, or
+//! gives to it, is the slope under a wheel less the mean of all.
 
 use bicycle::lanes::{Lanes, Real};
 use traversability::{Bins, N_BINS};
@@ -37,7 +42,7 @@ pub(crate) struct Outcomes<L: Lanes> {
     /// Traction, linear and angular, of each wheel on vegetation.
     pub vegetation: [Real<L>; 4],
     pub vegetation_probability: [Real<L>; 4],
-    /// Of known ground that does not hold the vehicle: it slides down the slope, without any traction.
+    /// Of known ground that a wheel finds no hold on: the vehicle stays or slides down, without any traction.
     pub sliding_probability: Real<L>,
     /// Traction, linear and angular, on unknown ground.
     pub unknown: Real<L>,
@@ -77,10 +82,10 @@ enum Law {
     Friction { per_stiffness: f32, share: f32, unloading: f32 },
 }
 
-/// How a vehicle holds on a slope.
+/// How a vehicle holds on the ground under its wheels.
 #[derive(Clone, Copy)]
 struct Hold<L: Lanes> {
-    /// Of friction that is less than the slope asks for.
+    /// Of friction that is less than some wheel asks for.
     sliding_probability: Real<L>,
     /// Mean of the other friction.
     friction: Real<L>,
@@ -90,7 +95,6 @@ struct Hold<L: Lanes> {
 
 /// What a wheel on dirt makes of its turning.
 struct Rolling<L: Lanes> {
-    hold: Hold<L>,
     /// Linear traction.
     speed: Real<L>,
     /// Slope that works for or against a turn [-].
@@ -139,17 +143,19 @@ impl Equations {
         let per_belly_depth_m = lanes.real_single(self.per_belly_depth_m);
         let freedom = (one - pose.belly_depth_m * per_belly_depth_m).max(zero);
         let per_wheel = lanes.real_single(0.25 * (1.0 - self.uniform_weight));
-        let across = self.hold(lanes, pose.across, pose.across);
         let per_turn_slope = lanes.real_single(self.per_turn_slope);
         let per_vegetation_m = lanes.real_single(self.per_vegetation_m);
         let mut known = [zero; 4];
+        for (known, ground) in known.iter_mut().zip(&pose.wheels) {
+            *known = zero.or_else(all_unknown, one - ground.unknown);
+        }
+        let hold = self.hold(lanes, pose, &known);
         let (mut linear_dirt, mut angular_dirt) = ([[zero; 4]; 1], [[zero; 4]; 2]);
         let (mut dirt_probability, mut vegetation_probability) = ([zero; 4], [zero; 4]);
         let mut vegetation = [zero; 4];
         let (mut sliding_probability, mut unknown_probability) = (zero, zero);
         for (wheel, ground) in pose.wheels.iter().enumerate() {
-            known[wheel] = zero.or_else(all_unknown, one - ground.unknown);
-            let Rolling { hold, speed, bump } = self.rolling(lanes, pose, ground, across);
+            let Rolling { speed, bump } = self.rolling(lanes, pose, ground, hold);
             let (speed, angular) = (speed * freedom, bump * per_turn_slope);
             linear_dirt[0][wheel] = speed;
             let turn = speed * hold.share;
@@ -179,48 +185,63 @@ impl Equations {
         }
     }
 
-    /// What a wheel on dirt makes of its turning, by the law; `across` is how the vehicle holds across the heading alone.
+    /// What a wheel on dirt makes of its turning, by the law.
     #[inline(always)]
     fn rolling<L: Lanes>(
         &self,
         lanes: L,
         pose: &PoseGround<L>,
         ground: &WheelGround<L>,
-        across: Hold<L>,
+        hold: Hold<L>,
     ) -> Rolling<L> {
         let (zero, one) = (lanes.real(0.0), lanes.real(1.0));
-        let slope = ground.forward_slope.abs();
+        let (least, slope) = (lanes.real_single(SHARE_LEAST), ground.forward_slope.abs());
         match self.law {
             Law::Linear { per_slope } => {
-                let per_share = one / across.share.max(lanes.real_single(SHARE_LEAST));
-                let lost = slope * (lanes.real_single(per_slope) * per_share);
-                Rolling { hold: across, speed: (one - lost).max(zero), bump: slope }
+                let lost = slope * (lanes.real_single(per_slope) / hold.share.max(least));
+                Rolling { speed: (one - lost).max(zero), bump: slope }
             }
-            Law::Friction { per_stiffness, share, unloading } => {
-                let left = (one - lanes.real_single(unloading) * slope).max(lanes.real_single(SHARE_LEAST));
-                let along = lanes.real_single(share) * slope / left;
+            Law::Friction { per_stiffness, .. } => {
+                let along = self.asked_along(lanes, slope);
                 let asked = (along * along + pose.across * pose.across).sqrt();
-                let hold = self.hold(lanes, asked, pose.across);
                 let kept = cube_root(lanes, (one - asked / hold.friction).max(zero));
                 let slip = lanes.real_single(3.0 * per_stiffness) * hold.friction * (one - kept);
-                let slip_along = slip * along / asked.max(lanes.real_single(SHARE_LEAST));
+                let slip_along = slip * along / asked.max(least);
                 let speed = (one - slip_along).max(zero) / (one + slope * slope).sqrt();
-                Rolling { hold, speed, bump: (ground.forward_slope - pose.along).abs() }
+                Rolling { speed, bump: (ground.forward_slope - pose.along).abs() }
             }
         }
     }
 
-    /// Whether the friction holds that is asked for, and what a slope across the heading leaves of its circle.
+    /// Friction that a slope along the heading asks for, by the law.
     #[inline(always)]
-    fn hold<L: Lanes>(&self, lanes: L, asked: Real<L>, across: Real<L>) -> Hold<L> {
+    fn asked_along<L: Lanes>(&self, lanes: L, slope: Real<L>) -> Real<L> {
+        match self.law {
+            Law::Linear { .. } => slope,
+            Law::Friction { share, unloading, .. } => {
+                let left = lanes.real(1.0) - lanes.real_single(unloading) * slope;
+                lanes.real_single(share) * slope / left.max(lanes.real_single(SHARE_LEAST))
+            }
+        }
+    }
+
+    /// Whether the friction holds that the wheels ask for, each as far as its ground is known, and what a slope across
+    /// the heading leaves of its circle.
+    #[inline(always)]
+    fn hold<L: Lanes>(&self, lanes: L, pose: &PoseGround<L>, known: &[Real<L>; 4]) -> Hold<L> {
         let (zero, one) = (lanes.real(0.0), lanes.real(1.0));
         let [least, most] = self.friction;
         let (least, most) = (lanes.real_single(least), lanes.real_single(most));
-        let beyond = (asked - least).max(zero);
+        let mut along = zero;
+        for (ground, known) in pose.wheels.iter().zip(known) {
+            along = along.max(*known * self.asked_along(lanes, ground.forward_slope.abs()));
+        }
+        let asked = (along * along + pose.across * pose.across).sqrt();
         let mean = lanes.real(0.5) * (asked.max(least) + most);
-        let taken = across / mean;
+        let taken = pose.across / mean;
         Hold {
-            sliding_probability: (beyond * lanes.real_single(self.per_friction_range)).min(one),
+            sliding_probability: ((asked - least).max(zero) * lanes.real_single(self.per_friction_range))
+                .min(one),
             friction: mean,
             share: (one - taken * taken).max(zero).sqrt(),
         }

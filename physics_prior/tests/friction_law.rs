@@ -176,3 +176,35 @@ fn the_plant_climbs_as_the_law_says() {
     }
     assert!(n_compared > 70, "{n_compared}");
 }
+
+/// The wheels have a radius of 0.45 m and are 0.775 m to the left and right of the middle.
+#[test]
+fn the_plant_stops_at_the_faces_before_one_wheel_that_the_prior_says() {
+    let law = SlopeLaw::of(&full_size());
+    let geometry = full_size().geometry;
+    for slope in [1.5, 3.0] {
+        for (face_m, stops) in [(0.15, false), (0.8, true)] {
+            // A bank on the right from 4 m ahead on.
+            let height_m = move |x: f64, y: f64| {
+                if y < -0.3 { (slope * (x - 4.0)).clamp(0.0, face_m) } else { 0.0 }
+            };
+            let world_cells =
+                GridGeometry { resolution_m: 0.1, origin: [-100, -100], n_rows: 200, n_cols: 250 };
+            let rock = |_, _| Patch::open(Stribeck::ROCK);
+            let world = World::from_fn("bank", world_cells, height_m, rock).unwrap();
+            let mut plant = Plant::new(&full_size(), Arc::new(world), [0.0; 3]).unwrap();
+            plant.set_command(Command { speed_mps: 1.0, steering_rad: 0.0 }).unwrap();
+            plant.advance(5.0);
+            let plant_m = plant.pose().x_m;
+            // The same ground around the front axle, place by place.
+            let at_zero = |x_m: f64| {
+                let ahead = |x: f64, y: f64| height_m(x + x_m - 12.0, y - 12.0);
+                f64::from(belief_on(ahead, &geometry, law, [0.5, 0.8]).linear.probabilities()[0])
+            };
+            let most = (10..25).map(|k| at_zero(0.1 * f64::from(k))).fold(0.0, f64::max);
+            let face = format!("{face_m} m, {slope}");
+            assert_eq!(plant_m < 2.5, stops, "{face}: the plant ends at {plant_m}");
+            assert_eq!(most > 0.5, stops, "{face}: without traction {most}");
+        }
+    }
+}

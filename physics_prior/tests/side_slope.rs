@@ -26,13 +26,35 @@ fn on_plane([east, north]: [f64; 2], yaw_rad: f64, friction: [f64; 2]) -> PriorB
 }
 
 #[test]
-fn ground_that_is_level_across_the_heading_asks_nothing_of_the_friction() {
-    let slippery = [0.01, 0.02];
+fn ground_that_is_level_across_the_heading_takes_nothing_of_the_friction_that_holds() {
+    let slippery = [0.31, 0.32];
     for (gradient, yaw_rad) in [([0.0, 0.0], 0.7), ([0.3, 0.0], 0.0), ([0.0, -0.2], 0.25 * TAU)] {
         let [usual, slippery] = [[0.5, 0.8], slippery].map(|friction| on_plane(gradient, yaw_rad, friction));
         assert_eq!(usual, slippery, "{gradient:?}");
     }
     assert_ne!(on_plane([0.0, 0.3], 0.0, slippery), on_plane([0.0, 0.3], 0.0, [0.5, 0.8]));
+}
+
+#[test]
+fn a_face_before_one_wheel_stops_all_four() {
+    // A face of 0.7 under the front right wheel alone: of frictions from 0.5 to 0.8 two thirds hold no wheel there. With
+    // the others its outcome, a quarter, is beyond tan 30 = 0.577 and nothing; the other wheels turn as on level ground.
+    let ground = surface(window(0.02, 100, 100), |x, y| {
+        let [ahead_m, left_m] = [x - 1.26, y - 0.9];
+        open(if ahead_m.abs().max(left_m.abs()) < 0.095 { 0.7 * ahead_m } else { 0.0 })
+    });
+    let prior = PriorConfig {
+        uniform_weight: 0.0,
+        wheel_envelope: 0.0,
+        high_centred_clearances: 1e6,
+        ..PriorConfig::default()
+    };
+    let assumption = Assumption::Physics { prior, level: level(1.0) };
+    let belief = prior_map(&CAR, &assumption, &ground, 4).belief(1.0, 1.0, 0.0).unwrap();
+    let linear = belief.linear.probabilities();
+    assert!((f64::from(linear[0]) - (2.0 / 3.0 + 1.0 / 12.0)).abs() < 1e-3, "{linear:?}");
+    assert!((f64::from(linear[11]) - 0.25).abs() < 1e-3, "{linear:?}");
+    assert!((f64::from(belief.angular.probabilities()[0]) - 0.75).abs() < 1e-3, "{:?}", belief.angular);
 }
 
 #[test]
@@ -77,7 +99,10 @@ fn the_vehicle_slides_with_the_probability_of_too_little_friction() {
 #[test]
 fn a_slope_across_leaves_the_rest_of_the_circle_of_friction_to_the_climb() {
     // Across 0.39 of 0.65: sqrt(1 - 0.6^2) = 0.8 of the circle is left, so that 0.8 tan 30 = 0.4619 takes everything.
-    for (along, linear) in [(0.0, 1.0), (0.1, 1.0 - 0.1 / 0.4619), (0.3, 1.0 - 0.3 / 0.4619), (0.47, 0.0)] {
+    // 0.47 ahead makes 0.6107 in all, which 0.631 of the friction holds, 0.7054 in the mean: 0.8333 of that circle is
+    // left, and 1 - 0.47 / (0.8333 tan 30) = 0.0231.
+    let steep = (0.47, 0.631 * 0.0231);
+    for (along, linear) in [(0.0, 1.0), (0.1, 1.0 - 0.1 / 0.4619), (0.3, 1.0 - 0.3 / 0.4619), steep] {
         let belief = on_plane([along, 0.39], 0.0, [0.5, 0.8]);
         assert!((belief.linear.mean(&Bins::TRACTION) - linear).abs() < 2e-4, "{along}: {linear}");
         for mirrored in [[along, -0.39], [-along, 0.39]] {
