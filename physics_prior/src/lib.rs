@@ -17,6 +17,8 @@
 //!   `sqrt(1 - (t / friction)^2)` is left of the circle of friction to drive and steer with: the slope at which
 //!   equation 15 ends shrinks to that share, and so does the angular traction. It is the slope of the contacts: whoever leans
 //!   on level ones does not slide.
+//! - Equation 15 makes an outcome of each wheel. But wheels go where the body goes, and the friction is one for all of
+//!   them: with the probability that it is less than the slopes under the worst wheel ask for, together, nothing moves.
 //! - By [`SlopeLaw::Friction`], which `navigator` takes for a vehicle, traction does not end in a straight line at 30 degrees:
 //!   what is lost is the slip of the tyres and the way up, until the axle that the slope unloads needs more friction than
 //!   there is. By [`SlopeLaw::Linear`], the default, it does: what was learned is fused with it.

@@ -14,13 +14,13 @@
 //! four that nothing is there. But a body goes where all its wheels go, and friction is one unknown for all of them: a
 //! wheel's slope s and t ask for `d = sqrt(s^2 + t^2)`, and friction below the largest d of the four moves nothing, up
 //! or down. Friction above it stands for its mean. Slopes are those of a ball in the wheel's place over about its
-//! diameter: one beyond friction is a step of about a radius, which is as much as driven wheels climb.
+//! diameter: one beyond friction is a step of about a radius.
 //!
-//! That is the law of [`SlopeLaw::Linear`]. By [`SlopeLaw::Friction`] a slope s along the heading asks for the friction a(s)
-//! of the axle that slides first ([`bicycle::AxleDemand`]), in the place of s in d. A wheel slips by
-//! `3 mu / C (1 - cbrt(1 - d / mu))`, of which a / d lies along the heading, and the way up counts by its level part:
-//! `linear = (1 - slip) / sqrt(1 + s^2)`. A plane under all wheels turns nobody: what equation 15 takes of a turn, or
-//! gives to it, is the slope under a wheel less the mean of all.
+//! That is the law of [`SlopeLaw::Linear`]. By [`SlopeLaw::Friction`] a slope s along the heading asks for the friction a of
+//! the axle that slides first ([`bicycle::AxleDemand`]), which the mean slope of the wheels unloads, in the place of s
+//! in d. A wheel slips by `3 mu / C (1 - cbrt(1 - d / mu))`, of which a / d lies along the heading, and the way up counts
+//! by its level part: `linear = (1 - slip) / sqrt(1 + s^2)`. A plane under all wheels turns nobody: what equation 15
+//! takes of a turn, or gives to it, is the slope under a wheel less the mean of all.
 
 use bicycle::lanes::{Lanes, Real};
 use traversability::{Bins, N_BINS};
@@ -202,7 +202,7 @@ impl Equations {
                 Rolling { speed: (one - lost).max(zero), bump: slope }
             }
             Law::Friction { per_stiffness, .. } => {
-                let along = self.asked_along(lanes, slope);
+                let along = self.asked_along(lanes, pose, slope);
                 let asked = (along * along + pose.across * pose.across).sqrt();
                 let kept = cube_root(lanes, (one - asked / hold.friction).max(zero));
                 let slip = lanes.real_single(3.0 * per_stiffness) * hold.friction * (one - kept);
@@ -213,13 +213,14 @@ impl Equations {
         }
     }
 
-    /// Friction that a slope along the heading asks for, by the law.
+    /// Friction that a slope under a wheel along the heading asks for, by the law. What all wheels share moves weight
+    /// between the axles.
     #[inline(always)]
-    fn asked_along<L: Lanes>(&self, lanes: L, slope: Real<L>) -> Real<L> {
+    fn asked_along<L: Lanes>(&self, lanes: L, pose: &PoseGround<L>, slope: Real<L>) -> Real<L> {
         match self.law {
             Law::Linear { .. } => slope,
             Law::Friction { share, unloading, .. } => {
-                let left = lanes.real(1.0) - lanes.real_single(unloading) * slope;
+                let left = lanes.real(1.0) - lanes.real_single(unloading) * pose.along.abs();
                 lanes.real_single(share) * slope / left.max(lanes.real_single(SHARE_LEAST))
             }
         }
@@ -234,7 +235,7 @@ impl Equations {
         let (least, most) = (lanes.real_single(least), lanes.real_single(most));
         let mut along = zero;
         for (ground, known) in pose.wheels.iter().zip(known) {
-            along = along.max(*known * self.asked_along(lanes, ground.forward_slope.abs()));
+            along = along.max(*known * self.asked_along(lanes, pose, ground.forward_slope.abs()));
         }
         let asked = (along * along + pose.across * pose.across).sqrt();
         let mean = lanes.real(0.5) * (asked.max(least) + most);

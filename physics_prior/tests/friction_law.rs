@@ -183,7 +183,7 @@ fn the_plant_stops_at_the_faces_before_one_wheel_that_the_prior_says() {
     let law = SlopeLaw::of(&full_size());
     let geometry = full_size().geometry;
     for slope in [1.5, 3.0] {
-        for (face_m, stops) in [(0.15, false), (0.8, true)] {
+        for (face_m, stops) in [(0.35, false), (0.8, true)] {
             // A bank on the right from 4 m ahead on.
             let height_m = move |x: f64, y: f64| {
                 if y < -0.3 { (slope * (x - 4.0)).clamp(0.0, face_m) } else { 0.0 }
