@@ -232,10 +232,11 @@ fn navigation_goes_on_where_it_was_broken_off_and_parts_make_the_same_table() {
 fn published_tables_are_those_of_the_drives_beside_the_page() {
     let docs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs");
     let page = std::fs::read_to_string(docs.join("navigation.md")).expect("the page");
-    // Six methods at three alphas and two that know none; in MuJoCo, at one alpha; one method and two planners.
-    for (drives, n_rows) in [("navigation", 20), ("navigation/mujoco", 8), ("navigation/peers", 3)] {
+    // Six methods at three alphas and two that know none; at one alpha, in MuJoCo; one and two planners; two of them mended.
+    let tables = [("", 20), ("mujoco", 8), ("peers", 3), ("mended", 2)];
+    for (drives, n_rows) in tables.map(|(drives, n_rows)| (format!("navigation/{drives}"), n_rows)) {
         let folder = tempfile::tempdir().expect("a temporary folder");
-        let output = merged(&[&docs.join(drives)], folder.path());
+        let output = merged(&[&docs.join(&drives)], folder.path());
         assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
         let table: Value = serde_json::from_slice(&read(folder.path(), "navigation.json")).expect("JSON");
         let rows = table["rows"].as_array().expect("rows");
