@@ -20,8 +20,8 @@ pub struct PriorConfig {
     /// Height of vegetation at which traction is gone (equation 16) [m]. The paper takes 0.2 m for wheels of
     /// 0.15 m diameter; see [`PriorConfig::for_vehicle`].
     pub vegetation_height_max_m: f64,
-    /// Friction of the ground lies anywhere between these two, each value as likely [-]. A vehicle across a slope needs
-    /// part of it to stay there: the tangent of its roll.
+    /// Friction of the ground lies anywhere between these two, each value as likely [-]. Slopes take part of it, across the
+    /// heading and under every wheel along it; where there is less than the steepest wheel needs, nothing moves.
     pub friction: [f64; 2],
     /// Pseudo-count of the prior in a Dirichlet posterior; the paper takes the number of bins.
     pub evidence: f64,

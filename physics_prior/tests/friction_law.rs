@@ -10,13 +10,9 @@ use std::sync::Arc;
 use bicycle::{AxleDemand, Command, Geometry, Vehicle};
 use physics_prior::{Assumption, PriorBelief, PriorConfig, SlopeLaw};
 use scenarios::{Patch, Plant, Stribeck, World};
-use surfaces::{CAR, level, open, prior_map, surface, window};
+use surfaces::{CAR, full_size, level, open, prior_map, surface, window};
 use terrain::GridGeometry;
 use traversability::{Bins, Pmf};
-
-fn full_size() -> Vehicle {
-    toml::from_str(include_str!("../../scenarios/vehicles/pietra_full_size.toml")).unwrap()
-}
 
 fn rear_driven() -> Vehicle {
     toml::from_str(include_str!("../../scenarios/vehicles/sedan.toml")).unwrap()

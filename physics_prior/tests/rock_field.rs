@@ -9,7 +9,7 @@ use std::sync::Arc;
 use bicycle::{Command, Vehicle};
 use physics_prior::{Assumption, PriorConfig, SlopeLaw};
 use scenarios::{Plant, RockFieldConfig, RockMap, Split, Truth, World, rock_field};
-use surfaces::{level, open, prior_map, surface};
+use surfaces::{full_size, level, open, prior_map, surface};
 use terrain::GridGeometry;
 
 const N_DRIVES: usize = 30;
@@ -65,8 +65,7 @@ fn drive(vehicle: &Vehicle, world: &Arc<World>, start: [f64; 3], driven: &mut Dr
 /// tenth of the speed.
 #[test]
 fn where_the_plant_stands_next_to_nothing_is_expected() {
-    let vehicle: Vehicle =
-        toml::from_str(include_str!("../../scenarios/vehicles/pietra_full_size.toml")).unwrap();
+    let vehicle = full_size();
     let cells = GridGeometry { resolution_m: 0.2, origin: [0, 0], n_rows: 250, n_cols: 250 };
     let (mut n_places, mut n_nothing) = ([0; 2], [[0; 2]; 2]);
     for index in 0..2 {

@@ -6,10 +6,10 @@ mod surfaces;
 use std::f64::consts::{FRAC_PI_2, TAU};
 use std::sync::Arc;
 
-use bicycle::{Command, Vehicle};
+use bicycle::Command;
 use physics_prior::{Assumption, PriorBelief, PriorConfig};
 use scenarios::{Patch, Plant, Stribeck, World};
-use surfaces::{CAR, level, open, prior_map, surface, window};
+use surfaces::{CAR, full_size, level, open, prior_map, surface, window};
 use terrain::{GridGeometry, SurfaceCell, TerrainClass};
 use traversability::Bins;
 
@@ -140,10 +140,6 @@ fn a_vehicle_that_leans_on_level_contacts_does_not_slide() {
 const START_S: f64 = 1.5;
 const WATCHED_S: f64 = 3.0;
 const STEERING_RAD: f32 = 0.15;
-
-fn full_size() -> Vehicle {
-    toml::from_str(include_str!("../../scenarios/vehicles/pietra_full_size.toml")).unwrap()
-}
 
 /// A plane that rises northwards, of a friction that does not depend on the sliding speed.
 fn plane(slope: f64, friction: f64) -> Arc<World> {

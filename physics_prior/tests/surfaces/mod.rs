@@ -2,8 +2,8 @@
 #![allow(dead_code, reason = "every test crate uses its own part")]
 #![allow(clippy::unwrap_used, reason = "helpers of tests may panic as tests do")]
 
-use bicycle::Geometry;
 use bicycle::lanes::Instructions;
+use bicycle::{Geometry, Vehicle};
 use physics_prior::{Assumption, PriorConfig, PriorMap};
 use terrain::{Cell, GridGeometry, GridMap, SurfaceCell, TerrainClass};
 use traversability::{CvarLevel, Risk};
@@ -29,6 +29,11 @@ pub const TRUCK: Geometry = Geometry {
     ground_clearance_m: 0.35,
     wheel_radius_m: 0.4,
 };
+
+/// The shipped full-size vehicle.
+pub fn full_size() -> Vehicle {
+    toml::from_str(include_str!("../../../scenarios/vehicles/pietra_full_size.toml")).unwrap()
+}
 
 /// A window whose south-west corner is the map's origin.
 pub fn window(resolution_m: f64, n_rows: usize, n_cols: usize) -> GridGeometry {
