@@ -50,6 +50,22 @@ pub struct Ranked {
     pub id: String,
     /// Probability in [0, 1].
     pub score: f64,
+    /// What this effect alone has for it; absent for one that the drives cannot judge.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub support: Option<Support>,
+}
+
+/// What a single effect has for it.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Support {
+    /// Logarithm of what it divides the loss by, half as fitted and half as foretold.
+    pub gain: f64,
+    /// How strongly the robot's drives ask for it, in standard deviations of chance [-].
+    pub strength: f64,
+    /// The same of the drive that asks for it least.
+    pub least_strength: f64,
+    /// How much of it the simulator's own drives ask for, which do not have it: in [-1, 1].
+    pub nominal: f64,
 }
 
 /// A condition under which a residual may stand out.

@@ -2,21 +2,21 @@
 //! nominal drive shows against the others.
 
 use crate::calibration::{calibrated, proportional, recalibrated};
-use crate::causes::{Explanation, Trial};
+use crate::causes::Trial;
 use crate::comparison::{Comparison, Yardstick, root_mean_square};
 use crate::conditions::StartRecord;
 use crate::drive::{Drive, DriveError};
-use crate::explanation::{best_pair, single_explanations};
+use crate::explanation::{best_pair, judged_sizes, single_explanations};
 use crate::familiarity::Familiarity;
 use crate::findings::ResidualCell;
 use crate::limits_shown::LimitsShown;
 use crate::machine::Machine;
 use crate::nuisance::Information;
 use crate::residual_table::residual_cells;
+use crate::score_test::{Chance, TriedScores, tried_scores};
 use crate::whitening::Whitening;
 use bicycle::{DriveLog, Effect};
 use serde::{Deserialize, Serialize};
-use std::collections::{BTreeMap, BTreeSet};
 
 /// Why a diagnosis cannot begin.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -66,9 +66,9 @@ pub(crate) struct Null {
     pub(crate) error: f64,
     /// Mean robust loss.
     pub(crate) loss: f64,
-    /// Logarithmic gain in loss that each effect brings by chance where there is none.
-    pub(crate) gains: BTreeMap<String, f64>,
-    /// The same of the best second effect.
+    /// How strongly effects are asked for where there is none.
+    pub(crate) chance: Chance,
+    /// Logarithmic gain in loss that the best second effect brings by chance.
     pub(crate) gain_of_two: f64,
     /// Residuals by quantity and horizon; before and after hold the same.
     pub(crate) cells: Vec<ResidualCell>,
@@ -101,12 +101,14 @@ impl Baseline {
         }
         let whitening =
             Whitening::of(&folds.iter().flat_map(|fold| fold.residuals.clone()).collect::<Vec<_>>());
-        let left_out: Vec<LeftOut> =
-            folds.into_iter().map(|fold| fold.judged(wheelbase_m, (&yardstick, &whitening))).collect();
         let nominal = Comparison::new(wheelbase_m, all.clone(), &yardstick);
         let nominal = nominal.judged_by(&whitening, &Familiarity::unlimited());
         let experience = Experience::of(&nominal, &effects);
-        let null = Null::of(&left_out, LimitsShown::of(&Trial::fixed(nominal, &effects)));
+        let nominal = Trial::fixed(nominal, &effects);
+        let tried = judged_sizes(&nominal);
+        let judged = |fold: Fold<'_>| fold.judged(wheelbase_m, (&yardstick, &whitening), &tried);
+        let left_out: Vec<LeftOut> = folds.into_iter().map(judged).collect();
+        let null = Null::of(&left_out, LimitsShown::of(&nominal));
         let proportional = proportional(wheelbase_m, &all, &yardstick);
         Ok(Self { wheelbase_m, effects, proportional, yardstick, whitening, experience, null })
     }
@@ -190,12 +192,18 @@ impl<'a> Fold<'a> {
         Self { own, others, effects, residuals }
     }
 
-    fn judged(self, wheelbase_m: f64, (yardstick, whitening): (&Yardstick, &Whitening)) -> LeftOut {
+    fn judged(
+        self,
+        wheelbase_m: f64,
+        (yardstick, whitening): (&Yardstick, &Whitening),
+        tried: &[Effect],
+    ) -> LeftOut {
         let of = |drives| Comparison::new(wheelbase_m, drives, yardstick);
         let others = of(self.others).judged_by(whitening, &Familiarity::unlimited());
         let experience = Experience::of(&others, &self.effects);
         let own = of(vec![self.own]).judged_by(whitening, &experience.familiarity);
-        LeftOut::new(&Trial::given_way(own, &self.effects, &experience.information), self.residuals)
+        let trial = Trial::given_way(own, &self.effects, &experience.information);
+        LeftOut::new(&trial, tried, self.residuals)
     }
 }
 
@@ -204,34 +212,25 @@ struct LeftOut {
     residuals: Vec<f32>,
     loss: f64,
     gain_of_two: f64,
-    gain_by_id: BTreeMap<String, f64>,
+    scores: TriedScores,
     starts: Vec<StartRecord>,
 }
 
 impl LeftOut {
-    fn new(trial: &Trial<'_>, residuals: Vec<f32>) -> Self {
+    fn new(trial: &Trial<'_>, tried: &[Effect], residuals: Vec<f32>) -> Self {
         let before = trial.loss(&[]);
         let singles = single_explanations(trial);
         let pair = best_pair(trial, &singles);
         let one = singles.first().map_or(before, |single| single.loss);
         let two = pair.map_or(one, |pair| pair.loss);
         let starts = StartRecord::of(&trial.comparison.drives().collect::<Vec<_>>(), &residuals);
-        let gain = |single: &Explanation| (single.ids()[0].to_owned(), (before / single.loss).ln());
-        let gain_by_id = singles.iter().map(gain).collect();
-        Self { residuals, loss: before, gain_of_two: (one / two).ln(), gain_by_id, starts }
+        let scores = tried_scores(trial, tried);
+        Self { residuals, loss: before, gain_of_two: (one / two).ln(), scores, starts }
     }
 }
 
 /// A gain by chance is so much of the second largest of all runs.
 const CHANCE_MARGIN: f64 = 0.75;
-
-/// By effect what it gains by chance.
-fn chance_by_id(left_out: &[LeftOut]) -> BTreeMap<String, f64> {
-    let ids: BTreeSet<&String> = left_out.iter().flat_map(|one| one.gain_by_id.keys()).collect();
-    let gain =
-        |id: &String| chance_gain(left_out.iter().map(|one| one.gain_by_id.get(id).copied().unwrap_or(0.0)));
-    ids.into_iter().map(|id| (id.clone(), gain(id))).collect()
-}
 
 /// The largest gain is left aside: that run may be the only one to show what the effect does, and the model that knows all
 /// runs knows it. Of two runs the larger counts.
@@ -253,7 +252,7 @@ impl Null {
         Self {
             error: median(&|one| root_mean_square(&one.residuals)),
             loss: median(&|one| one.loss),
-            gains: chance_by_id(left_out),
+            chance: Chance::of(&left_out.iter().map(|one| &one.scores).collect::<Vec<_>>()),
             limits_shown,
             gain_of_two: chance_gain(left_out.iter().map(|one| one.gain_of_two)),
             cells: residual_cells(&residuals, &residuals, None),

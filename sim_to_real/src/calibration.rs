@@ -242,6 +242,16 @@ pub(crate) fn coordinate(parameter: &Parameter, value: f64, pull: Option<f64>) -
     Coordinate { start: value, low, high, scale, pull: pull.map(|strength| (parameter.neutral, strength)) }
 }
 
+/// How far apart two sizes of an effect are, in changes that matter.
+pub(crate) fn distance(one: &Effect, other: &Effect) -> f64 {
+    let values = one.values().into_iter().zip(other.values());
+    let apart = |(parameter, (one, other)): (&Parameter, (f64, f64))| {
+        let [one, other] = [one, other].map(|value| coordinate(parameter, value, None));
+        (one.start - other.start) / one.scale
+    };
+    one.description().parameters.iter().zip(values).map(apart).fold(0.0, f64::hypot)
+}
+
 /// A change of a parameter that matters: half the smallest effect that is tried.
 fn scale(parameter: &Parameter) -> f64 {
     let distance = |tried: &f64| (tried - parameter.neutral).abs();

@@ -165,7 +165,7 @@ impl<'a> Trial<'a> {
 }
 
 /// The effect at every combination of the values that the catalogue tries.
-fn tried(description: &Description) -> Vec<Effect> {
+pub(crate) fn tried(description: &Description) -> Vec<Effect> {
     let mut values = vec![[0.0; 4]];
     for (place, parameter) in description.parameters.iter().enumerate() {
         let each = |so_far: &[f64; 4]| {

@@ -11,7 +11,8 @@ use crate::drive::Drive;
 use crate::explanation::{pairs, single_explanations};
 use crate::findings::Findings;
 use crate::intervals::named_effects;
-use crate::judgement::Weighed;
+use crate::judgement::{Single, Weighed};
+use crate::least_squares::mean_loss;
 use crate::machine::Machine;
 use crate::residual_table::residual_cells;
 use crate::steering::Steering;
@@ -104,11 +105,17 @@ pub(crate) fn closed(floor: f64, before: f64, after: f64) -> Option<f64> {
 }
 
 fn weighed(baseline: &Baseline, trial: &Trial<'_>, splits: &[Split<'_>]) -> Weighed {
-    let none = Explanation::new(Vec::new(), trial.loss(&[]));
-    let singles = foretold(splits, single_explanations(trial));
+    let before = trial.judged_residuals(&[]);
+    let none = Explanation::new(Vec::new(), mean_loss(&before));
+    let supported = |explanation: Explanation| {
+        let support = baseline.null.chance.support((trial, &before), &explanation, none.loss);
+        Single { explanation, support }
+    };
+    let singles = foretold(splits, single_explanations(trial)).into_iter().map(supported).collect();
     let mut weighed = Weighed { none, pairs: Vec::new(), singles };
     if weighed.may_hold_pairs(&baseline.null) {
-        weighed.pairs = foretold(splits, pairs(trial, &weighed.singles));
+        weighed.pairs =
+            foretold(splits, pairs(trial, weighed.singles.iter().map(|single| &single.explanation)));
     }
     weighed
 }
@@ -116,7 +123,8 @@ fn weighed(baseline: &Baseline, trial: &Trial<'_>, splits: &[Split<'_>]) -> Weig
 /// Explanations that may turn out not to be constant: the best single effects, and what is announced.
 fn in_question(weighed: &Weighed, announced: &[Effect]) -> Vec<Vec<Effect>> {
     let singles = weighed.singles.iter().take(N_IN_QUESTION);
-    let mut explanations: Vec<Vec<Effect>> = singles.map(|single| single.causes.clone()).collect();
+    let mut explanations: Vec<Vec<Effect>> =
+        singles.map(|single| single.explanation.causes.clone()).collect();
     if announced.len() > 1 {
         explanations.push(announced.to_vec());
     }

@@ -1,6 +1,7 @@
 //! Which explanations there are, and how much each is to be believed.
 
-use crate::causes::{Explanation, Trial, candidates};
+use crate::causes::{Explanation, Trial, candidates, tried};
+use bicycle::Effect;
 use bicycle::effect::Description;
 
 /// Seconds are sought beside this many of the best singles.
@@ -12,6 +13,11 @@ const N_REFINED: usize = 5;
 /// in the sensors.
 fn judged(trial: &Trial<'_>) -> impl Iterator<Item = &'static Description> {
     candidates().filter(|description| trial.comparison.judges(description.id))
+}
+
+/// Every effect that the drives can judge, at every size that the catalogue tries.
+pub(crate) fn judged_sizes(trial: &Trial<'_>) -> Vec<Effect> {
+    judged(trial).flat_map(tried).collect()
 }
 
 /// Every effect alone, best first.
@@ -40,13 +46,16 @@ fn best_forms(sorted: Vec<Explanation>) -> Vec<Explanation> {
 
 /// The best pair that holds one of the best singles.
 pub(crate) fn best_pair(trial: &Trial<'_>, singles: &[Explanation]) -> Option<Explanation> {
-    pairs(trial, singles).into_iter().next()
+    pairs(trial, singles.iter()).into_iter().next()
 }
 
 /// Pairs that hold one of the best singles, the best of them fitted together, best first.
-pub(crate) fn pairs(trial: &Trial<'_>, singles: &[Explanation]) -> Vec<Explanation> {
+pub(crate) fn pairs<'a>(
+    trial: &Trial<'_>,
+    singles: impl Iterator<Item = &'a Explanation>,
+) -> Vec<Explanation> {
     let mut pairs: Vec<Explanation> = Vec::new();
-    for first in singles.iter().take(N_FIRSTS) {
+    for first in singles.take(N_FIRSTS) {
         pairs.extend(with_a_second(trial, first));
     }
     pairs = sorted(pairs);

@@ -1,14 +1,21 @@
-//! From explanations to a verdict: every explanation has an energy, the logarithm of its loss plus a price per effect;
-//! the smallest energy wins, and energies become probabilities.
+//! From explanations to a verdict. What supports a single effect makes its logit over none (conditional logit, McFadden
+//! 1974), a second effect adds to that of the first what it gains beyond its price; the most probable explanation wins.
 
-use crate::answer::{Ranked, Verdict};
+use crate::answer::{Ranked, Support, Verdict};
 use crate::baseline::Null;
 use crate::causes::{Explanation, candidates};
 use bicycle::Effect;
 
-/// Logarithmic gain that an effect must bring beyond what it brings between nominal drives.
-const PRICE_OF_ONE: f64 = 0.05;
-/// The same for a second effect, which a wrong shape of the first one invites.
+/// Logit of a single effect over none where nothing supports it,
+const UNSUPPORTED: f64 = -6.8;
+/// and what supports it counts for: the root of its gain, the logarithms of one more than its strength and than that of
+/// the weakest drive, and how much of it nominal drives ask for.
+const SUPPORT: [f64; 4] = [7.9, 1.2, 1.8, -2.9];
+/// An explanation is announced when it is this many times as probable as none.
+const BEYOND_DOUBT: f64 = 1.3;
+/// The names that are as good as the best hold the true one with this probability, if one of them is.
+const CREDIBLE: f64 = 0.85;
+/// Logarithmic gain in loss that a second effect must bring beyond chance: a wrong shape of the first one invites it.
 pub(crate) const PRICE_OF_TWO: f64 = 0.12;
 /// The same on top where both are in one actuator: two of them are the usual shape of a third that has no name.
 const PRICE_OF_ONE_ACTUATOR: f64 = 0.18;
@@ -19,13 +26,8 @@ const ACTUATORS: [&[&str]; 2] = [
 ];
 /// Difference in energy that makes one explanation e times as probable as another.
 pub(crate) const TEMPERATURE: f64 = 0.035;
-/// An effect is announced only when it takes this share off the loss, or off the null's where that is larger, beyond what it
-/// takes off between nominal drives.
-const BEYOND_DOUBT: f64 = 0.1;
-/// Explanations this much less probable than the best are told apart from it.
-const TOLD_APART: f64 = 0.25;
 /// Where the data tell nothing apart, this many names are enough to say so.
-const MOST_NAMES: usize = 6;
+const MOST_NAMES: usize = 4;
 /// What is left is unknown when its loss exceeds this many losses of the null and
 pub(crate) const UNKNOWN_IN_NULLS: f64 = 1.7;
 /// this share of what there was above it.
@@ -39,10 +41,22 @@ const PAIRS_ABOVE_NULLS: f64 = 0.9;
 /// some hundredths of what it explains, and another effect mends the rest of it.
 const SHARE_OF_A_SECOND: f64 = 0.02;
 
-/// All explanations that were tried, singles and pairs best first.
+/// An effect alone.
+pub(crate) struct Single {
+    pub(crate) explanation: Explanation,
+    pub(crate) support: Support,
+}
+
+impl Single {
+    fn cause(&self) -> &'static str {
+        self.explanation.causes[0].description().cause
+    }
+}
+
+/// All explanations that were tried, singles and pairs of least energy first.
 pub(crate) struct Weighed {
     pub(crate) none: Explanation,
-    pub(crate) singles: Vec<Explanation>,
+    pub(crate) singles: Vec<Single>,
     pub(crate) pairs: Vec<Explanation>,
 }
 
@@ -54,27 +68,18 @@ pub(crate) struct Judgement {
     pub(crate) credible_set: Vec<String>,
 }
 
-/// What an explanation must gain to be believed.
-fn price(explanation: &Explanation, null: &Null) -> f64 {
-    let nulls = chance_gain(explanation, null);
-    let ids = explanation.ids();
-    let is_one_actuator = |own: &&&[&str]| ids.iter().all(|id| own.contains(id));
-    nulls
-        + match ids.len() {
-            0 => 0.0,
-            1 => PRICE_OF_ONE,
-            _ if ACTUATORS.iter().any(|own| is_one_actuator(&own)) => {
-                PRICE_OF_ONE + PRICE_OF_TWO + PRICE_OF_ONE_ACTUATOR
-            }
-            _ => PRICE_OF_ONE + PRICE_OF_TWO,
-        }
+/// Logarithm of how many times as probable as none a single effect is.
+fn logit(support: &Support) -> f64 {
+    let Support { gain, strength, least_strength, nominal } = support;
+    let features = [gain.max(0.0).sqrt(), strength.ln_1p(), least_strength.ln_1p(), *nominal];
+    UNSUPPORTED + SUPPORT.iter().zip(features).map(|(weight, feature)| weight * feature).sum::<f64>()
 }
 
-/// What an explanation gains between nominal drives: of a pair what its likelier member does, and a second one.
-fn chance_gain(explanation: &Explanation, null: &Null) -> f64 {
-    let own = |id: &&str| null.gains.get(*id).copied().unwrap_or(0.0);
-    let gains = explanation.ids().iter().map(own).fold(0.0, f64::max);
-    if explanation.causes.len() > 1 { gains + null.gain_of_two } else { gains }
+/// What a second effect must gain to be believed.
+fn price(pair: &Explanation, null: &Null) -> f64 {
+    let ids = pair.ids();
+    let is_one_actuator = ACTUATORS.iter().any(|own| ids.iter().all(|id| own.contains(id)));
+    null.gain_of_two + PRICE_OF_TWO + if is_one_actuator { PRICE_OF_ONE_ACTUATOR } else { 0.0 }
 }
 
 impl Weighed {
@@ -82,32 +87,40 @@ impl Weighed {
     pub(crate) fn may_hold_pairs(&self, null: &Null) -> bool {
         let least = PAIRS_ABOVE_NULLS * null.loss;
         self.singles.first().is_some_and(|single| {
-            (single.loss / least).ln() > PRICE_OF_TWO && single.loss > SHARE_OF_A_SECOND * self.none.loss
+            let loss = single.explanation.loss;
+            (loss / least).ln() > PRICE_OF_TWO && loss > SHARE_OF_A_SECOND * self.none.loss
         })
     }
 
     pub(crate) fn judge(&self, null: &Null) -> Judgement {
-        let pairs = self.pairs.iter().filter(|pair| self.takes_its_share(pair));
-        let explanations = std::iter::once(&self.none).chain(&self.singles).chain(pairs);
-        let mut all: Vec<(f64, &Explanation)> = explanations
-            .map(|explanation| (explanation.energy() + price(explanation, null), explanation))
-            .collect();
-        all.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let best = if self.is_beyond_doubt(all[0].1, null) { all[0].1 } else { &self.none };
+        let all = self.by_logit(null);
+        let (logit, likeliest) = all[0];
+        let would_show = likeliest.causes.iter().all(|own| null.limits_shown.would_show(own));
+        let best = if would_show && logit > BEYOND_DOUBT.ln() { likeliest } else { &self.none };
         let (verdict, announced) = self.verdict(best, null);
-        let credible_set = self.credible_set(best);
-        Judgement { verdict, announced, ranking: ranking(&all), credible_set }
+        Judgement { verdict, announced, ranking: self.ranking(&all), credible_set: self.credible_set(best) }
+    }
+
+    /// Every explanation with its logit over none, the largest first.
+    fn by_logit(&self, null: &Null) -> Vec<(f64, &Explanation)> {
+        let singles = self.singles.iter().map(|single| (logit(&single.support), &single.explanation));
+        let mut all: Vec<(f64, &Explanation)> = singles.chain([(0.0, &self.none)]).collect();
+        if let Some(first) = self.singles.first() {
+            let known = all.iter().map(|(logit, _)| *logit).fold(f64::NEG_INFINITY, f64::max);
+            let of_two = |pair: &Explanation| {
+                known + (first.explanation.energy() - pair.energy() - price(pair, null)) / TEMPERATURE
+            };
+            let pairs = self.pairs.iter().filter(|pair| self.takes_its_share(pair));
+            all.extend(pairs.map(|pair| (of_two(pair), pair)));
+        }
+        all.sort_by(|a, b| b.0.total_cmp(&a.0));
+        all
     }
 
     fn takes_its_share(&self, pair: &Explanation) -> bool {
-        let single = self.singles.iter().map(Explanation::energy).fold(f64::INFINITY, f64::min);
+        let energy = |single: &Single| single.explanation.energy();
+        let single = self.singles.iter().map(energy).fold(f64::INFINITY, f64::min);
         single.exp() - pair.energy().exp() > SHARE_OF_A_SECOND * self.none.loss
-    }
-
-    fn is_beyond_doubt(&self, best: &Explanation, null: &Null) -> bool {
-        let gain = (self.none.loss - best.energy().exp()) / self.none.loss.max(null.loss);
-        let would_show = best.causes.iter().all(|own| null.limits_shown.would_show(own));
-        would_show && gain - chance_gain(best, null) > BEYOND_DOUBT
     }
 
     fn verdict(&self, best: &Explanation, null: &Null) -> (Verdict, Vec<Effect>) {
@@ -123,34 +136,34 @@ impl Weighed {
         }
     }
 
-    /// Singles that the data cannot tell apart from the best single; of a pair, its members.
+    /// The likeliest singles that hold the true one with some probability, if one of them is; of a pair, its members.
     fn credible_set(&self, best: &Explanation) -> Vec<String> {
-        let reach = -TEMPERATURE * TOLD_APART.ln();
-        let Some(first) = self.singles.first() else { return Vec::new() };
-        let near = self.singles.iter().take_while(|single| single.energy() - first.energy() < reach);
-        let mut ids: Vec<String> = match best.causes.len() {
-            2.. => best.ids().iter().map(|id| (*id).to_owned()).collect(),
-            _ => near.flat_map(Explanation::ids).map(str::to_owned).collect(),
-        };
-        ids.dedup();
-        ids.truncate(MOST_NAMES);
-        ids
+        if best.causes.len() > 1 {
+            return best.ids().into_iter().map(str::to_owned).collect();
+        }
+        let mut singles: Vec<(f64, &str)> =
+            self.singles.iter().map(|single| (logit(&single.support).exp(), single.cause())).collect();
+        singles.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let all: f64 = singles.iter().map(|(odds, _)| odds).sum();
+        let held = singles.iter().scan(0.0, |held, (odds, _)| Some(std::mem::replace(held, *held + odds)));
+        let needed = held.take_while(|held| *held < CREDIBLE * all).count().min(MOST_NAMES);
+        singles[..needed].iter().map(|(_, id)| (*id).to_owned()).collect()
     }
-}
 
-/// The probability of every effect to be in the true explanation.
-fn ranking(all: &[(f64, &Explanation)]) -> Vec<Ranked> {
-    let least = all[0].0;
-    let weight = |energy: f64| (-(energy - least) / TEMPERATURE).exp();
-    let total: f64 = all.iter().map(|(energy, _)| weight(*energy)).sum();
-    let of = |id: &str| {
-        let holds = all.iter().filter(|(_, explanation)| explanation.ids().contains(&id));
-        holds.map(|(energy, _)| weight(*energy)).sum::<f64>() / total
-    };
-    let mut ranking: Vec<Ranked> = candidates()
-        .filter(|description| description.id == description.cause)
-        .map(|description| Ranked { id: description.id.to_owned(), score: of(description.id) })
-        .collect();
-    ranking.sort_by(|a, b| b.score.total_cmp(&a.score));
-    ranking
+    /// The probability of every effect to be in the true explanation.
+    fn ranking(&self, all: &[(f64, &Explanation)]) -> Vec<Ranked> {
+        let odds = |logit: f64| (logit - all[0].0).exp();
+        let total: f64 = all.iter().map(|(logit, _)| odds(*logit)).sum();
+        let of = |id: &str| {
+            let holds = all.iter().filter(|(_, explanation)| explanation.ids().contains(&id));
+            holds.map(|(logit, _)| odds(*logit)).sum::<f64>() / total
+        };
+        let support =
+            |id: &str| self.singles.iter().find(|single| single.cause() == id).map(|single| single.support);
+        let ranked = |id: &'static str| Ranked { id: id.to_owned(), score: of(id), support: support(id) };
+        let causes = candidates().filter(|description| description.id == description.cause);
+        let mut ranking: Vec<Ranked> = causes.map(|description| ranked(description.id)).collect();
+        ranking.sort_by(|a, b| b.score.total_cmp(&a.score));
+        ranking
+    }
 }

@@ -38,6 +38,11 @@ fn loss(residual: f64) -> f64 {
     2.0 * BEND * BEND * ((1.0 + ratio * ratio).sqrt() - 1.0)
 }
 
+/// What a residual counts for in a square: the loss's derivative over that of the square.
+pub(crate) fn weight(residual: f32) -> f32 {
+    1.0 / (1.0 + (residual / BEND as f32).powi(2)).sqrt()
+}
+
 /// Levenberg and Marquardt with reweighting; derivatives by differences of a hundredth of a parameter's scale.
 pub(crate) fn fit(coordinates: &[Coordinate], mut residuals: impl FnMut(&[f64]) -> Vec<f32>) -> Fit {
     let mut values: Vec<f64> = coordinates.iter().map(|coordinate| coordinate.start).collect();
@@ -116,7 +121,7 @@ impl Linearised {
             there.iter().zip(&here).map(|(b, a)| (b - a) / step as f32).collect()
         };
         let columns = coordinates.iter().enumerate().map(column).collect();
-        let weights = here.iter().map(|r| 1.0 / (1.0 + (r / BEND as f32).powi(2)).sqrt()).collect();
+        let weights = here.iter().copied().map(weight).collect();
         Self { columns, weights, here }
     }
 

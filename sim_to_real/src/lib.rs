@@ -44,6 +44,7 @@ mod nuisance;
 mod repair;
 mod residual_table;
 mod rollout;
+mod score_test;
 mod screening;
 mod signals;
 mod signature;
@@ -58,7 +59,8 @@ mod without_simulator;
 mod engine_tests;
 
 pub use answer::{
-    Answer, BeforeAfter, Condition, Estimate, NamedEffect, Place, Ranked, SCHEMA_VERSION, Shrink, Verdict,
+    Answer, BeforeAfter, Condition, Estimate, NamedEffect, Place, Ranked, SCHEMA_VERSION, Shrink, Support,
+    Verdict,
 };
 pub use baseline::{Baseline, GapError};
 pub use causes::composed;

@@ -21,11 +21,11 @@ use crate::least_squares::mean_loss;
 use crate::limits_shown::LimitsShown;
 use crate::machine::Machine;
 use crate::residual_table::residual_cells;
+use crate::score_test::Chance;
 use crate::whitening::Whitening;
 use bicycle::DriveLog;
 pub(crate) use notes::of_evidence;
 use selection::{LeftOut, Selection, grown};
-use std::collections::BTreeMap;
 
 /// Rollouts by which effects are selected, and by which the selected ones are fitted; of longer drives, stretches evenly
 /// spread.
@@ -82,7 +82,7 @@ fn bare_baseline(machine: &Machine, drives: &[&Drive], yardstick: Yardstick) -> 
     let null = Null {
         error: root_mean_square(&noise),
         loss: mean_loss(&noise),
-        gains: BTreeMap::new(),
+        chance: Chance::default(),
         limits_shown: LimitsShown::default(),
         gain_of_two: 0.0,
         cells: residual_cells(&noise, &noise, None),

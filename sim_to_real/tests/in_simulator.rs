@@ -123,7 +123,7 @@ fn machine() -> Machine {
 }
 
 fn ranking(ids: &[&str]) -> Vec<Ranked> {
-    ids.iter().map(|id| Ranked { id: (*id).to_owned(), score: 0.1 }).collect()
+    ids.iter().map(|id| Ranked { id: (*id).to_owned(), score: 0.1, support: None }).collect()
 }
 
 const SCREENED: [&str; 5] = ["steer_lag", "friction", "steer_delay", "gyro_bias", "speed_scale"];

@@ -26,7 +26,10 @@ fn answer(verdict: Verdict, announced: &[&str], ranking: &[(&str, f64)]) -> Answ
         steering: Steering::Angle,
         verdict,
         effects: announced.iter().map(named).collect(),
-        ranking: ranking.iter().map(|(id, score)| Ranked { id: (*id).to_owned(), score: *score }).collect(),
+        ranking: ranking
+            .iter()
+            .map(|(id, score)| Ranked { id: (*id).to_owned(), score: *score, support: None })
+            .collect(),
         credible_set: announced.iter().map(|id| (*id).to_owned()).collect(),
         places: vec![Place { condition: Condition::SteeringChange, share: 0.5 }],
         shrink: Shrink {

@@ -6,9 +6,9 @@ use crate::comparison::{Comparison, Yardstick};
 use crate::constancy::{Changing, Halves, changing};
 use crate::explanation::single_explanations;
 use crate::limits_shown::LimitsShown;
+use crate::score_test::Chance;
 use crate::whitening::Whitening;
 use bicycle::Effect;
-use std::collections::BTreeMap;
 
 /// The bicycle with the noise of a drive of its own.
 fn bicycle() -> Baseline {
@@ -18,7 +18,7 @@ fn bicycle() -> Baseline {
     let null = Null {
         error: 1.0,
         loss: 1.0,
-        gains: BTreeMap::new(),
+        chance: Chance::default(),
         gain_of_two: 0.0,
         limits_shown: LimitsShown::default(),
         cells: Vec::new(),

@@ -1,13 +1,13 @@
-//! Prices, probabilities, credible sets and the rule of the unknown.
+//! Odds, probabilities, credible sets, the price of a second effect and the rule of the unknown.
 
 use super::effect;
-use crate::answer::Verdict;
+use crate::answer::{Support, Verdict};
 use crate::baseline::Null;
 use crate::causes::Explanation;
-use crate::judgement::{Judgement, Weighed};
+use crate::judgement::{Judgement, Single, Weighed};
 use crate::limits_shown::LimitsShown;
+use crate::score_test::Chance;
 use proptest::prelude::*;
-use std::collections::BTreeMap;
 
 const SINGLES: [(&str, f64); 5] = [
     ("steer_lag", 0.2),
@@ -17,12 +17,12 @@ const SINGLES: [(&str, f64); 5] = [
     ("rolling_drag", 0.3),
 ];
 
-/// A null of loss 1 in which one effect gained something by chance.
-fn null(gained: (&str, f64)) -> Null {
+/// A null of loss 1.
+fn null() -> Null {
     Null {
         error: 1.0,
         loss: 1.0,
-        gains: BTreeMap::from([(gained.0.to_owned(), gained.1)]),
+        chance: Chance::default(),
         gain_of_two: 0.0,
         limits_shown: LimitsShown::default(),
         cells: Vec::new(),
@@ -30,22 +30,26 @@ fn null(gained: (&str, f64)) -> Null {
     }
 }
 
-fn single((id, value): (&str, f64), loss: f64) -> Explanation {
-    Explanation::new(vec![effect(id, value)], loss)
+/// An effect that divides the loss by so much, and which both drives ask for in proportion.
+fn single((id, value): (&str, f64), none: f64, loss: f64) -> Single {
+    let gain = (none / loss).ln();
+    let strength = 20.0 * gain.max(0.0).sqrt();
+    let support = Support { gain, strength, least_strength: 0.7 * strength, nominal: 0.0 };
+    Single { explanation: Explanation::new(vec![effect(id, value)], loss), support }
 }
 
 /// Singles of the list with these losses, sorted as they come.
 fn weighed(none: f64, losses: &[f64], pair: Option<f64>) -> Weighed {
-    let mut singles: Vec<Explanation> =
-        SINGLES.iter().zip(losses).map(|(&own, &loss)| single(own, loss)).collect();
-    singles.sort_by(|a, b| a.loss.total_cmp(&b.loss));
+    let mut singles: Vec<Single> =
+        SINGLES.iter().zip(losses).map(|(&own, &loss)| single(own, none, loss)).collect();
+    singles.sort_by(|a, b| a.explanation.loss.total_cmp(&b.explanation.loss));
     let both = [SINGLES[0], SINGLES[3]].map(|(id, value)| effect(id, value));
     let pairs = pair.map(|loss| Explanation::new(both.to_vec(), loss)).into_iter().collect();
     Weighed { none: Explanation::new(Vec::new(), none), singles, pairs }
 }
 
 fn judged(none: f64, losses: &[f64], pair: Option<f64>) -> Judgement {
-    weighed(none, losses, pair).judge(&null(("wind", 0.0)))
+    weighed(none, losses, pair).judge(&null())
 }
 
 fn announced(judgement: &Judgement) -> Vec<&str> {
@@ -57,31 +61,30 @@ fn score(judgement: &Judgement, id: &str) -> f64 {
 }
 
 #[test]
-fn a_gain_below_its_price_is_nothing_and_one_well_above_is_announced() {
+fn a_gain_that_drives_hardly_ask_for_is_nothing_and_a_large_one_is_announced() {
     let at = |gain: f64| judged(1.3, &[1.3 * (-gain).exp(), 1.3, 1.3, 1.3, 1.3], None);
     assert_eq!(at(0.0).verdict, Verdict::None);
     assert_eq!(at(0.01).verdict, Verdict::None);
-    // A little more than its price is likelier than nothing, and not beyond doubt: 1 - exp(-0.1) is 0.095 of the loss,
-    // 1 - exp(-0.11) is 0.104.
-    assert!(score(&at(0.08), "steer_lag") > 0.5);
-    assert_eq!(at(0.1).verdict, Verdict::None);
-    assert_eq!(announced(&at(0.11)), ["steer_lag"]);
+    assert_eq!(announced(&at(0.2)), ["steer_lag"]);
     // Once announced, it stays so for every larger gain.
     let first = (0..60).find(|k| at(0.01 * f64::from(*k)).verdict != Verdict::None).unwrap();
     assert!((first..60).all(|k| announced(&at(0.01 * f64::from(k))) == ["steer_lag"]), "from {first}");
 }
 
-/// What an effect gains between nominal drives is no evidence for it.
+/// What one drive asks for and the other does not, and what nominal drives ask for, is believed less.
 #[test]
-fn what_chance_gains_has_to_be_gained_on_top() {
-    let losses = [1.3 * (-0.26_f64).exp(), 1.3, 1.3, 1.3, 1.3];
-    let lenient = weighed(1.3, &losses, None).judge(&null(("steer_lag", 0.0)));
-    let strict = weighed(1.3, &losses, None).judge(&null(("steer_lag", 0.26)));
-    assert_eq!((lenient.verdict, strict.verdict), (Verdict::Effects, Verdict::None));
-    // Of two that explain alike, the one that chance favours loses.
-    let alike = [losses[0], losses[0] * 1.0001, 1.3, 1.3, 1.3];
-    let judgement = weighed(1.3, &alike, None).judge(&null(("steer_lag", 0.05)));
-    assert_eq!(announced(&judgement), ["steer_delay"]);
+fn what_drives_do_not_agree_on_is_believed_less() {
+    let announced_with = |change: &dyn Fn(&mut Support)| {
+        let mut weighed = weighed(1.3, &[1.13, 1.3, 1.3, 1.3, 1.3], None);
+        change(&mut weighed.singles[0].support);
+        let judgement = weighed.judge(&null());
+        (announced(&judgement).len(), score(&judgement, "steer_lag"))
+    };
+    let (n, whole) = announced_with(&|_| ());
+    let (n_of_one, of_one) = announced_with(&|support| support.least_strength = 0.0);
+    let (_, of_nominal) = announced_with(&|support| support.nominal = 0.5);
+    assert_eq!((n, n_of_one), (1, 0));
+    assert!(of_one < whole && of_nominal < whole, "{whole} {of_one} {of_nominal}");
 }
 
 #[test]
@@ -109,9 +112,9 @@ fn a_second_effect_that_mends_the_first_is_none() {
 fn a_second_effect_in_the_same_actuator_is_dearer() {
     let with = |second: (&str, f64)| {
         let pair = Explanation::new(vec![effect("steer_lag", 0.2), effect(second.0, second.1)], 2.0);
-        let singles = vec![single(SINGLES[0], 2.0 * 0.25_f64.exp())];
+        let singles = vec![single(SINGLES[0], 6.0, 2.0 * 0.25_f64.exp())];
         let weighed = Weighed { none: Explanation::new(Vec::new(), 6.0), singles, pairs: vec![pair] };
-        weighed.judge(&null(("wind", 0.0))).announced.len()
+        weighed.judge(&null()).announced.len()
     };
     assert_eq!((with(SINGLES[1]), with(SINGLES[2])), (1, 2));
 }
@@ -137,27 +140,20 @@ fn what_exceeds_the_floor_and_a_share_of_the_gap_is_unknown() {
 /// place.
 #[test]
 fn a_limit_that_nominal_drives_would_not_have_shown_is_no_sign() {
-    let limit = |value: f64| Explanation::new(vec![effect("accel_limit", value)], 1.0);
     let at = |value: f64| {
-        let rival = single(SINGLES[0], 1.1);
-        let singles = vec![limit(value), rival];
-        let null =
-            Null { limits_shown: LimitsShown::from_iter([("accel_limit", 2.0)]), ..null(("wind", 0.0)) };
+        let singles = vec![single(("accel_limit", value), 2.0, 1.0), single(SINGLES[0], 2.0, 1.1)];
+        let null = Null { limits_shown: LimitsShown::from_iter([("accel_limit", 2.0)]), ..null() };
         Weighed { none: Explanation::new(Vec::new(), 2.0), singles, pairs: Vec::new() }.judge(&null)
     };
     assert_eq!(announced(&at(1.9)), ["accel_limit"]);
     assert!(announced(&at(2.1)).is_empty());
 }
 
-/// Two that fit alike; one of them foretells other drives a tenth worse, which is half a tenth in energy.
+/// One that foretells other drives a tenth worse has half a tenth more energy.
 #[test]
-fn what_foretells_worse_is_believed_less() {
-    let losses = [1.0, 1.02, 3.0, 3.0, 3.0];
-    let mut weighed = weighed(4.0, &losses, None);
-    assert_eq!(announced(&weighed.judge(&null(("wind", 0.0)))), ["steer_lag"]);
-    weighed.singles[0].foretold_loss = 1.1;
-    assert!((weighed.singles[0].energy() - 0.5 * 1.1_f64.ln()).abs() < 1e-12);
-    assert_eq!(announced(&weighed.judge(&null(("wind", 0.0)))), ["steer_delay"]);
+fn what_foretells_worse_has_more_energy() {
+    let own = Explanation { foretold_loss: 1.1, ..Explanation::new(vec![effect("steer_lag", 0.2)], 1.0) };
+    assert!((own.energy() - 0.5 * 1.1_f64.ln()).abs() < 1e-12);
 }
 
 proptest! {
@@ -200,6 +196,10 @@ proptest! {
         let n = before.credible_set.len();
         prop_assert!(n >= 1);
         prop_assert_eq!(&before.credible_set, &names[..n]);
+        // Of what is probable without none, the set holds 0.85 or has four names.
+        let of = |ids: &[&str]| ids.iter().map(|id| score(&before, id)).sum::<f64>();
+        prop_assert!(n == 4 || of(&names[..n]) >= 0.85 * of(&names) - 1e-9);
+        prop_assert!(n == 1 || of(&names[..n - 1]) < 0.85 * of(&names));
         let rival = order[4];
         let mut changed = losses.clone();
         changed[rival] *= worse;

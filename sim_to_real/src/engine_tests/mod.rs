@@ -7,6 +7,7 @@ mod conditions;
 mod constancy;
 mod intervals;
 mod judgement;
+mod score_test;
 
 use crate::drive::testing::{log, machine};
 use crate::drive::{Drive, STEP_S};

@@ -155,7 +155,7 @@ mod tests {
     use super::*;
 
     fn ranked(ids: &[&str]) -> Vec<Ranked> {
-        ids.iter().map(|id| Ranked { id: (*id).to_owned(), score: 0.1 }).collect()
+        ids.iter().map(|id| Ranked { id: (*id).to_owned(), score: 0.1, support: None }).collect()
     }
 
     #[test]

@@ -264,7 +264,10 @@ impl Selection {
     /// Every effect that can be judged; a half where the gain is the price.
     pub(crate) fn ranking(&self) -> Vec<Ranked> {
         let score = |gain: f64| 1.0 / (1.0 + (-(gain - PRICE) / (0.25 * PRICE)).exp());
-        self.gains.iter().map(|(id, gain)| Ranked { id: (*id).to_owned(), score: score(*gain) }).collect()
+        self.gains
+            .iter()
+            .map(|(id, gain)| Ranked { id: (*id).to_owned(), score: score(*gain), support: None })
+            .collect()
     }
 
     /// Error without and with the selected effects on each group, by parameters from the others.

@@ -1,0 +1,177 @@
+//! Score tests: how strongly drives ask for an effect, in units of how much nominal drives ask for it by chance.
+//!
+//! An effect changes the residuals from r to r - d. Over a stretch of a drive, with the loss's weights w, the score of its
+//! size is the sum of w d r and the information the sum of w d d; their ratio is the size that the stretch asks for, 1 at
+//! a fit. Were residuals independent, the squared score would be as large as the information. They are not: what it is
+//! larger by on nominal drives, in the direction of this very effect, is its dispersion (quasi-likelihood, McCullagh and
+//! Nelder 1989, section 9.2).
+
+use crate::answer::Support;
+use crate::calibration::distance;
+use crate::causes::{Explanation, Trial};
+use crate::least_squares::weight;
+use crate::rollout::PER_START;
+use bicycle::Effect;
+use serde::{Deserialize, Serialize};
+
+/// Rollouts of a stretch, ten seconds.
+const STRETCH: usize = 50;
+/// The usual dispersion of a machine counts like that many stretches.
+const USUAL_STRETCHES: f64 = 8.0;
+/// Information of a stretch that tells next to nothing, in shares of the mean of all.
+const LEAST_INFORMATION: f64 = 0.01;
+/// Information below which nominal drives say nothing of how much of an effect they ask for.
+const SILENT: f64 = 5.0;
+
+/// Score and information of the size of an effect.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Score {
+    pub(crate) score: f64,
+    pub(crate) information: f64,
+}
+
+impl Score {
+    fn of(before: &[f32], after: &[f32]) -> Self {
+        let add = |sum: Self, (before, after): (&f32, &f32)| {
+            let weighed = weight(*before) * (before - after);
+            Self {
+                score: sum.score + f64::from(weighed * before),
+                information: sum.information + f64::from(weighed * (before - after)),
+            }
+        };
+        before.iter().zip(after).fold(Self::default(), add)
+    }
+
+    /// Of the effect as it is and not of its size: what nominal drives ask for, up to all of it either way.
+    fn amplitude(self) -> f64 {
+        (self.score / self.information.max(SILENT)).clamp(-1.0, 1.0)
+    }
+
+    /// In standard deviations of chance; what is asked for the other way round is nothing.
+    fn strength(self, dispersion: f64) -> f64 {
+        let chance = (self.information * dispersion).sqrt().max(f64::MIN_POSITIVE);
+        (self.score / chance).max(0.0)
+    }
+}
+
+impl<'a> std::iter::Sum<&'a Self> for Score {
+    fn sum<I: Iterator<Item = &'a Self>>(scores: I) -> Self {
+        scores.fold(Self::default(), |sum, own| Self {
+            score: sum.score + own.score,
+            information: sum.information + own.information,
+        })
+    }
+}
+
+/// Of every stretch of every drive, the last one of a drive up to half as long again.
+fn scores(trial: &Trial<'_>, before: &[f32], causes: &[Effect]) -> Vec<Vec<Score>> {
+    let after = trial.judged_residuals(causes);
+    let mut start = 0;
+    let mut by_drive = Vec::new();
+    for drive in trial.comparison.drives() {
+        let n = drive.starts.len();
+        let ends = (1..(n / STRETCH).max(1)).map(|k| k * STRETCH).chain([n]);
+        let mut from = 0;
+        let of = |to: usize| {
+            let rows = (start + from) * PER_START..(start + to) * PER_START;
+            from = to;
+            Score::of(&before[rows.clone()], &after[rows])
+        };
+        by_drive.push(ends.map(of).collect());
+        start += n;
+    }
+    by_drive
+}
+
+/// Squared score over information, mean over stretches, once the scores are those of what is left beside an amplitude.
+fn dispersion(stretches: &[Score], amplitude: f64) -> f64 {
+    let n = stretches.len().max(1) as f64;
+    let least = LEAST_INFORMATION * stretches.iter().map(|own| own.information).sum::<f64>() / n;
+    let ratio = |own: &Score| {
+        let left = own.score - amplitude * own.information;
+        left * left / own.information.max(least).max(f64::MIN_POSITIVE)
+    };
+    stretches.iter().map(ratio).sum::<f64>() / n
+}
+
+/// An effect of some size on nominal drives that the model was not calibrated on.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+struct Nominal {
+    effect: Effect,
+    dispersion: f64,
+    n_stretches: f64,
+    amplitude: f64,
+}
+
+/// How strongly nominal drives ask for effects that they do not have.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Chance {
+    /// Every effect at every size that the catalogue tries.
+    nominal: Vec<Nominal>,
+    /// Dispersion of the median effect.
+    usual: f64,
+}
+
+/// Scores of effects at the sizes that the catalogue tries on one drive.
+pub(crate) type TriedScores = Vec<(Effect, Vec<Score>)>;
+
+/// On a nominal drive that the model was not calibrated on.
+pub(crate) fn tried_scores(trial: &Trial<'_>, effects: &[Effect]) -> TriedScores {
+    let before = trial.judged_residuals(&[]);
+    effects.iter().map(|&own| (own, scores(trial, &before, &[own]).concat())).collect()
+}
+
+impl Chance {
+    /// Of nominal drives, each with the same effects in the same order.
+    pub(crate) fn of(drives: &[&TriedScores]) -> Self {
+        let Some(first) = drives.first() else { return Self::default() };
+        let effect = |place: usize| {
+            let stretches: Vec<Score> = drives.iter().flat_map(|drive| drive[place].1.clone()).collect();
+            Nominal {
+                effect: first[place].0,
+                dispersion: dispersion(&stretches, 0.0),
+                n_stretches: stretches.len() as f64,
+                amplitude: stretches.iter().sum::<Score>().amplitude(),
+            }
+        };
+        let nominal: Vec<Nominal> = (0..first.len()).map(effect).collect();
+        let mut told: Vec<f64> =
+            nominal.iter().map(|own| own.dispersion).filter(|dispersion| *dispersion > 0.0).collect();
+        told.sort_by(f64::total_cmp);
+        let usual = told.get(told.len() / 2).copied().unwrap_or(1.0);
+        Self { nominal, usual }
+    }
+
+    /// What supports a single effect, given the loss without it.
+    pub(crate) fn support(
+        &self,
+        (trial, before): (&Trial<'_>, &[f32]),
+        own: &Explanation,
+        none: f64,
+    ) -> Support {
+        let by_drive = scores(trial, before, &own.causes);
+        let stretches = by_drive.concat();
+        let whole: Score = stretches.iter().sum();
+        let own_amplitude = whole.score / whole.information.max(f64::MIN_POSITIVE);
+        let nominal = own.causes.first().and_then(|cause| self.nearest(cause));
+        let told = nominal.map_or([0.0; 2], |nominal| [nominal.dispersion, nominal.n_stretches]);
+        let n = stretches.len() as f64;
+        let sum =
+            USUAL_STRETCHES * self.usual + told[0] * told[1] + dispersion(&stretches, own_amplitude) * n;
+        let dispersion = sum / (USUAL_STRETCHES + told[1] + n);
+        let strength = |scores: &Vec<Score>| scores.iter().sum::<Score>().strength(dispersion);
+        Support {
+            gain: none.ln() - own.energy(),
+            strength: whole.strength(dispersion),
+            least_strength: by_drive.iter().map(strength).fold(f64::INFINITY, f64::min),
+            nominal: nominal.map_or(0.0, |nominal| nominal.amplitude),
+        }
+    }
+
+    /// The same effect at the size nearest to this one.
+    fn nearest(&self, effect: &Effect) -> Option<&Nominal> {
+        let of_kind =
+            self.nominal.iter().filter(|own| own.effect.description().id == effect.description().id);
+        of_kind.min_by(|a, b| distance(&a.effect, effect).total_cmp(&distance(&b.effect, effect)))
+    }
+}
