@@ -95,8 +95,7 @@ impl Weighed {
     pub(crate) fn judge(&self, null: &Null) -> Judgement {
         let all = self.by_logit(null);
         let (logit, likeliest) = all[0];
-        let would_show = likeliest.causes.iter().all(|own| null.limits_shown.would_show(own));
-        let best = if would_show && logit > BEYOND_DOUBT.ln() { likeliest } else { &self.none };
+        let best = if logit > BEYOND_DOUBT.ln() { likeliest } else { &self.none };
         let (verdict, announced) = self.verdict(best, null);
         Judgement { verdict, announced, ranking: self.ranking(&all), credible_set: self.credible_set(best) }
     }
@@ -104,15 +103,16 @@ impl Weighed {
     /// Every explanation with its logit over none, the largest first.
     fn by_logit(&self, null: &Null) -> Vec<(f64, &Explanation)> {
         let singles = self.singles.iter().map(|single| (logit(&single.support), &single.explanation));
-        let mut all: Vec<(f64, &Explanation)> = singles.chain([(0.0, &self.none)]).collect();
+        let mut all: Vec<(f64, &Explanation)> = singles.collect();
         if let Some(first) = self.singles.first() {
-            let known = all.iter().map(|(logit, _)| *logit).fold(f64::NEG_INFINITY, f64::max);
+            let of_one = all.iter().map(|(logit, _)| *logit).fold(f64::NEG_INFINITY, f64::max);
             let of_two = |pair: &Explanation| {
-                known + (first.explanation.energy() - pair.energy() - price(pair, null)) / TEMPERATURE
+                of_one + (first.explanation.energy() - pair.energy() - price(pair, null)) / TEMPERATURE
             };
             let pairs = self.pairs.iter().filter(|pair| self.takes_its_share(pair));
             all.extend(pairs.map(|pair| (of_two(pair), pair)));
         }
+        all.push((0.0, &self.none));
         all.sort_by(|a, b| b.0.total_cmp(&a.0));
         all
     }

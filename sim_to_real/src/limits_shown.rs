@@ -1,5 +1,4 @@
-//! Limits that nominal drives would have shown: one that they never came near may be the simulator's as well, and is no
-//! sign of a gap.
+//! Limits that nominal drives would have shown: one that they never came near may be the simulator's as well.
 
 use crate::calibration::is_limit;
 use crate::causes::{Trial, candidates};
@@ -50,8 +49,17 @@ impl LimitsShown {
         Self(shown)
     }
 
-    /// Whether nominal drives would have shown an effect: whatever limits nothing they would.
-    pub(crate) fn would_show(&self, effect: &Effect) -> bool {
-        self.0.get(effect.description().id).is_none_or(|limit| effect.values()[0] <= *limit)
+    /// In words, that nominal drives never came near a limit; nothing of one that they would have shown, nor of what limits
+    /// nothing.
+    pub(crate) fn doubt(&self, effect: &Effect) -> Option<String> {
+        let description = effect.description();
+        let limit = self.0.get(description.id)?;
+        (effect.values()[0] > *limit).then(|| {
+            format!(
+                "the simulator's own drives never came near this {}: it may have it as well, which a drive of the \
+                 simulator that does would tell",
+                description.cause
+            )
+        })
     }
 }

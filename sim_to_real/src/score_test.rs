@@ -175,3 +175,53 @@ impl Chance {
         of_kind.min_by(|a, b| distance(&a.effect, effect).total_cmp(&distance(&b.effect, effect)))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn stretches(scores: &[f64], information: f64) -> Vec<Score> {
+        scores.iter().map(|&score| Score { score, information }).collect()
+    }
+
+    /// Scores of 4 on an information of 4 are (4^2) / 4 = 4 times what chance is without dispersion; where 3 of each is
+    /// that of an amplitude of 0.75, 1 is left, a quarter.
+    #[test]
+    fn dispersion_is_the_squared_score_over_the_information() {
+        assert!((dispersion(&stretches(&[4.0, -4.0, 4.0], 4.0), 0.0) - 4.0).abs() < 1e-12);
+        assert!((dispersion(&stretches(&[4.0, 2.0], 4.0), 0.75) - 0.25).abs() < 1e-12);
+        assert!(dispersion(&stretches(&[0.0; 3], 0.0), 0.0).abs() < 1e-12);
+    }
+
+    /// 12 over the root of 9 times 4; what is asked for the other way round is nothing.
+    #[test]
+    fn strength_is_in_standard_deviations_of_chance() {
+        let of = |score: f64| Score { score, information: 9.0 }.strength(4.0);
+        assert!((of(12.0) - 2.0).abs() < 1e-12);
+        assert!(of(-12.0).abs() < 1e-12);
+    }
+
+    /// Two residuals of 1 and -2 that an effect takes to 0.5 and -2: w d r is 0.5 and w d d is 0.25 of the first alone,
+    /// w being 1 / sqrt(1 + 1 / 9).
+    #[test]
+    fn a_score_is_that_of_what_changes() {
+        let own = Score::of(&[1.0, -2.0], &[0.5, -2.0]);
+        let weight = 0.9_f64.sqrt();
+        assert!((own.score - 0.5 * weight).abs() < 1e-6 && (own.information - 0.25 * weight).abs() < 1e-6);
+    }
+
+    /// Nominal drives say of the nearest size what the effect is like to them: of 0.9 and 1.1 tried, 0.92 is as 0.9.
+    #[test]
+    fn the_nearest_size_tells() {
+        let sizes = [0.9, 1.1].map(|ratio| crate::engine_tests::effect("steer_gain", ratio));
+        let tried: TriedScores = sizes
+            .iter()
+            .zip([2.0, 6.0])
+            .map(|(own, score)| (*own, stretches(&[score, -score], 4.0)))
+            .collect();
+        let chance = Chance::of(&[&tried, &tried]);
+        let nearest = chance.nearest(&crate::engine_tests::effect("steer_gain", 0.92));
+        assert!(nearest.is_some_and(|own| (own.dispersion - 1.0).abs() < 1e-12 && own.effect == sizes[0]));
+        assert!(chance.nearest(&crate::engine_tests::effect("steer_lag", 0.2)).is_none());
+    }
+}

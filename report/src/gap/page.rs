@@ -83,14 +83,15 @@ fn effects(answer: &Answer) -> String {
     }
     let row = |effect: &NamedEffect| {
         format!(
-            "<tr><td><code>{}</code></td><td>{}</td><td>{}</td></tr>\n",
+            "<tr><td><code>{}</code></td><td>{}</td><td>{}</td><td>{}</td></tr>\n",
             escaped(&effect.id),
             escaped(text::meaning(&effect.id)),
-            escaped(&text::parameters(effect))
+            escaped(&text::parameters(effect)),
+            escaped(&text::asked_for(answer, &effect.id).unwrap_or_default())
         )
     };
     let rows: String = answer.effects.iter().map(row).collect();
-    html::table(&["effect", "what it is", "value (90 %)"], &rows) + &credible(answer)
+    html::table(&["effect", "what it is", "value (90 %)", "how strongly"], &rows) + &credible(answer)
 }
 
 /// What else would explain the drives.

@@ -14,7 +14,7 @@ const ROW: f64 = 40.0;
 /// Effects that are shown: at least and at most so many, in between those that are likelier than this.
 const LEAST: usize = 5;
 const MOST: usize = 14;
-const LIKELY: f64 = 5e-4;
+const LIKELY: f64 = 5e-3;
 
 pub(super) fn page(answer: &Answer) -> Option<Canvas> {
     let n_likely = answer.ranking.iter().take_while(|ranked| ranked.score >= LIKELY).count();

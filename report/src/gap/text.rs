@@ -167,6 +167,7 @@ pub fn text(answer: &Answer, drives: &str) -> String {
     for effect in &answer.effects {
         lines.push(format!("    {}  {}", effect.id, parameters(effect)));
         lines.push(format!("      {}", meaning(&effect.id)));
+        lines.extend(asked_for(answer, &effect.id).map(|told| format!("      {told}")));
     }
     if matches!(answer.verdict, Verdict::Effects | Verdict::EffectsAndUnknown) {
         lines.extend(others(answer).map(|(what, names)| format!("    {what}: {}", names.join(", "))));
@@ -179,6 +180,15 @@ pub fn text(answer: &Answer, drives: &str) -> String {
     lines.extend(answer.in_simulator.iter().flat_map(|own| named("yours", &in_simulator(own))));
     lines.extend(named("next", &answer.advice));
     lines.join("\n") + "\n"
+}
+
+/// How strongly the drives ask for an effect, where that is known.
+pub(crate) fn asked_for(answer: &Answer, id: &str) -> Option<String> {
+    let support = answer.ranking.iter().find(|ranked| ranked.id == id)?.support?;
+    Some(format!(
+        "alone it is asked for {:.1} times as strongly as by chance, in every drive at least {:.1} times",
+        support.strength, support.least_strength
+    ))
 }
 
 /// What else would explain the gap: in which sense, and the names.
@@ -215,6 +225,8 @@ mod tests {
             "    steer_lag  time constant 0.210 s (0.180 to 0.240)",
         ];
         assert_eq!(&lines[..5], expected);
+        let strength = "      alone it is asked for 9.3 times as strongly as by chance, in every drive at least 8.1 times";
+        assert_eq!(lines[6], strength);
         let rest = [
             "    Alone, these explain the drives about as well: steer_delay",
             "  where    change of steering 0.61",
@@ -225,7 +237,7 @@ mod tests {
             "           error after 2 s: yaw 0.0210 to 0.00400 rad, displacement along 0.200 to 0.0500 m",
             "  next     drive steps of the steering & sines",
         ];
-        assert_eq!(lines[6..], rest);
+        assert_eq!(lines[7..], rest);
     }
 
     #[test]
