@@ -63,7 +63,6 @@ pub fn diagnose(baseline: &Baseline, machine: &Machine, real: &[DriveLog]) -> Re
     let mut judgement = weighed.judge(&baseline.null);
     let causes = judgement.announced.clone();
     let mut notes = of_evidence(&all);
-    notes.extend(causes.iter().filter_map(|cause| baseline.null.limits_shown.doubt(cause)));
     if drives.len() > 1
         && let Some(changing) = changing(baseline, &drives, &in_question(&weighed, &causes))
     {

@@ -95,7 +95,8 @@ impl Weighed {
     pub(crate) fn judge(&self, null: &Null) -> Judgement {
         let all = self.by_logit(null);
         let (logit, likeliest) = all[0];
-        let best = if logit > BEYOND_DOUBT.ln() { likeliest } else { &self.none };
+        let would_show = likeliest.causes.iter().all(|own| null.limits_shown.would_show(own));
+        let best = if would_show && logit > BEYOND_DOUBT.ln() { likeliest } else { &self.none };
         let (verdict, announced) = self.verdict(best, null);
         Judgement { verdict, announced, ranking: self.ranking(&all), credible_set: self.credible_set(best) }
     }

@@ -1,4 +1,5 @@
-//! Limits that nominal drives would have shown: one that they never came near may be the simulator's as well.
+//! Limits that nominal drives would have shown: one that they never came near may be the simulator's as well, and is no
+//! sign of a gap.
 
 use crate::calibration::is_limit;
 use crate::causes::{Trial, candidates};
@@ -49,17 +50,8 @@ impl LimitsShown {
         Self(shown)
     }
 
-    /// In words, that nominal drives never came near a limit; nothing of one that they would have shown, nor of what limits
-    /// nothing.
-    pub(crate) fn doubt(&self, effect: &Effect) -> Option<String> {
-        let description = effect.description();
-        let limit = self.0.get(description.id)?;
-        (effect.values()[0] > *limit).then(|| {
-            format!(
-                "the simulator's own drives never came near this {}: it may have it as well, which a drive of the \
-                 simulator that does would tell",
-                description.cause
-            )
-        })
+    /// Whether nominal drives would have shown an effect: whatever limits nothing they would.
+    pub(crate) fn would_show(&self, effect: &Effect) -> bool {
+        self.0.get(effect.description().id).is_none_or(|limit| effect.values()[0] <= *limit)
     }
 }

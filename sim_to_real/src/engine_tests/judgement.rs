@@ -149,14 +149,17 @@ fn what_exceeds_the_floor_and_a_share_of_the_gap_is_unknown() {
     assert_eq!(judged(1.2, &[1.2; 5], None).verdict, Verdict::None);
 }
 
-/// A limit of 2.1 where nominal drives would have shown one of 2.0 and less; of a lag nothing is to be shown.
+/// Where the best explanation is a limit that nominal drives never came near, nothing is announced, and no rival takes its
+/// place.
 #[test]
-fn a_limit_that_nominal_drives_would_not_have_shown_is_doubted() {
-    let shown = LimitsShown::from_iter([("accel_limit", 2.0)]);
-    assert_eq!(shown.doubt(&effect("accel_limit", 1.9)), None);
-    assert_eq!(shown.doubt(&effect("steer_lag", 0.2)), None);
-    let doubt = shown.doubt(&effect("accel_limit", 2.1)).unwrap();
-    assert!(doubt.starts_with("the simulator's own drives never came near this accel_limit"), "{doubt}");
+fn a_limit_that_nominal_drives_would_not_have_shown_is_no_sign() {
+    let at = |value: f64| {
+        let singles = vec![single(("accel_limit", value), 2.0, 1.0), single(SINGLES[0], 2.0, 1.1)];
+        let null = Null { limits_shown: LimitsShown::from_iter([("accel_limit", 2.0)]), ..null() };
+        Weighed { none: Explanation::new(Vec::new(), 2.0), singles, pairs: Vec::new() }.judge(&null)
+    };
+    assert_eq!(announced(&at(1.9)), ["accel_limit"]);
+    assert!(announced(&at(2.1)).is_empty());
 }
 
 /// One that foretells other drives a tenth worse has half a tenth more energy.
