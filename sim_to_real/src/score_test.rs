@@ -20,6 +20,8 @@ const STRETCH: usize = 50;
 const USUAL_STRETCHES: f64 = 8.0;
 /// Information of a stretch that tells next to nothing, in shares of the mean of all.
 const LEAST_INFORMATION: f64 = 0.01;
+/// Gain of an effect with which a rollout runs away beyond all numbers.
+const RAN_AWAY: f64 = -100.0;
 /// Information below which nominal drives say nothing of how much of an effect they ask for.
 const SILENT: f64 = 5.0;
 
@@ -31,15 +33,15 @@ pub(crate) struct Score {
 }
 
 impl Score {
+    /// What runs away beyond all numbers tells nothing.
     fn of(before: &[f32], after: &[f32]) -> Self {
         let add = |sum: Self, (before, after): (&f32, &f32)| {
-            let weighed = weight(*before) * (before - after);
-            Self {
-                score: sum.score + f64::from(weighed * before),
-                information: sum.information + f64::from(weighed * (before - after)),
-            }
+            let [before, change] = [*before, before - after].map(f64::from);
+            let weighed = f64::from(weight(before as f32)) * change;
+            Self { score: sum.score + weighed * before, information: sum.information + weighed * change }
         };
-        before.iter().zip(after).fold(Self::default(), add)
+        let told = before.iter().zip(after).filter(|(before, after)| (*before - *after).is_finite());
+        told.fold(Self::default(), add)
     }
 
     /// Of the effect as it is and not of its size: what nominal drives ask for, up to all of it either way.
@@ -161,7 +163,7 @@ impl Chance {
         let dispersion = sum / (USUAL_STRETCHES + told[1] + n);
         let strength = |scores: &Vec<Score>| scores.iter().sum::<Score>().strength(dispersion);
         Support {
-            gain: none.ln() - own.energy(),
+            gain: (none.ln() - own.energy()).max(RAN_AWAY),
             strength: whole.strength(dispersion),
             least_strength: by_drive.iter().map(strength).fold(f64::INFINITY, f64::min),
             nominal: nominal.map_or(0.0, |nominal| nominal.amplitude),
@@ -208,6 +210,15 @@ mod tests {
         let own = Score::of(&[1.0, -2.0], &[0.5, -2.0]);
         let weight = 0.9_f64.sqrt();
         assert!((own.score - 0.5 * weight).abs() < 1e-6 && (own.information - 0.25 * weight).abs() < 1e-6);
+    }
+
+    /// Nothing of what ran away is counted, and what is left is a number.
+    #[test]
+    fn what_ran_away_tells_nothing() {
+        let own = Score::of(&[1.0, 1.0, 1.0], &[0.5, f32::INFINITY, f32::NAN]);
+        assert_eq!(own, Score::of(&[1.0], &[0.5]));
+        let far = Score::of(&[1.0], &[f32::MAX]);
+        assert!(far.information.is_finite() && far.amplitude().is_finite() && far.strength(1.0).is_finite());
     }
 
     /// Nominal drives say of the nearest size what the effect is like to them: of 0.9 and 1.1 tried, 0.92 is as 0.9.
