@@ -19,7 +19,7 @@ use bicycle::{Effect, Model};
 use mppi::Isa;
 use scenarios::{Deviation, TestMachine};
 use serde::Serialize;
-use sim_to_real::Verdict;
+use sim_to_real::{ControllerModel, Verdict};
 
 use crate::closed_loop::DriveError;
 use crate::sweep::in_turns;
@@ -31,9 +31,9 @@ use rocks::Rocks;
 pub use row::{Differences, Row};
 use track::Track;
 
-/// Name of the machine around which the one that drives is drawn.
-pub const BASE: &str = "pietra_full_size";
-/// Seed of the machine, its hills and the recorded drives.
+/// Vehicles around which machines are drawn.
+pub const VEHICLES: [&str; 3] = ["pietra_full_size", "sedan", "buggy_fifth"];
+/// Seed of the machine, its hills and the simulator's drives.
 const MACHINE_SEED: u64 = 1;
 /// Lateral acceleration that plans on the course may ask for, over the grip of firm ground [-].
 const LATERAL_SHARE: f64 = 0.75;
@@ -43,11 +43,13 @@ const PLAN_AHEAD: usize = 5;
 /// Which drives to do.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Request {
+    /// Name of the vehicle around which the machine is drawn, one of [`VEHICLES`].
+    pub vehicle: &'static str,
     /// Where to drive.
     pub grounds: Vec<Ground>,
     /// What the plant does and its simulator does not.
     pub gaps: Vec<Gap>,
-    /// Seeds 1 to this.
+    /// Seeds 1 to this; each has recorded drives and a diagnosis of its own.
     pub n_seeds: u64,
     /// Drives at a time.
     pub n_threads: usize,
@@ -67,10 +69,14 @@ impl Request {
 pub struct Found {
     /// What the plant does and its simulator does not.
     pub gap: Gap,
+    /// Of the recorded drives.
+    pub seed: u64,
     /// What the diagnosis says.
     pub verdict: Verdict,
-    /// The effects that it adds to the calibrated model.
+    /// The effects that it announces, as they fit the model that it is made with.
     pub found: Vec<Effect>,
+    /// What the controller's model is to hold.
+    pub controller_model: ControllerModel,
     /// The effect that the gap amounts to.
     pub truth: Option<Effect>,
 }
@@ -78,7 +84,7 @@ pub struct Found {
 /// All drives and what they add up to.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Report {
-    /// Name of the machine around which the one that drives is drawn.
+    /// Name of the vehicle around which the machine is drawn.
     pub vehicle: &'static str,
     /// Seeds were 1 to this.
     pub n_seeds: u64,
@@ -161,20 +167,22 @@ pub fn measure(request: &Request, told: impl Fn(Progress<'_>) + Sync) -> Result<
     }
     let pool = rayon::ThreadPoolBuilder::new().num_threads(request.n_threads).build()?;
     let fleet = Fleet::prepare(request)?;
-    let diagnoses = in_turns(&pool, request.gaps.len(), |index| {
-        let found = fleet.diagnose(request.gaps[index])?;
+    let recorded: Vec<(Gap, u64)> =
+        request.gaps.iter().flat_map(|&gap| (1..=request.n_seeds).map(move |seed| (gap, seed))).collect();
+    let diagnoses = in_turns(&pool, recorded.len(), |index| {
+        let found = fleet.diagnose(recorded[index])?;
         told(Progress::Diagnosed(&found));
         Ok::<_, ClosedLoopError>(found)
     })?;
     let drives = in_turns(&pool, jobs.len(), |index| {
         let job = jobs[index];
-        let found = diagnoses.iter().find(|found| found.gap == job.gap);
-        let drive = fleet.drive(job, found.map_or(&[][..], |found| &found.found))?;
+        let found = recorded.iter().position(|of| *of == (job.gap, job.seed)).unwrap_or(0);
+        let drive = fleet.drive(job, &diagnoses[found].controller_model)?;
         told(Progress::Drove(&drive));
         Ok::<_, ClosedLoopError>(drive)
     })?;
     Ok(Report {
-        vehicle: BASE,
+        vehicle: request.vehicle,
         n_seeds: request.n_seeds,
         isa: request.isa,
         calibrated: fleet.simulator.calibrated().to_vec(),
@@ -229,8 +237,8 @@ struct Fleet {
 
 impl Fleet {
     fn prepare(request: &Request) -> Result<Self, ClosedLoopError> {
-        let base = formats::read_vehicle(BASE)?;
-        let machine = TestMachine::draw(&base, BASE, MACHINE_SEED)?;
+        let base = formats::read_vehicle(request.vehicle)?;
+        let machine = TestMachine::draw(&base, request.vehicle, MACHINE_SEED)?;
         Ok(Self {
             simulator: Simulator::calibrate(&machine, MACHINE_SEED)?,
             track: Track::new(&machine, request.isa),
@@ -239,13 +247,13 @@ impl Fleet {
         })
     }
 
-    fn diagnose(&self, gap: Gap) -> Result<Found, ClosedLoopError> {
-        let (verdict, found) = self.simulator.diagnose(&self.machine, gap, MACHINE_SEED)?;
-        Ok(Found { gap, verdict, found, truth: gap.effect(&self.machine) })
+    fn diagnose(&self, (gap, seed): (Gap, u64)) -> Result<Found, ClosedLoopError> {
+        let (verdict, found, controller_model) = self.simulator.diagnose(&self.machine, gap, seed)?;
+        Ok(Found { gap, seed, verdict, found, controller_model, truth: gap.effect(&self.machine) })
     }
 
-    fn drive(&self, job: Job, found: &[Effect]) -> Result<DriveResult, ClosedLoopError> {
-        let model: Model = self.simulator.model(&self.machine, (job.belief, job.gap), found);
+    fn drive(&self, job: Job, repaired: &ControllerModel) -> Result<DriveResult, ClosedLoopError> {
+        let model: Model = self.simulator.model(&self.machine, job, repaired);
         let deviations: Vec<Deviation> = job.gap.deviation(&self.machine).into_iter().collect();
         match job.ground {
             Ground::Course => self.track.drive(&self.machine, job, (model, &deviations)),

@@ -9,6 +9,7 @@ mod follow_up;
 mod ground;
 mod in_simulator;
 mod machine;
+mod model_file;
 mod outputs;
 mod progress;
 mod request;

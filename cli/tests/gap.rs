@@ -206,8 +206,31 @@ fn a_case_is_diagnosed_verified_written_and_applied() {
 
     succeed(folder.path(), &["apply", "a.json", "--model", "rc_car", "--out", "m.toml"]);
     let model = formats::read_model(&path("m.toml")).unwrap();
-    assert_eq!(model.effects.len(), answer.effects.len());
-    assert_eq!(model.effects[0].values()[0], lag.value);
+    let measured = answer.controller_model.unwrap();
+    assert_eq!(model.effects, measured.effects());
+    let [before, after] = measured.foretold_losses.unwrap();
+    assert!(after < 0.5 * before, "{before} {after}");
+    let own = measured.causes.iter().find(|cause| cause.description().id == "steer_lag").unwrap();
+    assert!((own.values()[0] - LATE_S).abs() < 0.1, "{own:?}");
+}
+
+/// Beside a model that has most of the lag already, the rest of it is found, and nothing that was calibrated comes in.
+#[test]
+fn a_diagnosis_begins_with_the_users_own_model() {
+    let folder = tempfile::tempdir().unwrap();
+    let case = write_case(folder.path(), "late", &drive("real_heldout.csv"));
+    let mut model = bicycle::Model::of(&formats::read_vehicle("sedan").unwrap());
+    model.effects = vec![bicycle::Effect::from_values("steer_lag", [0.2, 0.0, 0.0, 0.0]).unwrap()];
+    fs::write(folder.path().join("own.toml"), formats::model_text(&model).unwrap()).unwrap();
+    let words = ["diagnose", &case, "--model", "own.toml", "--json", "a.json", "--baseline-cache", &cache()];
+    succeed(folder.path(), &words);
+    let answer: Answer = serde_json::from_slice(&fs::read(folder.path().join("a.json")).unwrap()).unwrap();
+    let measured = answer.controller_model.unwrap();
+    let lags: Vec<f64> = measured.effects().iter().map(|own| own.values()[0]).collect();
+    assert!((1..=2).contains(&lags.len()), "{measured:?}");
+    assert!(lags.iter().sum::<f64>() > 0.25, "{measured:?}");
+    let told = refuse(folder.path(), &["diagnose", &case, "--model", "none.toml"]);
+    assert!(told.contains("none.toml: expected a readable text file"), "{told}");
 }
 
 #[test]

@@ -10,8 +10,8 @@ use pyo3::types::{PyDict, PyString};
 use report::gap::Told;
 use sim_to_real::{
     Answer, Baseline, Case, Diagnosed, Diagnosis, Drives, InSimulatorDiagnosis, InSimulatorError, Manoeuvre,
-    PartUnknown, Verification, WithoutSimulator, decide_in_simulator, diagnose_without_simulator, own_runs,
-    repaired, verify,
+    PartUnknown, Verification, WithoutSimulator, controller_model, decide_in_simulator,
+    diagnose_without_simulator, own_runs, repaired, verify,
 };
 
 use crate::arrays::kind;
@@ -136,6 +136,9 @@ impl Work {
         let advised = interruptible(py, move || {
             let (baseline, diagnosis) = &*found;
             let mut answer = diagnosis.answer(&name);
+            let Case { machine, real, .. } = &*case;
+            let model = controller_model((baseline, diagnosis), machine, &real.logs, None)?;
+            answer.controller_model = Some(model);
             let diagnosed = Diagnosed { case: &case, baseline, diagnosis };
             diagnosed.advise(&mut answer, MANOEUVRE).map(|manoeuvre| (answer, manoeuvre))
         })?;
@@ -339,7 +342,7 @@ pub fn manoeuvre<'py>(py: Python<'py>, report: &GapReport) -> PyResult<Option<Bo
     frame(py, columns).map(Some)
 }
 
-/// A controller's model with the effects that a diagnosis announced after its own.
+/// A controller's model with what a diagnosis measured for it: what was calibrated, and what was announced as it fits there.
 ///
 /// diagnosis: a `GapReport`, its answer as a dict, or the path of an answer.json. model: a `Model` or a `Vehicle`. force:
 /// whether to apply what is named where a part of the gap stays unknown, for which it may stand. Returns a `Model`; raises

@@ -1187,7 +1187,7 @@ class Vehicle:
         """A dict of what stands in the file."""
 
 def apply(diagnosis: GapReport | dict[str, Any] | _Path, model: Model | Vehicle, *, force: bool=False) -> Model:
-    """A controller's model with the effects that a diagnosis announced after its own.
+    """A controller's model with what a diagnosis measured for it: what was calibrated, and what was announced as it fits there.
 
     diagnosis: a `GapReport`, its answer as a dict, or the path of an answer.json. model: a `Model` or a `Vehicle`. force:
     whether to apply what is named where a part of the gap stays unknown, for which it may stand. Returns a `Model`; raises

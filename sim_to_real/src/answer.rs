@@ -1,5 +1,6 @@
 //! The answer of a diagnosis, as it stands in files.
 
+use crate::controller_model::ControllerModel;
 use crate::findings::QuantityError;
 use crate::in_simulator::InSimulator;
 use crate::steering::Steering;
@@ -168,6 +169,9 @@ pub struct Answer {
     /// Errors on the held-out drives in metres, radians and their rates; empty until they are opened.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub errors_by_quantity: Vec<QuantityError>,
+    /// What a controller's model is to hold, where that was measured.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub controller_model: Option<ControllerModel>,
     /// What the user's own simulator says, where it was asked.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub in_simulator: Option<InSimulator>,
@@ -203,6 +207,7 @@ mod tests {
             places: Vec::new(),
             shrink: shrink(Some(3.0), 1.5),
             errors_by_quantity: Vec::new(),
+            controller_model: None,
             in_simulator: None,
             advice: Vec::new(),
         };

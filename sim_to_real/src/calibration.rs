@@ -61,6 +61,8 @@ const GRAVITY: [&str; 2] = ["slope_gravity", "cross_slope"];
 const COMPENSATION: &str = "hill_compensation";
 /// What makes the turning lead the steering.
 const SWING: &str = "steer_swing";
+/// What a controller's model does without.
+const NOT_FOR_CONTROL: [&str; 3] = [SWING, "drive_limit", "drive_power"];
 /// Below this share of gravity along the slope the simulator is one of a plane.
 const PLANE: f64 = 0.25;
 
@@ -97,11 +99,13 @@ pub(crate) fn recalibrated(
 }
 
 /// The ordinary effects with a proportional speed loop, fitted to drives in units of their yardstick, for a controller's
-/// model: without what answers a change of a command by more than that change, which sampled plans would exploit.
+/// model: without what answers a change of a command by more than that change, which sampled plans would exploit, and
+/// without limits of the drive. Those that a proportional loop asks for are of the ramp in the machine's own speed
+/// controller; taken for limits of its force they would forbid slopes that it climbs.
 pub(crate) fn proportional(wheelbase_m: f64, drives: &[&Drive], yardstick: &Yardstick) -> Vec<Effect> {
     let comparison = Comparison::new(wheelbase_m, drives.to_vec(), yardstick);
     let mut start = ordinary(CONTROLLERS[0]);
-    start.retain(|effect| effect.description().id != SWING);
+    start.retain(|effect| !NOT_FOR_CONTROL.contains(&effect.description().id));
     let effects = fitted(&comparison, start, &[COMPENSATION]);
     let whole = with_whole_gravity(effects);
     refined(&comparison, &whole, &held_of(&whole))
@@ -221,6 +225,21 @@ fn refined(comparison: &Comparison<'_>, effects: &[Effect], held: &[&str]) -> Ve
 pub(crate) fn free_coordinates(effects: &[Effect]) -> Vec<Coordinate> {
     let held = held_of(effects);
     effects.iter().flat_map(|own| coordinates_of(own, held.contains(&own.description().id))).collect()
+}
+
+/// The same, each pulled to where it is.
+pub(crate) fn held_coordinates(effects: &[Effect]) -> Vec<Coordinate> {
+    let held = |own: Coordinate| Coordinate { pull: own.pull.map(|_| (own.start, PULL)), ..own };
+    free_coordinates(effects).into_iter().map(held).collect()
+}
+
+/// The parameters of causes: pulled to nothing.
+pub(crate) fn coordinates_of_causes(causes: &[Effect]) -> Vec<Coordinate> {
+    let of = |cause: &Effect| {
+        let parameters = cause.description().parameters.iter().zip(cause.values());
+        parameters.map(|(parameter, value)| coordinate(parameter, value, None)).collect::<Vec<_>>()
+    };
+    causes.iter().flat_map(of).collect()
 }
 
 fn coordinates_of(effect: &Effect, is_held: bool) -> Vec<Coordinate> {

@@ -1,6 +1,6 @@
 //! Causes: effects of the catalogue added to the calibrated model, fitted to real drives.
 
-use crate::calibration::{coordinate, is_limit, with_values};
+use crate::calibration::{coordinate, coordinates_of_causes, is_limit, with_values};
 use crate::comparison::Comparison;
 use crate::least_squares::{fit, mean_loss};
 use crate::nuisance::{Information, Nuisance};
@@ -108,16 +108,7 @@ impl<'a> Trial<'a> {
     /// All parameters of all causes fitted together.
     pub(crate) fn refined(&self, explanation: Explanation) -> Explanation {
         let causes = explanation.causes;
-        let coordinates: Vec<_> = causes
-            .iter()
-            .flat_map(|cause| {
-                let parameters = cause.description().parameters;
-                parameters
-                    .iter()
-                    .zip(cause.values())
-                    .map(|(parameter, value)| coordinate(parameter, value, None))
-            })
-            .collect();
+        let coordinates = coordinates_of_causes(&causes);
         let found = fit(&coordinates, |values| self.judged_residuals(&with_values(&causes, values)));
         if found.loss < explanation.loss {
             Explanation::new(with_values(&causes, &found.values), found.loss)

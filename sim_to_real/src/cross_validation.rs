@@ -24,14 +24,18 @@ impl CrossValidation {
         Self { drives: if let [drive] = drives { drive.halves() } else { drives.to_vec() } }
     }
 
+    /// Every drive with the others before it.
+    pub(crate) fn folds(&self) -> Vec<(Vec<&Drive>, &Drive)> {
+        let others = |out: usize| {
+            self.drives.iter().enumerate().filter(move |(i, _)| *i != out).map(|(_, drive)| drive).collect()
+        };
+        self.drives.iter().enumerate().map(|(out, own)| (others(out), own)).collect()
+    }
+
     /// Every split with both of its sides on trial.
     pub(crate) fn splits<'a>(&'a self, on_trial: impl Fn(&[&'a Drive]) -> Trial<'a>) -> Vec<Split<'a>> {
-        let split = |out: usize| {
-            let rest: Vec<&Drive> =
-                self.drives.iter().enumerate().filter(|(i, _)| *i != out).map(|(_, drive)| drive).collect();
-            Split { learned: on_trial(&rest), own: on_trial(&[&self.drives[out]]) }
-        };
-        (0..self.drives.len()).map(split).collect()
+        let folds = self.folds().into_iter();
+        folds.map(|(rest, own)| Split { learned: on_trial(&rest), own: on_trial(&[own]) }).collect()
     }
 }
 

@@ -1,7 +1,7 @@
 //! Intervals of the announced parameters, by leaving out one stretch of the real drives after the other.
 
 use crate::answer::{Estimate, NamedEffect};
-use crate::calibration::{coordinate, is_limit, value_at, with_values};
+use crate::calibration::{coordinates_of_causes, is_limit, value_at, with_values};
 use crate::causes::Trial;
 use crate::least_squares::Linearised;
 use bicycle::Effect;
@@ -21,11 +21,7 @@ const CONFORMAL: f64 = 1.7;
 /// The effects with their parameters and 90 % intervals.
 pub(crate) fn named_effects(trial: &Trial<'_>, causes: &[Effect]) -> Vec<NamedEffect> {
     let parameters: Vec<_> = causes.iter().flat_map(|cause| cause.description().parameters).collect();
-    let centre: Vec<_> = causes
-        .iter()
-        .flat_map(|cause| cause.description().parameters.iter().zip(cause.values()))
-        .map(|(parameter, value)| coordinate(parameter, value, None))
-        .collect();
+    let centre = coordinates_of_causes(causes);
     let places: Vec<f64> = centre.iter().map(|coordinate| coordinate.start).collect();
     let linearised =
         Linearised::at(&centre, &places, |values| trial.judged_residuals(&with_values(causes, values)));

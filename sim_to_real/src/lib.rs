@@ -21,6 +21,7 @@ mod causes;
 mod comparison;
 mod conditions;
 mod constancy;
+mod controller_model;
 mod cross_validation;
 mod diagnosis;
 mod drive;
@@ -64,6 +65,7 @@ pub use answer::{
 };
 pub use baseline::{Baseline, GapError};
 pub use causes::composed;
+pub use controller_model::{ControllerModel, controller_model};
 pub use diagnosis::{Diagnosis, diagnose};
 pub use drive::DriveError;
 pub use drives::{Case, Drives, DrivesError};

@@ -49,7 +49,8 @@ pub enum PartUnknown {
     Applied,
 }
 
-/// A model with the announced effects after its own, and these alone, as they fit it.
+/// A model with what the answer measured for a controller in place of its own effects, else with the announced effects
+/// after its own; and the announced ones alone, as they fit it.
 ///
 /// # Errors
 /// An answer that names no effect, or none that a controller's model can hold.
@@ -64,12 +65,17 @@ pub fn repaired(
     if answer.verdict == Verdict::EffectsAndUnknown && part_unknown == PartUnknown::Refused {
         return Err(RepairError::PartUnknown);
     }
-    let effects = announced(answer)?.into_iter().map(|effect| fitting(effect, model));
-    let effects: Vec<Effect> = effects.collect();
-    let mut repaired = model.clone();
-    repaired.effects.extend(&effects);
+    let announced = announced(answer)?;
+    let (effects, added) = match &answer.controller_model {
+        Some(measured) => (measured.effects(), measured.causes.clone()),
+        None => {
+            let added: Vec<Effect> = announced.into_iter().map(|effect| fitting(effect, model)).collect();
+            ([&model.effects[..], &added].concat(), added)
+        }
+    };
+    let repaired = Model { effects, ..model.clone() };
     repaired.validate().map_err(|error| refused(error.to_string()))?;
-    Ok((repaired, effects))
+    Ok((repaired, added))
 }
 
 fn refused(problem: String) -> RepairError {
@@ -145,6 +151,7 @@ mod tests {
             places: Vec::new(),
             shrink: Shrink::default(),
             errors_by_quantity: Vec::new(),
+            controller_model: None,
             in_simulator: None,
             advice: Vec::new(),
         }

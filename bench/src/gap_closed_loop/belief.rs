@@ -3,10 +3,12 @@
 use bicycle::{DriveLog, Effect, Model};
 use scenarios::{Style, TestMachine, seed_of, test_drive};
 use serde::{Deserialize, Serialize};
-use sim_to_real::{Baseline, GroundMap, Machine, SensorNoise, Verdict, composed, diagnose};
+use sim_to_real::{
+    Baseline, ControllerModel, GroundMap, Machine, SensorNoise, Verdict, composed, controller_model, diagnose,
+};
 
 use super::gap::{Gap, friction};
-use super::{ClosedLoopError, LATERAL_SHARE};
+use super::{ClosedLoopError, Job, LATERAL_SHARE};
 
 /// What the controller believes of the vehicle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
@@ -16,7 +18,7 @@ pub enum Belief {
     Bare,
     /// What the simulator's own drives have calibrated.
     Nominal,
-    /// The same with the effects that the diagnosis found in recorded drives of the plant.
+    /// What the diagnosis of recorded drives of the plant makes of it.
     Repaired,
     /// The same with the effect that the gap amounts to.
     True,
@@ -66,13 +68,14 @@ impl Simulator {
         self.baseline.effects_for_control()
     }
 
-    /// Drives the plant with a gap, and diagnoses what was recorded.
+    /// Drives the plant with a gap, and diagnoses what was recorded: the verdict, what was announced, and the controller's
+    /// model.
     pub fn diagnose(
         &self,
         machine: &TestMachine,
         gap: Gap,
         seed: u64,
-    ) -> Result<(Verdict, Vec<Effect>), ClosedLoopError> {
+    ) -> Result<(Verdict, Vec<Effect>, ControllerModel), ClosedLoopError> {
         let deviations: Vec<_> = gap.deviation(machine).into_iter().collect();
         let drive = |(k, &style): (usize, &Style)| {
             let seed = seed_of(seed, &[REAL, gap as u64, k as u64]);
@@ -80,21 +83,22 @@ impl Simulator {
         };
         let logs: Vec<DriveLog> = REAL_STYLES.iter().enumerate().map(drive).collect::<Result<_, _>>()?;
         let diagnosis = diagnose(&self.baseline, &self.described, &logs)?;
-        Ok((diagnosis.answer(gap.name()).verdict, diagnosis.effects().to_vec()))
+        let model = controller_model((&self.baseline, &diagnosis), &self.described, &logs, None)?;
+        Ok((diagnosis.answer(gap.name()).verdict, diagnosis.effects().to_vec(), model))
     }
 
     /// The controller's model.
-    pub fn model(&self, machine: &TestMachine, (belief, gap): (Belief, Gap), found: &[Effect]) -> Model {
+    pub fn model(&self, machine: &TestMachine, job: Job, repaired: &ControllerModel) -> Model {
         let mut model = Model::of(&machine.vehicle);
         model.limits.lateral_acceleration_max_mps2 = LATERAL_SHARE * 9.81 * friction(machine);
-        let truth: Vec<Effect> = gap.effect(machine).into_iter().collect();
-        let causes = match belief {
-            Belief::Bare => return model,
-            Belief::Nominal => &[],
-            Belief::Repaired => found,
-            Belief::True => &truth[..],
+        let nominal = self.baseline.effects_for_control();
+        let truth: Vec<Effect> = job.gap.effect(machine).into_iter().collect();
+        model.effects = match job.belief {
+            Belief::Bare => Vec::new(),
+            Belief::Nominal => nominal.to_vec(),
+            Belief::Repaired => repaired.effects(),
+            Belief::True => composed(nominal, &truth),
         };
-        model.effects = composed(self.baseline.effects_for_control(), causes);
         model
     }
 }

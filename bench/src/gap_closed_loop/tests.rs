@@ -7,6 +7,7 @@ use super::*;
 
 fn request() -> Request {
     Request {
+        vehicle: VEHICLES[0],
         grounds: Ground::ALL.to_vec(),
         gaps: vec![Gap::None, Gap::SteerLag],
         n_seeds: 2,

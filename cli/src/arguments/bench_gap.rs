@@ -1,6 +1,6 @@
 //! `surefoot bench gap`.
 
-use bench::gap_closed_loop::{Gap, Ground};
+use bench::gap_closed_loop::{Gap, Ground, VEHICLES};
 use clap::Args;
 
 use super::values;
@@ -9,6 +9,10 @@ use super::values;
 #[derive(Args, Clone, Debug)]
 #[command(after_long_help = AFTER_HELP)]
 pub struct BenchGapArguments {
+    /// Vehicle around which the machine that drives is drawn
+    #[arg(long, value_name = "VEHICLE", value_parser = vehicle, default_value = "pietra_full_size")]
+    pub vehicle: &'static str,
+
     /// Where to drive, separated by commas
     #[arg(long, value_name = "GROUND,..", value_delimiter = ',', value_parser = ground,
           default_value = "course,rocks")]
@@ -19,7 +23,7 @@ pub struct BenchGapArguments {
           default_value = "none,steer_delay,steer_lag,understeer,speed_lag,friction,slope_gravity")]
     pub gaps: Vec<Gap>,
 
-    /// Drive with the seeds 1 to N, at most 1000
+    /// Drive with the seeds 1 to N, at most 1000; each has recorded drives and a diagnosis of its own
     #[arg(long, value_name = "N", value_parser = values::seed_count, default_value = "10",
           allow_hyphen_values = true)]
     pub seeds: u64,
@@ -31,6 +35,11 @@ pub struct BenchGapArguments {
     /// Where the results go.
     #[command(flatten)]
     pub results: super::ResultArguments,
+}
+
+fn vehicle(word: &str) -> Result<&'static str, String> {
+    let known = VEHICLES.into_iter().find(|vehicle| *vehicle == word);
+    known.ok_or_else(|| format!("expected one of {}, found {word:?}", VEHICLES.join(", ")))
 }
 
 fn ground(word: &str) -> Result<Ground, String> {
@@ -53,7 +62,7 @@ drive`, three times as fast as there. The exit code is 0 once all drives are don
 const AFTER_HELP: &str = "\
 Writes gap_closed_loop.png, and gap_closed_loop.json with
   calibrated  effects of the model that the simulator's drives calibrate
-  diagnoses   of each gap: verdict, what was found, the truth
+  diagnoses   of each gap and seed: verdict, what was found, the controller's model, the truth
   rows        of each ground, gap and belief: n, n_goal, wilson; time_s, across_rms_m, across_max_m, speed_rms_mps,
               plan_rms_m as value, low, high (95 %, bootstrap over the seeds); less_nominal: the same less the nominal
               model's, seed by seed

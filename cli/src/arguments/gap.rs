@@ -122,6 +122,12 @@ pub struct GapDiagnoseArguments {
     #[arg(long, value_name = "ERROR", value_parser = values::limit, allow_hyphen_values = true)]
     pub fail_above: Option<f64>,
 
+    /// The controller's model to begin with (TOML), else the one that the simulator's drives calibrate
+    ///
+    /// What is announced is fitted beside its effects for `surefoot gap apply`; what is announced does not depend on it.
+    #[arg(long, value_name = "IN.toml")]
+    pub model: Option<PathBuf>,
+
     /// Who decides besides the calibrated model.
     #[command(flatten)]
     pub simulator: GapSimulatorArguments,
@@ -251,10 +257,13 @@ Exit codes:
   3  the diagnosis stands and the gap is larger than --fail-above; one line says by how much";
 
 const APPLY_ABOUT: &str = "\
-Puts the effects that a diagnosis announced into the controller's model and never into the plant.
+Puts what a diagnosis measured for the controller into its model, and never into the plant.
 
-An effect with the same id that the model already holds stays, and the new one acts after it: the diagnosis was made \
-with the old model in place. Effects of the sensors correct the state estimate.";
+Wheelbase and limits stay. The effects become those that were measured: what the simulator's drives calibrated, or the \
+effects of the model that `gap diagnose --model` began with, and beside them what was announced as it fits there; or \
+all of it fitted to the robot's drives, or none of it, whichever foretells drives best that were left out. An older \
+answer, which measured none, has its effects put after those of the model. Effects of the sensors correct the state \
+estimate.";
 
 const APPLY_AFTER_HELP: &str = "\
 Examples:
@@ -262,7 +271,7 @@ Examples:
   surefoot drive --model repaired.toml --seed 3
 
 Exit codes:
-  0  the model was written; 'none' writes the model as it was
+  0  the model was written; 'none' adds nothing to what was calibrated
   1  it was not; one line on standard error says why
   2  bad usage or input, a diagnosis that names no effect ('unknown'), or one that leaves
      a part unknown ('effects_and_unknown') without --force";

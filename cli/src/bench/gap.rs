@@ -8,6 +8,7 @@ use crate::{UsageError, progress};
 
 pub(crate) fn run_gap(arguments: &BenchGapArguments) -> anyhow::Result<()> {
     let request = Request {
+        vehicle: arguments.vehicle,
         grounds: arguments.grounds.clone(),
         gaps: arguments.gaps.clone(),
         n_seeds: arguments.seeds,
@@ -17,7 +18,9 @@ pub(crate) fn run_gap(arguments: &BenchGapArguments) -> anyhow::Result<()> {
     arguments.results.prepare()?;
     let bar = progress::bar(request.n_drives() as u64, "{pos}/{len} drives, {eta} left   {msg}");
     let measured = measure(&request, |progress| match progress {
-        Progress::Diagnosed(found) => bar.set_message(format!("diagnosed {}", found.gap.name())),
+        Progress::Diagnosed(found) => {
+            bar.set_message(format!("diagnosed {}, seed {}", found.gap.name(), found.seed))
+        }
         Progress::Drove(drive) => {
             bar.set_message(report::gap_closed_loop::drive_text(drive));
             bar.inc(1);

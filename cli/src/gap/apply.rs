@@ -3,16 +3,16 @@
 use std::path::Path;
 
 use bicycle::{Effect, Model};
-use formats::ConfigText;
 use sim_to_real::{Answer, PartUnknown, RepairError, Verdict, repaired};
 
+use super::model_file;
 use crate::UsageError;
 use crate::arguments::GapApplyArguments;
 
 pub(super) fn run(arguments: &GapApplyArguments) -> anyhow::Result<()> {
     let answer = read_answer(&arguments.diagnosis)?;
     let part_unknown = if arguments.force { PartUnknown::Applied } else { PartUnknown::Refused };
-    let found = repaired(&read_model(&arguments.model)?, &answer, part_unknown);
+    let found = repaired(&model_file::read(&arguments.model)?, &answer, part_unknown);
     let (model, effects) = found.map_err(|error| {
         let told = if error == RepairError::PartUnknown { FORCED.to_owned() } else { error.to_string() };
         UsageError(format!("{}: {told}", arguments.diagnosis.display()))
@@ -36,19 +36,6 @@ fn read_answer(path: &Path) -> Result<Answer, UsageError> {
         .map_err(|error| UsageError(format!("{file}: expected the answer of gap diagnose, found: {error}")))
 }
 
-/// A model's file, or the model that a vehicle's file or a shipped vehicle stands for.
-fn read_model(path: &Path) -> Result<Model, UsageError> {
-    let name = path.to_string_lossy();
-    let is_shipped = formats::shipped_vehicle_names().any(|shipped| shipped == name);
-    let vehicle = || formats::read_vehicle(&name).map(|vehicle| Model::of(&vehicle));
-    if is_shipped {
-        return vehicle().map_err(UsageError::from_input);
-    }
-    let text = ConfigText::read(path).map_err(UsageError::from_input)?;
-    let model = if text.has_key("geometry") { vehicle() } else { formats::parse_model(&text) };
-    model.map_err(UsageError::from_input)
-}
-
 /// The model as TOML, with a line that says where its effects come from.
 fn text(model: &Model, answer: &Answer, before: &Path) -> anyhow::Result<String> {
     let ids: Vec<_> = answer.effects.iter().map(|effect| effect.id.as_str()).collect();
@@ -59,7 +46,9 @@ fn text(model: &Model, answer: &Answer, before: &Path) -> anyhow::Result<String>
 
 fn say(answer: &Answer, effects: &[Effect], out: &Path) {
     println!("  {}", out.display());
-    if effects.is_empty() {
+    if let Some(measured) = &answer.controller_model {
+        println!("  {} effects of the model that was measured", measured.nominal.len());
+    } else if effects.is_empty() {
         println!("  The diagnosis found no gap: the model is as it was.");
     }
     for effect in effects {
@@ -67,6 +56,11 @@ fn say(answer: &Answer, effects: &[Effect], out: &Path) {
         let values = description.parameters.iter().zip(effect.values());
         let values = values.map(|(p, value)| format!("{} = {value:.4} {}", p.name, p.unit));
         println!("  + {}  {}", description.id, values.collect::<Vec<_>>().join(", "));
+    }
+    if let Some([before, after]) = answer.controller_model.as_ref().and_then(|own| own.foretold_losses) {
+        println!(
+            "  Drives that it was not fitted to cost it {after:.2} instead of {before:.2} (mean robust loss)."
+        );
     }
     if answer.verdict == Verdict::EffectsAndUnknown {
         println!("  A part of the gap is none of the catalogue and remains.");

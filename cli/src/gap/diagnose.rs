@@ -2,17 +2,18 @@
 
 use std::path::Path;
 
+use bicycle::Model;
 use report::gap::Told;
 use sim_to_real::{
-    Answer, Baseline, Case, Diagnosed, Diagnosis, Drives, Verification, WithoutSimulator, diagnose,
-    diagnose_without_simulator, verify,
+    Answer, Baseline, Case, ControllerModel, Diagnosed, Diagnosis, Drives, Verification, WithoutSimulator,
+    controller_model, diagnose, diagnose_without_simulator, verify,
 };
 
 use super::in_simulator::Decider;
 use super::outputs::Outputs;
 use super::progress::Progress;
 use super::request::Request;
-use super::{baseline, drives, follow_up, machine};
+use super::{baseline, drives, follow_up, machine, model_file};
 use crate::arguments::GapDiagnoseArguments;
 use crate::{LimitExceeded, UsageError, summary};
 
@@ -29,6 +30,7 @@ pub(super) fn run(arguments: &GapDiagnoseArguments) -> anyhow::Result<()> {
             UsageError("--fail-above: expected held-out drives to measure, found none".to_owned()).into()
         );
     }
+    let own_model = arguments.model.as_deref().map(model_file::read).transpose()?;
     let outputs = Outputs::prepare(arguments)?;
     let mut doubts = request.doubtful_names()?;
     let case = read(&request, &mut doubts)?;
@@ -37,6 +39,7 @@ pub(super) fn run(arguments: &GapDiagnoseArguments) -> anyhow::Result<()> {
     let (baseline, diagnosis) = diagnosed_against(&case, folder.as_deref(), &mut doubts)?;
     let mut predicted = diagnosis.answer(request.name.as_deref().unwrap_or(&case.machine.name));
     let diagnosed = Diagnosed { case: &case, baseline: &baseline, diagnosis: &diagnosis };
+    predicted.controller_model = Some(for_controller(&diagnosed, own_model.as_ref())?);
     follow_up::advise(&diagnosed, &mut predicted, (arguments, &outputs))?;
     decider.decide(&mut predicted, &case.machine, (&case.sim.logs, &case.real.logs))?;
     outputs.write_json("prediction.json", &predicted)?;
@@ -95,6 +98,15 @@ fn diagnosed_against(
     let diagnosis = diagnose(&baseline, machine, &real.logs);
     searching.finish();
     Ok((baseline, diagnosis.map_err(UsageError::from_input)?))
+}
+
+/// What a controller's model is to hold: what was announced, fitted beside the effects of the user's own model or beside
+/// those that the simulator's drives calibrated.
+fn for_controller(diagnosed: &Diagnosed<'_>, own: Option<&Model>) -> Result<ControllerModel, UsageError> {
+    let Diagnosed { case, baseline, diagnosis } = *diagnosed;
+    let effects = own.map(|model| &model.effects[..]);
+    controller_model((baseline, diagnosis), &case.machine, &case.real.logs, effects)
+        .map_err(UsageError::from_input)
 }
 
 fn read(request: &Request, doubts: &mut Vec<String>) -> Result<Case, UsageError> {

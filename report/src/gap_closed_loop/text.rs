@@ -1,7 +1,8 @@
 //! The closed-loop table for a terminal.
 
-use bench::gap_closed_loop::{DriveResult, Report, Row};
+use bench::gap_closed_loop::{Belief, DriveResult, Found, Report, Row};
 use bench::statistics::Mean;
+use std::collections::BTreeMap;
 
 /// A drive in a line.
 pub fn drive_text(drive: &DriveResult) -> String {
@@ -13,18 +14,50 @@ pub fn drive_text(drive: &DriveResult) -> String {
 /// What was found in the recorded drives, and the table.
 pub fn text(report: &Report) -> String {
     let mut told = String::from("  found in the recorded drives\n");
-    for found in &report.diagnoses {
-        let effects: Vec<String> = found.found.iter().map(effect_text).collect();
-        let effects = if effects.is_empty() { "nothing".to_owned() } else { effects.join(", ") };
-        let truth = found.truth.as_ref().map_or("nothing".to_owned(), effect_text);
-        told += &format!("    {:<14} {effects}; true: {truth}\n", found.gap.name());
-    }
+    told.extend(report.diagnoses.chunk_by(|a, b| a.gap == b.gap).map(found_text));
     told += &format!(
         "\n  {:<7}{:<14}{:<10}{:>8}  {:<22}{:<22}{:<22}{:<22}\n",
         "", "gap", "model", "goal", "time [s]", "off course RMS [m]", "speed RMS [m/s]", "plan RMS [m]"
     );
     told.extend(report.rows.iter().map(row_text));
+    told += &format!(
+        "\n  less those of the nominal model's drives, seed by seed\n  {:<7}{:<14}{:<10}{:<24}{:<24}{:<24}\n",
+        "", "gap", "model", "off course RMS [m]", "speed RMS [m/s]", "plan RMS [m]"
+    );
+    let others = report.rows.iter().filter(|row| row.belief > Belief::Nominal);
+    told.extend(others.map(difference_text));
     told
+}
+
+/// What the diagnoses of one gap announce, and how often.
+fn found_text(found: &[Found]) -> String {
+    let names = |found: &Found| {
+        let ids: Vec<&str> = found.found.iter().map(|effect| effect.description().id).collect();
+        if ids.is_empty() { "nothing".to_owned() } else { ids.join(" + ") }
+    };
+    let mut counts: BTreeMap<String, usize> = BTreeMap::new();
+    found.iter().for_each(|found| *counts.entry(names(found)).or_default() += 1);
+    let counts: Vec<String> = counts.iter().map(|(names, n)| format!("{names} ({n})")).collect();
+    let truth = found[0].truth.as_ref().map_or("nothing".to_owned(), effect_text);
+    format!("    {:<14} {}; true: {truth}\n", found[0].gap.name(), counts.join(", "))
+}
+
+fn difference_text(row: &Row) -> String {
+    let Row { ground, gap, belief, less_nominal, .. } = row;
+    let mean = |mean: Option<Mean>| {
+        mean.map_or("-".to_owned(), |mean| {
+            format!("{:+.3} [{:+.3}, {:+.3}]", mean.value, mean.low, mean.high)
+        })
+    };
+    format!(
+        "  {:<7}{:<14}{:<10}{:<24}{:<24}{:<24}\n",
+        ground.name(),
+        gap.name(),
+        belief.name(),
+        mean(less_nominal.across_rms_m),
+        mean(less_nominal.speed_rms_mps),
+        mean(less_nominal.plan_rms_m)
+    )
 }
 
 /// Id and parameters.
@@ -56,7 +89,7 @@ fn row_text(row: &Row) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use bench::gap_closed_loop::{Belief, Differences, Gap, Ground};
+    use bench::gap_closed_loop::{Differences, Gap, Ground};
 
     #[test]
     fn a_row_tells_counts_and_intervals_and_leaves_out_what_there_is_not() {

@@ -5,10 +5,9 @@
 //! With residuals d of a rival, their derivatives J by its parameters and the information M that the drives so far hold
 //! of these, the least sum of squares is d'd - d'J (M + J'J)^-1 J'd. All three sums add up over pieces.
 
-use crate::calibration::{coordinate, with_values};
+use crate::calibration::{coordinates_of_causes, with_values};
 use crate::causes::{Trial, composed};
 use crate::judgement::TEMPERATURE;
-use crate::least_squares::Coordinate;
 use bicycle::Effect;
 use nalgebra::{DMatrix, DVector};
 
@@ -54,7 +53,7 @@ pub(super) struct Sums {
 
 impl Sums {
     pub(super) fn of(trial: &Trial<'_>, causes: &[Effect]) -> Self {
-        let coordinates = coordinates(causes);
+        let coordinates = coordinates_of_causes(causes);
         let here = trial.residuals(causes);
         let columns: Vec<Vec<f32>> = (0..coordinates.len())
             .map(|place| {
@@ -102,15 +101,6 @@ impl Sums {
 
 fn dot(a: &[f32], b: &[f32]) -> f64 {
     a.iter().zip(b).map(|(a, b)| f64::from(*a) * f64::from(*b)).sum()
-}
-
-fn coordinates(causes: &[Effect]) -> Vec<Coordinate> {
-    let each = |cause: &Effect| {
-        let values = cause.values();
-        let parameters = cause.description().parameters.iter().zip(values);
-        parameters.map(|(parameter, value)| coordinate(parameter, value, None)).collect::<Vec<_>>()
-    };
-    causes.iter().flat_map(each).collect()
 }
 
 /// The drives so far in two numbers.

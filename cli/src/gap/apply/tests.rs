@@ -1,7 +1,7 @@
 use std::path::PathBuf;
 
 use bicycle::Effect;
-use sim_to_real::{Estimate, NamedEffect, Shrink, Steering};
+use sim_to_real::{ControllerModel, Estimate, NamedEffect, Shrink, Steering};
 
 use super::*;
 
@@ -34,6 +34,7 @@ fn answer(verdict: Verdict, effects: Vec<NamedEffect>) -> Answer {
             position_error_2s_m: None,
         },
         errors_by_quantity: Vec::new(),
+        controller_model: None,
         in_simulator: None,
         advice: Vec::new(),
     }
@@ -87,18 +88,31 @@ fn a_part_that_is_unknown_is_applied_only_when_forced() {
     assert_eq!(formats::read_model(&file("out.toml")).unwrap().effects.len(), 1);
 }
 
+/// What was measured takes the place of what the model had: the diagnosis was not made with that.
 #[test]
-fn a_vehicle_stands_for_its_model() {
-    let shipped = read_model(Path::new("sedan")).unwrap();
+fn the_model_that_was_measured_takes_the_place_of_the_old_effects() {
     let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("mine.toml");
-    std::fs::write(&path, formats::shipped_vehicle_text("sedan").unwrap()).unwrap();
-    assert_eq!(read_model(&path).unwrap(), shipped);
-    assert!(shipped.effects.is_empty());
-    assert!(
-        read_model(&folder.path().join("none.toml"))
-            .unwrap_err()
-            .0
-            .contains("none.toml: expected a readable")
-    );
+    let file = |name: &str| folder.path().join(name);
+    let effect = |id: &str, value: f64| Effect::from_values(id, [value, 0.0, 0.0, 0.0]).unwrap();
+    let measured = ControllerModel {
+        nominal: vec![effect("speed_scale", 0.98)],
+        causes: vec![effect("steer_lag", 0.21)],
+        foretold_losses: Some([3.0, 1.0]),
+    };
+    let announced = answer(Verdict::Effects, vec![named("steer_lag", &[("time_constant_s", 0.25)])]);
+    let answer = Answer { controller_model: Some(measured.clone()), ..announced };
+    formats::write_json_atomic(&file("a.json"), &answer).unwrap();
+    let mut model = Model::of(&formats::read_vehicle("rc_car").unwrap());
+    model.effects = vec![effect("speed_scale", 0.5)];
+    std::fs::write(file("in.toml"), formats::model_text(&model).unwrap()).unwrap();
+    let arguments = GapApplyArguments {
+        diagnosis: file("a.json"),
+        model: file("in.toml"),
+        out: file("out.toml"),
+        force: false,
+    };
+    run(&arguments).unwrap();
+    let repaired = formats::read_model(&file("out.toml")).unwrap();
+    assert_eq!(repaired.effects, measured.effects());
+    assert_eq!((repaired.wheelbase_m, repaired.limits), (model.wheelbase_m, model.limits));
 }
