@@ -70,8 +70,8 @@ Writes gap_closed_loop.png, and gap_closed_loop.json with
 
 Example, about half an hour:
   surefoot bench gap
-Example, a few seconds:
-  surefoot bench gap --grounds course --gaps none,steer_lag --seeds 2";
+Example, half a minute:
+  surefoot bench gap --vehicle sedan --grounds course --gaps none,steer_lag --seeds 2";
 
 #[cfg(test)]
 mod tests {
@@ -84,6 +84,10 @@ mod tests {
         }
         assert_eq!(ground("rocks"), Ok(Ground::Rocks));
         assert!(gap("lag").unwrap_err().contains("expected one of none, steer_delay"));
+        assert_eq!(vehicle("sedan"), Ok("sedan"));
+        assert!(
+            vehicle("rc_car").unwrap_err().contains("expected one of pietra_full_size, sedan, buggy_fifth")
+        );
         assert!(ground("moon").unwrap_err().contains("expected course or rocks"));
     }
 }

@@ -2,6 +2,7 @@
 
 use bench::gap_closed_loop::{Belief, DriveResult, Found, Report, Row};
 use bench::statistics::Mean;
+use sim_to_real::Verdict;
 use std::collections::BTreeMap;
 
 /// A drive in a line.
@@ -33,7 +34,11 @@ pub fn text(report: &Report) -> String {
 fn found_text(found: &[Found]) -> String {
     let names = |found: &Found| {
         let ids: Vec<&str> = found.found.iter().map(|effect| effect.description().id).collect();
-        if ids.is_empty() { "nothing".to_owned() } else { ids.join(" + ") }
+        match found.verdict {
+            Verdict::None => "nothing".to_owned(),
+            Verdict::Unknown => "unknown".to_owned(),
+            Verdict::Effects | Verdict::EffectsAndUnknown => ids.join(" + "),
+        }
     };
     let mut counts: BTreeMap<String, usize> = BTreeMap::new();
     found.iter().for_each(|found| *counts.entry(names(found)).or_default() += 1);
