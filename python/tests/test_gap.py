@@ -65,8 +65,12 @@ def test_what_was_found_goes_into_a_model(report, tmp_path):
     vehicle = surefoot.Vehicle("rc_car")
     for diagnosis in (report, report.answer, tmp_path / "answer.json"):
         model = gap.apply(diagnosis, vehicle)
+        measured = report.answer["controller_model"]
         forms = [effect["form"] or effect["id"] for effect in report.answer["effects"]]
-        assert [effect["id"] for effect in model.to_dict()["effects"]] == forms
+        assert [effect["id"] for effect in measured["causes"]] == forms
+        effects = model.to_dict()["effects"]
+        assert all(effect in effects for effect in measured["nominal"] + measured["causes"])
+        assert len(effects) == len(measured["nominal"]) + len(measured["causes"])
     with pytest.raises(TypeError, match="model: expected a Model or a Vehicle"):
         gap.apply(report, "rc_car")
     with pytest.raises(TypeError, match="diagnosis: expected a GapReport"):
