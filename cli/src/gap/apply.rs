@@ -17,7 +17,7 @@ pub(super) fn run(arguments: &GapApplyArguments) -> anyhow::Result<()> {
         let told = if error == RepairError::PartUnknown { FORCED.to_owned() } else { error.to_string() };
         UsageError(format!("{}: {told}", arguments.diagnosis.display()))
     })?;
-    let text = text(&model, &answer, &arguments.model)?;
+    let text = text(&model, (&answer, &effects), &arguments.model)?;
     formats::write_bytes_atomic(&arguments.out, text.as_bytes())
         .map_err(|error| UsageError(format!("--out: {}", UsageError::from_input(error))))?;
     say(&answer, &effects, &arguments.out);
@@ -37,17 +37,27 @@ fn read_answer(path: &Path) -> Result<Answer, UsageError> {
 }
 
 /// The model as TOML, with a line that says where its effects come from.
-fn text(model: &Model, answer: &Answer, before: &Path) -> anyhow::Result<String> {
-    let ids: Vec<_> = answer.effects.iter().map(|effect| effect.id.as_str()).collect();
+fn text(model: &Model, (answer, added): (&Answer, &[Effect]), before: &Path) -> anyhow::Result<String> {
+    let ids: Vec<_> = added.iter().map(|effect| effect.description().cause).collect();
     let added = if ids.is_empty() { "nothing".to_owned() } else { ids.join(", ") };
-    let origin = format!("{} with {added} added, as diagnosed in case {}", before.display(), answer.case);
+    let (before, case) = (before.display(), &answer.case);
+    let origin = match &answer.controller_model {
+        Some(_) => format!("{before} with the effects measured in case {case}, {added} added"),
+        None => format!("{before} with {added} added, as diagnosed in case {case}"),
+    };
     Ok(format!("# {}\n{}", origin.replace(['\n', '\r'], " "), formats::model_text(model)?))
 }
 
 fn say(answer: &Answer, effects: &[Effect], out: &Path) {
     println!("  {}", out.display());
     if let Some(measured) = &answer.controller_model {
-        println!("  {} effects of the model that was measured", measured.nominal.len());
+        println!(
+            "  {} effects as they were measured, in place of those of the model",
+            measured.nominal.len()
+        );
+        if measured.causes.is_empty() && !answer.effects.is_empty() {
+            println!("  What was announced is left out: the robot's drives are foretold better without it.");
+        }
     } else if effects.is_empty() {
         println!("  The diagnosis found no gap: the model is as it was.");
     }
