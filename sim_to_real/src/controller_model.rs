@@ -22,7 +22,8 @@ pub struct ControllerModel {
     pub nominal: Vec<Effect>,
     /// The announced effects as they fit it; none where it foretells better without them.
     pub causes: Vec<Effect>,
-    /// Mean robust loss on drives left out, of the model before and of this one [-]; absent where nothing was announced.
+    /// Mean robust loss on drives left out, of the model before and of this one [-]; absent where nothing was announced or
+    /// a prediction ran away.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub foretold_losses: Option<[f64; 2]>,
 }
@@ -100,7 +101,9 @@ impl Repair<'_> {
         let ways = [Fitted::Nothing, Fitted::Causes, Fitted::Everything];
         let losses = ways.map(|way| self.foretold_loss(&left_out, way));
         let best = (0..ways.len()).fold(0, |best, way| if losses[way] < losses[best] { way } else { best });
-        ControllerModel { foretold_losses: Some([losses[0], losses[best]]), ..self.fitted(&all, ways[best]) }
+        // What runs away beyond all numbers has no loss that a file could hold.
+        let told = Some([losses[0], losses[best]]).filter(|told| told.iter().all(|loss| loss.is_finite()));
+        ControllerModel { foretold_losses: told, ..self.fitted(&all, ways[best]) }
     }
 
     /// Mean loss of every drive under the model that the others give.
@@ -139,14 +142,12 @@ mod tests {
     use super::*;
     use crate::engine_tests::{Made, arcs, effect};
 
-    const YARDSTICK: fn() -> Yardstick = Yardstick::rough;
-
     fn made(curvature_ratio: f64, speed_ratio: f64, seed: u64) -> Drive {
         arcs(Made { curvature_ratio, left_ratio: 1.0, speed_ratio }, seed)
     }
 
     fn best(drives: &[Drive], nominal: &[Effect], announced: &[Effect]) -> ControllerModel {
-        Repair { wheelbase_m: 1.0, yardstick: &YARDSTICK(), nominal, announced }.best(drives)
+        Repair { wheelbase_m: 1.0, yardstick: &Yardstick::rough(), nominal, announced }.best(drives)
     }
 
     /// Curvature at 0.8 of the commanded one is found beside a model that has 0.9 of its own: 0.8 / 0.9.
