@@ -174,10 +174,11 @@ pub fn measure(request: &Request, told: impl Fn(Progress<'_>) + Sync) -> Result<
         told(Progress::Diagnosed(&found));
         Ok::<_, ClosedLoopError>(found)
     })?;
+    let repaired: BTreeMap<(Gap, u64), &ControllerModel> =
+        diagnoses.iter().map(|found| ((found.gap, found.seed), &found.controller_model)).collect();
     let drives = in_turns(&pool, jobs.len(), |index| {
         let job = jobs[index];
-        let found = recorded.iter().position(|of| *of == (job.gap, job.seed)).unwrap_or(0);
-        let drive = fleet.drive(job, &diagnoses[found].controller_model)?;
+        let drive = fleet.drive(job, repaired[&(job.gap, job.seed)])?;
         told(Progress::Drove(&drive));
         Ok::<_, ClosedLoopError>(drive)
     })?;

@@ -233,7 +233,7 @@ pub(crate) fn held_coordinates(effects: &[Effect]) -> Vec<Coordinate> {
     free_coordinates(effects).into_iter().map(held).collect()
 }
 
-/// The parameters of causes: pulled to nothing.
+/// The parameters of causes, which nothing pulls anywhere.
 pub(crate) fn coordinates_of_causes(causes: &[Effect]) -> Vec<Coordinate> {
     let of = |cause: &Effect| {
         let parameters = cause.description().parameters.iter().zip(cause.values());

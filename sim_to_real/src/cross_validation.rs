@@ -24,7 +24,7 @@ impl CrossValidation {
         Self { drives: if let [drive] = drives { drive.halves() } else { drives.to_vec() } }
     }
 
-    /// Every drive with the others before it.
+    /// For every drive the others, and it.
     pub(crate) fn folds(&self) -> Vec<(Vec<&Drive>, &Drive)> {
         let others = |out: usize| {
             self.drives.iter().enumerate().filter(move |(i, _)| *i != out).map(|(_, drive)| drive).collect()

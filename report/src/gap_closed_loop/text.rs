@@ -33,7 +33,8 @@ pub fn text(report: &Report) -> String {
 /// What the diagnoses of one gap announce, and how often.
 fn found_text(found: &[Found]) -> String {
     let names = |found: &Found| {
-        let ids: Vec<&str> = found.found.iter().map(|effect| effect.description().id).collect();
+        let mut ids: Vec<&str> = found.found.iter().map(|effect| effect.description().id).collect();
+        ids.sort_unstable();
         match found.verdict {
             Verdict::None => "nothing".to_owned(),
             Verdict::Unknown => "unknown".to_owned(),

@@ -114,5 +114,11 @@ fn the_model_that_was_measured_takes_the_place_of_the_old_effects() {
     run(&arguments).unwrap();
     let repaired = formats::read_model(&file("out.toml")).unwrap();
     assert_eq!(repaired.effects, measured.effects());
+    // What nobody could have measured is refused, and the file of before stays.
+    let text = std::fs::read_to_string(file("a.json")).unwrap();
+    std::fs::write(file("a.json"), text.replace("0.21", "-3.0")).unwrap();
+    let told = run(&arguments).unwrap_err().to_string();
+    assert!(told.contains("a.json: ") && told.contains("time_constant_s: expected "), "{told}");
+    assert_eq!(formats::read_model(&file("out.toml")).unwrap(), repaired);
     assert_eq!((repaired.wheelbase_m, repaired.limits), (model.wheelbase_m, model.limits));
 }
