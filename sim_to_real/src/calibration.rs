@@ -2,7 +2,7 @@
 
 use crate::comparison::{Comparison, Yardstick};
 use crate::drive::Drive;
-use crate::least_squares::{Coordinate, fit};
+use crate::least_squares::{Coordinate, fit, fit_from_several};
 use bicycle::Effect;
 use bicycle::effect::Parameter;
 
@@ -52,7 +52,7 @@ const CONTROLLERS: [&[&str]; 5] = [
 const WORTH_A_CONTROLLER: f64 = 0.02;
 /// The same where no gravity acts: nothing then tells how the controller answers a force, and a less simple one that is
 /// not there would answer it wrongly.
-const WORTH_A_CONTROLLER_ON_A_PLANE: f64 = 0.06;
+const WORTH_A_CONTROLLER_ON_A_PLANE: f64 = 0.03;
 /// Pull towards no effect, so that what the drives leave open stays small.
 const PULL: f64 = 1.5;
 /// Shares of gravity, along and across.
@@ -70,7 +70,7 @@ const PLANE: f64 = 0.25;
 pub(crate) fn calibrated(wheelbase_m: f64, drives: &[&Drive]) -> (Vec<Effect>, Yardstick) {
     let rough = Yardstick::rough();
     let comparison = Comparison::new(wheelbase_m, drives.to_vec(), &rough);
-    let simplest = fitted(&comparison, ordinary(CONTROLLERS[0]), &[COMPENSATION]);
+    let simplest = fitted_from_several(&comparison, ordinary(CONTROLLERS[0]));
     let mut yardstick = Yardstick::of(&comparison.residuals(&simplest), &rough);
     let mut effects = with_controller(&Comparison::new(wheelbase_m, drives.to_vec(), &yardstick), simplest);
     for _ in 0..2 {
@@ -86,6 +86,14 @@ pub(crate) fn calibrated(wheelbase_m: f64, drives: &[&Drive]) -> (Vec<Effect>, Y
 /// The best fit from a start, limits tried first.
 fn fitted(comparison: &Comparison<'_>, start: Vec<Effect>, held: &[&str]) -> Vec<Effect> {
     refined(comparison, &with_limits_tried(comparison, start), held)
+}
+
+/// The best fit from a start and others around it. Between a delay, a play and a lag, or a speed loop and limits of the
+/// drive, lie minima that a fit does not leave: a time constant that has become 0 has no slope any more.
+fn fitted_from_several(comparison: &Comparison<'_>, start: Vec<Effect>) -> Vec<Effect> {
+    let start = with_limits_tried(comparison, start);
+    let residuals = |values: &[f64]| comparison.residuals(&with_values(&start, values));
+    with_values(&start, &fit_from_several(&coordinates_beside(&start, &[COMPENSATION]), residuals).values)
 }
 
 /// The same effects fitted to other drives, from where they are.
@@ -106,7 +114,7 @@ pub(crate) fn proportional(wheelbase_m: f64, drives: &[&Drive], yardstick: &Yard
     let comparison = Comparison::new(wheelbase_m, drives.to_vec(), yardstick);
     let mut start = ordinary(CONTROLLERS[0]);
     start.retain(|effect| !NOT_FOR_CONTROL.contains(&effect.description().id));
-    let effects = fitted(&comparison, start, &[COMPENSATION]);
+    let effects = fitted_from_several(&comparison, start);
     let whole = with_whole_gravity(effects);
     refined(&comparison, &whole, &held_of(&whole))
 }
@@ -215,16 +223,18 @@ fn held_of(effects: &[Effect]) -> Vec<&'static str> {
 
 /// All parameters of all effects fitted together, but for those of effects that are held.
 fn refined(comparison: &Comparison<'_>, effects: &[Effect], held: &[&str]) -> Vec<Effect> {
-    let of = |effect: &Effect| coordinates_of(effect, held.contains(&effect.description().id));
-    let coordinates: Vec<Coordinate> = effects.iter().flat_map(of).collect();
-    let found = fit(&coordinates, |values| comparison.residuals(&with_values(effects, values)));
-    with_values(effects, &found.values)
+    let residuals = |values: &[f64]| comparison.residuals(&with_values(effects, values));
+    with_values(effects, &fit(&coordinates_beside(effects, held), residuals).values)
+}
+
+/// The parameters of effects as they are fitted together; what is held has no room.
+fn coordinates_beside(effects: &[Effect], held: &[&str]) -> Vec<Coordinate> {
+    effects.iter().flat_map(|own| coordinates_of(own, held.contains(&own.description().id))).collect()
 }
 
 /// The parameters of calibrated effects as they would be fitted again; what is held has no room.
 pub(crate) fn free_coordinates(effects: &[Effect]) -> Vec<Coordinate> {
-    let held = held_of(effects);
-    effects.iter().flat_map(|own| coordinates_of(own, held.contains(&own.description().id))).collect()
+    coordinates_beside(effects, &held_of(effects))
 }
 
 /// The same, each pulled to where it is.

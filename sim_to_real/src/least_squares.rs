@@ -1,10 +1,18 @@
 //! Robust non-linear least squares with bounds, for a handful of parameters and thousands of residuals.
 
 use nalgebra::{DMatrix, DVector};
+use rand::{RngExt, SeedableRng};
+use rand_xoshiro::Xoshiro256PlusPlus;
 
 /// Where the pseudo-Huber loss bends from square to straight, in standard deviations.
 const BEND: f64 = 3.0;
 const N_ITERATIONS: usize = 25;
+/// Other starts that are tried for a minimum which is not the next one, within a change that matters of where the fit ended,
+/// and how far each is followed before the best of them is followed to the end.
+const N_OTHER_STARTS: usize = 12;
+const N_ITERATIONS_TRIED: usize = 4;
+/// A minimum of at most this share of the loss is another one, and not the same one found better.
+const ANOTHER_MINIMUM: f64 = 0.98;
 
 /// A parameter of a fit, in the coordinate it is fitted in.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -43,13 +51,54 @@ pub(crate) fn weight(residual: f32) -> f32 {
     1.0 / (1.0 + (residual / BEND as f32).powi(2)).sqrt()
 }
 
+/// The least of the minima next to the start and next to others around it.
+pub(crate) fn fit_from_several(
+    coordinates: &[Coordinate],
+    mut residuals: impl FnMut(&[f64]) -> Vec<f32>,
+) -> Fit {
+    let first = fit(coordinates, &mut residuals);
+    let mut generator = Xoshiro256PlusPlus::seed_from_u64(0);
+    let mut tried = |_| {
+        let start = started_around(coordinates, &first.values, &mut generator);
+        fit_within(N_ITERATIONS_TRIED, &start, &mut residuals)
+    };
+    let best = (0..N_OTHER_STARTS).map(&mut tried).min_by(|a, b| a.loss.total_cmp(&b.loss));
+    let followed = best.map(|best| fit(&started_at(coordinates, &best.values), &mut residuals));
+    followed.filter(|other| other.loss < ANOTHER_MINIMUM * first.loss).unwrap_or(first)
+}
+
+fn started_at(coordinates: &[Coordinate], values: &[f64]) -> Vec<Coordinate> {
+    let at = |(coordinate, &start): (&Coordinate, &f64)| Coordinate { start, ..*coordinate };
+    coordinates.iter().zip(values).map(at).collect()
+}
+
+fn started_around(
+    coordinates: &[Coordinate],
+    values: &[f64],
+    generator: &mut Xoshiro256PlusPlus,
+) -> Vec<Coordinate> {
+    let moved = |(own, value): (&Coordinate, &f64)| {
+        (value + own.scale * generator.random_range(-1.0..1.0)).clamp(own.low, own.high)
+    };
+    let values: Vec<f64> = coordinates.iter().zip(values).map(moved).collect();
+    started_at(coordinates, &values)
+}
+
 /// Levenberg and Marquardt with reweighting; derivatives by differences of a hundredth of a parameter's scale.
-pub(crate) fn fit(coordinates: &[Coordinate], mut residuals: impl FnMut(&[f64]) -> Vec<f32>) -> Fit {
+pub(crate) fn fit(coordinates: &[Coordinate], residuals: impl FnMut(&[f64]) -> Vec<f32>) -> Fit {
+    fit_within(N_ITERATIONS, coordinates, residuals)
+}
+
+fn fit_within(
+    n_iterations: usize,
+    coordinates: &[Coordinate],
+    mut residuals: impl FnMut(&[f64]) -> Vec<f32>,
+) -> Fit {
     let mut values: Vec<f64> = coordinates.iter().map(|coordinate| coordinate.start).collect();
     let mut here = residuals(&values);
     let mut total = total_loss(coordinates, &values, &here);
     let mut damping = 1e-3;
-    for _ in 0..N_ITERATIONS {
+    for _ in 0..n_iterations {
         let linearised = Linearised::around(coordinates, &values, here.clone(), &mut residuals);
         let normal = linearised.normal(0..here.len()).pulled(coordinates, &values);
         let mut improved = false;
@@ -234,6 +283,16 @@ mod tests {
             measured.iter().enumerate().map(at).collect()
         });
         assert!((found.values[0] - 2.0).abs() < 5e-3 && (found.values[1] - 0.7).abs() < 5e-3, "{found:?}");
+    }
+
+    /// (x^2 - 1)^2 + 0.3 x + 1 from x = 1 has its next minimum at 0.96 and a lower one at -1.04: the slope
+    /// 4 x^3 - 4 x + 0.3 is -0.001 and 0.04 less than 0 there.
+    #[test]
+    fn a_lower_minimum_beyond_the_next_is_found() {
+        let valleys = |x: &[f64]| vec![(((x[0] * x[0] - 1.0).powi(2) + 0.3 * x[0] + 1.0) as f32).sqrt(); 8];
+        let start = [Coordinate { scale: 3.0, ..coordinate(1.0) }];
+        assert!((fit(&start, valleys).values[0] - 0.96).abs() < 0.02);
+        assert!((fit_from_several(&start, valleys).values[0] + 1.04).abs() < 0.02);
     }
 
     #[test]

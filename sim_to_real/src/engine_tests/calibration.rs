@@ -8,14 +8,20 @@ use bicycle::{Column, Effect};
 
 const GRAVITY_MPS2: f64 = 9.80665;
 
-/// A controller that asks for (command - speed) / T + J times the integral of that distance.
+/// A controller that asks for (command - speed) / T + J times the integral of that distance, of which it gets what the drive
+/// can give; the integral waits meanwhile.
 #[derive(Clone, Copy)]
 struct Controller {
     time_constant_s: f64,
     integral_per_s2: f64,
     /// Share of gravity that the world lets act along the slope.
     gravity: f64,
+    /// Most that the drive gives, forwards and backwards.
+    limit_mps2: f64,
 }
+
+const STRONG: Controller =
+    Controller { time_constant_s: 0.5, integral_per_s2: 0.0, gravity: 1.0, limit_mps2: f64::INFINITY };
 
 /// Drives of 40 s over hills of 10 %: new speeds every three seconds, a slow weave, small steps of Euler's.
 fn drive(controller: Controller, seed: u64) -> Drive {
@@ -45,9 +51,13 @@ fn drive(controller: Controller, seed: u64) -> Drive {
         for _ in 0..SUBSTEPS {
             let step_s = STEP_S / SUBSTEPS as f64;
             let distance = asked - speed;
-            integral += controller.integral_per_s2 * distance * step_s;
+            let wanted = distance / controller.time_constant_s + integral;
+            let given = wanted.clamp(-controller.limit_mps2, controller.limit_mps2);
+            if (wanted - given) * distance <= 0.0 {
+                integral += controller.integral_per_s2 * distance * step_s;
+            }
             let pull = controller.gravity * GRAVITY_MPS2 * slope * yaw.cos();
-            speed += (distance / controller.time_constant_s + integral - pull) * step_s;
+            speed += (given - pull) * step_s;
             yaw += speed * angle.tan() * step_s;
             x += speed * yaw.cos() * step_s;
             y += speed * yaw.sin() * step_s;
@@ -82,7 +92,7 @@ fn value(effects: &[Effect], id: &str) -> Option<f64> {
 
 #[test]
 fn a_proportional_controller_is_taken_for_no_more() {
-    let effects = found(Controller { time_constant_s: 0.5, integral_per_s2: 0.0, gravity: 1.0 });
+    let effects = found(STRONG);
     assert!((value(&effects, "speed_loop").unwrap() - 0.5).abs() < 0.03, "{effects:?}");
     assert_eq!(value(&effects, "slope_gravity"), Some(1.0));
     assert_eq!(value(&effects, "speed_integral"), None, "{effects:?}");
@@ -90,15 +100,26 @@ fn a_proportional_controller_is_taken_for_no_more() {
 
 #[test]
 fn an_integral_is_found_by_what_it_does_on_slopes() {
-    let effects = found(Controller { time_constant_s: 0.5, integral_per_s2: 3.0, gravity: 1.0 });
+    let effects = found(Controller { integral_per_s2: 3.0, ..STRONG });
     assert!((value(&effects, "speed_integral").unwrap() - 3.0).abs() < 0.6, "{effects:?}");
     assert!((value(&effects, "speed_loop").unwrap() - 0.5).abs() < 0.1, "{effects:?}");
     assert_eq!(value(&effects, "slope_gravity"), Some(1.0));
 }
 
+/// A weak drive that hills of 10 % nearly ask all of. The fit ends first at a loop without any time constant behind limits,
+/// which no force has power over.
+#[test]
+fn a_controller_is_found_behind_the_limits_of_its_drive() {
+    let weak = Controller { time_constant_s: 0.2, integral_per_s2: 5.0, limit_mps2: 1.3, ..STRONG };
+    let effects = found(weak);
+    assert!((value(&effects, "speed_loop").unwrap() - 0.2).abs() < 0.05, "{effects:?}");
+    assert!((value(&effects, "speed_integral").unwrap() - 5.0).abs() < 1.0, "{effects:?}");
+    assert_eq!(value(&effects, "slope_gravity"), Some(1.0));
+}
+
 #[test]
 fn in_a_world_without_gravity_none_is_calibrated() {
-    let effects = found(Controller { time_constant_s: 0.5, integral_per_s2: 0.0, gravity: 0.0 });
+    let effects = found(Controller { gravity: 0.0, ..STRONG });
     assert_eq!(value(&effects, "slope_gravity"), Some(0.0));
     assert!((value(&effects, "speed_loop").unwrap() - 0.5).abs() < 0.03, "{effects:?}");
 }
@@ -106,7 +127,7 @@ fn in_a_world_without_gravity_none_is_calibrated() {
 /// A proportional controller on a plant that feels two fifths of gravity: what is missing is compensated.
 #[test]
 fn a_controller_that_pushes_against_slopes_is_found() {
-    let effects = found(Controller { time_constant_s: 0.5, integral_per_s2: 0.0, gravity: 0.4 });
+    let effects = found(Controller { gravity: 0.4, ..STRONG });
     assert_eq!(value(&effects, "slope_gravity"), Some(1.0));
     assert!((value(&effects, "hill_compensation").unwrap() - 0.6).abs() < 0.05, "{effects:?}");
     assert!((value(&effects, "speed_loop").unwrap() - 0.5).abs() < 0.03, "{effects:?}");
