@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use bicycle::Column;
+use bicycle::{Column, Effect};
 use formats::DriveLogFile;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyString};
@@ -38,8 +38,9 @@ const MANOEUVRE: &str = "manoeuvre.csv";
 /// and then a bare bicycle stands for it; heldout are used for nothing but to verify the answer. vehicle: a `Vehicle`, the
 /// name of one that ships, the path of a vehicle's file, or a dict or a dataclass of it ("name", "wheelbase" [m], and where known
 /// "max_steer" [rad], "max_speed" [m/s], "noise"). columns: a dict from our names to yours, {"vx": "wheel_speed"}.
-/// simulator: a callable that drives commands as your simulator does and so decides; see docs/python.md. name: for the
-/// report.
+/// simulator: a callable that drives commands as your simulator does and so decides; see docs/python.md. model: a `Model` or
+/// a `Vehicle`, the controller's model to begin with, else the one that the simulator's drives calibrate; what is announced
+/// is fitted beside its effects for `apply`, and does not depend on it. name: for the report.
 ///
 /// Returns a `GapReport`. Takes from seconds to minutes; Ctrl-C ends it. Raises `ValueError` for drives that would be
 /// misread, with what gave them away, and what the callable raises.
@@ -52,6 +53,7 @@ const MANOEUVRE: &str = "manoeuvre.csv";
     heldout: "Sequence[_Drive] | None" = None,
     columns: "dict[str, str] | None" = None,
     simulator: "Callable[[dict[str, Any]], Mapping[str, Any]] | None" = None,
+    model: "Model | Vehicle | None" = None,
     name=None,
 ))]
 #[expect(clippy::too_many_arguments, reason = "keywords in Python")]
@@ -63,8 +65,10 @@ pub fn diagnose(
     heldout: Option<&Bound<'_, PyAny>>,
     columns: Option<&Bound<'_, PyDict>>,
     simulator: Option<&Bound<'_, PyAny>>,
+    model: Option<&Bound<'_, PyAny>>,
     name: Option<&str>,
 ) -> PyResult<GapReport> {
+    let own_effects = model.map(|model| Ok::<_, PyErr>(believed(model)?.effects)).transpose()?;
     let (names, mut doubts) = (column_names(columns)?, Vec::new());
     let (sim, real) = (drives("sim", sim, &names, &mut doubts)?, drives("real", real, &names, &mut doubts)?);
     let heldout = heldout.map(|heldout| drives("heldout", heldout, &names, &mut doubts)).transpose()?;
@@ -79,7 +83,7 @@ pub fn diagnose(
     work.try_out(own.as_ref())?;
     let name = name.unwrap_or(&work.case.machine.name).to_owned();
     let found = work.diagnosed(py)?;
-    let (mut answer, manoeuvre) = work.advised(py, &found, name)?;
+    let (mut answer, manoeuvre) = work.advised(py, &found, name, own_effects)?;
     work.decide(own.as_ref(), &mut answer)?;
     let heldout = work.screened_heldout(py, heldout.unwrap_or_default())?;
     work.verified(py, own.as_ref(), Opened { found, answer, manoeuvre, heldout })
@@ -131,13 +135,19 @@ impl Work {
         Ok(Arc::new(found.map_err(refused_value)?))
     }
 
-    fn advised(&self, py: Python<'_>, found: &Found, name: String) -> PyResult<(Answer, Option<Manoeuvre>)> {
+    fn advised(
+        &self,
+        py: Python<'_>,
+        found: &Found,
+        name: String,
+        own_effects: Option<Vec<Effect>>,
+    ) -> PyResult<(Answer, Option<Manoeuvre>)> {
         let (case, found) = (Arc::clone(&self.case), Arc::clone(found));
         let advised = interruptible(py, move || {
             let (baseline, diagnosis) = &*found;
             let mut answer = diagnosis.answer(&name);
             let Case { machine, real, .. } = &*case;
-            let model = controller_model((baseline, diagnosis), machine, &real.logs, None)?;
+            let model = controller_model((baseline, diagnosis), machine, &real.logs, own_effects.as_deref())?;
             answer.controller_model = Some(model);
             let diagnosed = Diagnosed { case: &case, baseline, diagnosis };
             diagnosed.advise(&mut answer, MANOEUVRE).map(|manoeuvre| (answer, manoeuvre))
@@ -350,17 +360,19 @@ pub fn manoeuvre<'py>(py: Python<'py>, report: &GapReport) -> PyResult<Option<Bo
 #[pyfunction]
 #[pyo3(signature = (diagnosis: "GapReport | dict[str, Any] | _Path", model: "Model | Vehicle", *, force=false))]
 pub fn apply(diagnosis: &Bound<'_, PyAny>, model: &Bound<'_, PyAny>, force: bool) -> PyResult<Model> {
-    let model = if let Ok(vehicle) = model.cast::<Vehicle>() {
-        bicycle::Model::of(&vehicle.get().0)
-    } else if let Ok(model) = model.cast::<Model>() {
-        model.get().0.clone()
-    } else {
-        return Err(refused_type("model", "a Model or a Vehicle", kind(model)));
-    };
     let part_unknown = if force { PartUnknown::Applied } else { PartUnknown::Refused };
-    let (model, _) = repaired(&model, &answer(diagnosis)?, part_unknown)
+    let (model, _) = repaired(&believed(model)?, &answer(diagnosis)?, part_unknown)
         .map_err(|error| refused_value(format!("diagnosis: {error}")))?;
     Ok(Model(model))
+}
+
+fn believed(model: &Bound<'_, PyAny>) -> PyResult<bicycle::Model> {
+    if let Ok(vehicle) = model.cast::<Vehicle>() {
+        return Ok(bicycle::Model::of(&vehicle.get().0));
+    }
+    let model =
+        model.cast::<Model>().map_err(|_| refused_type("model", "a Model or a Vehicle", kind(model)))?;
+    Ok(model.get().0.clone())
 }
 
 fn answer(found: &Bound<'_, PyAny>) -> PyResult<Answer> {

@@ -85,6 +85,16 @@ def test_what_was_found_goes_into_a_model(report, tmp_path):
     assert gap.apply(partly, vehicle, force=True) == gap.apply(report, vehicle)
 
 
+def test_the_controllers_own_model_is_begun_with(sim, real, report):
+    delay = {"id": "steer_delay", "delay_s": 0.05}
+    own = surefoot.Model.from_dict({**surefoot.Vehicle("rc_car").model().to_dict(), "effects": [delay]})
+    begun = gap.diagnose(sim, real, VEHICLE, model=own)
+    assert begun.names == report.names
+    assert [effect["id"] for effect in begun.answer["controller_model"]["nominal"]] == ["steer_delay"]
+    with pytest.raises(TypeError, match="model: expected a Model or a Vehicle"):
+        gap.diagnose(sim, real, VEHICLE, model="rc_car")
+
+
 def test_the_manoeuvre_is_a_table_or_nothing(report):
     table = gap.manoeuvre(report)
     if table is not None:
