@@ -1,7 +1,7 @@
 //! The nominal model calibrated on nominal drives, with everything that the catalogue holds of ordinary physics.
 
 use crate::comparison::{Comparison, Yardstick};
-use crate::drive::Drive;
+use crate::drive::{Drive, STEP_S};
 use crate::least_squares::{Coordinate, fit, fit_from_several};
 use bicycle::Effect;
 use bicycle::effect::Parameter;
@@ -59,6 +59,8 @@ const PULL: f64 = 1.5;
 const GRAVITY: [&str; 2] = ["slope_gravity", "cross_slope"];
 /// What a controller does against the first of them.
 const COMPENSATION: &str = "hill_compensation";
+/// What every machine takes its time by.
+const LAGS: [&str; 2] = ["steer_servo", "speed_loop"];
 /// What makes the turning lead the steering.
 const SWING: &str = "steer_swing";
 /// What a controller's model does without.
@@ -70,7 +72,7 @@ const PLANE: f64 = 0.25;
 pub(crate) fn calibrated(wheelbase_m: f64, drives: &[&Drive]) -> (Vec<Effect>, Yardstick) {
     let rough = Yardstick::rough();
     let comparison = Comparison::new(wheelbase_m, drives.to_vec(), &rough);
-    let simplest = fitted_from_several(&comparison, ordinary(CONTROLLERS[0]));
+    let simplest = simplest_fit(&comparison, ordinary(CONTROLLERS[0]));
     let mut yardstick = Yardstick::of(&comparison.residuals(&simplest), &rough);
     let mut effects = with_controller(&Comparison::new(wheelbase_m, drives.to_vec(), &yardstick), simplest);
     for _ in 0..2 {
@@ -88,12 +90,17 @@ fn fitted(comparison: &Comparison<'_>, start: Vec<Effect>, held: &[&str]) -> Vec
     refined(comparison, &with_limits_tried(comparison, start), held)
 }
 
-/// The best fit from a start and others around it. Between a delay, a play and a lag, or a speed loop and limits of the
-/// drive, lie minima that a fit does not leave: a time constant that has become 0 has no slope any more.
-fn fitted_from_several(comparison: &Comparison<'_>, start: Vec<Effect>) -> Vec<Effect> {
-    let start = with_limits_tried(comparison, start);
-    let residuals = |values: &[f64]| comparison.residuals(&with_values(&start, values));
-    with_values(&start, &fit_from_several(&coordinates_beside(&start, &[COMPENSATION]), residuals).values)
+/// The best fit with a proportional loop. Where a time constant of it has become shorter than a step, with which its slope
+/// is gone, from other starts around there too: play can stand for a servo, and limits of the drive for a speed loop, well
+/// enough that a fit stays at a loop which no force has power over.
+fn simplest_fit(comparison: &Comparison<'_>, start: Vec<Effect>) -> Vec<Effect> {
+    let found = fitted(comparison, start, &[COMPENSATION]);
+    let is_gone = |own: &Effect| LAGS.contains(&own.description().id) && own.values()[0] < STEP_S;
+    if !found.iter().any(is_gone) {
+        return found;
+    }
+    let residuals = |values: &[f64]| comparison.residuals(&with_values(&found, values));
+    with_values(&found, &fit_from_several(&coordinates_beside(&found, &[COMPENSATION]), residuals).values)
 }
 
 /// The same effects fitted to other drives, from where they are.
@@ -114,7 +121,7 @@ pub(crate) fn proportional(wheelbase_m: f64, drives: &[&Drive], yardstick: &Yard
     let comparison = Comparison::new(wheelbase_m, drives.to_vec(), yardstick);
     let mut start = ordinary(CONTROLLERS[0]);
     start.retain(|effect| !NOT_FOR_CONTROL.contains(&effect.description().id));
-    let effects = fitted_from_several(&comparison, start);
+    let effects = simplest_fit(&comparison, start);
     let whole = with_whole_gravity(effects);
     refined(&comparison, &whole, &held_of(&whole))
 }
