@@ -59,7 +59,7 @@ const PULL: f64 = 1.5;
 const GRAVITY: [&str; 2] = ["slope_gravity", "cross_slope"];
 /// What a controller does against the first of them.
 const COMPENSATION: &str = "hill_compensation";
-/// What every machine takes its time by.
+/// Effects whose time constant no machine is without.
 const LAGS: [&str; 2] = ["steer_servo", "speed_loop"];
 /// What makes the turning lead the steering.
 const SWING: &str = "steer_swing";
