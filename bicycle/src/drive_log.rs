@@ -1,6 +1,12 @@
 //! A drive as a time series: what was commanded and what was measured, run by run.
 
+mod joined;
+mod readings;
+
 use crate::Odometry;
+
+pub use joined::JoinError;
+pub use readings::Readings;
 
 /// A quantity that a drive log may hold. Body frame forward-left-up, map frame x east, y north, z up.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -116,6 +122,11 @@ impl Column {
         Self::NAMES[self as usize]
     }
 
+    /// Whether it is what was asked for and no measurement.
+    pub fn is_command(self) -> bool {
+        self.name().starts_with("cmd_")
+    }
+
     /// The column of that name in files.
     pub fn from_name(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|column| column.name() == name)
@@ -200,13 +211,26 @@ pub enum DriveLogError {
 }
 
 /// A drive log in memory: one or several runs, each with its own time axis, and the columns that were measured.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default)]
 pub struct DriveLog {
     /// Name and first row of each run.
     runs: Vec<(String, usize)>,
     time_s: Vec<f64>,
     /// Empty when the column is absent, otherwise one value per row.
     columns: [Vec<f64>; Column::COUNT],
+}
+
+/// What is missing in both is the same.
+impl PartialEq for DriveLog {
+    fn eq(&self, other: &Self) -> bool {
+        let same = |own: &Vec<f64>, other: &Vec<f64>| {
+            let mut pairs = own.iter().zip(other);
+            own.len() == other.len()
+                && pairs.all(|(own, other)| own == other || (own.is_nan() && other.is_nan()))
+        };
+        let mut columns = self.columns.iter().zip(&other.columns);
+        self.runs == other.runs && self.time_s == other.time_s && columns.all(|(own, other)| same(own, other))
+    }
 }
 
 impl DriveLog {

@@ -45,7 +45,7 @@ mod vehicle;
 pub use applied::{Applied, AppliedBy};
 pub use axle_demand::AxleDemand;
 pub use decision::{Decision, HoldReason, StopReason};
-pub use drive_log::{Column, DriveLog, DriveLogError, DriveRow, Run};
+pub use drive_log::{Column, DriveLog, DriveLogError, DriveRow, JoinError, Readings, Run};
 pub use effect::{Effect, SensorModel};
 pub use model::{GroundSample, Model, ModelError};
 pub use motion::{Command, ImuSample, Odometry, State};

@@ -55,6 +55,7 @@ pub use drive::{Correct, DriveArguments, MapSource, Method, Pace};
 pub use friction::{BenchFrictionArguments, FrictionSource, TrainFrictionArguments};
 pub use gap::{
     GapApplyArguments, GapCommand, GapDiagnoseArguments, GapEffectsArguments, GapSimulatorArguments,
+    PoseUnknown,
 };
 pub use gap_check::{GapScoreArguments, GapSealArguments};
 pub use ground::{BenchGroundArguments, GapGroundArguments};

@@ -39,8 +39,18 @@ fn read_ros(path: &Path) -> Result<(RobotRos, Vehicle), UsageError> {
     Ok((robot.ros.ok_or_else(missing)?, vehicle))
 }
 
-/// Reads a drive; what its file leaves out is told in `doubts`.
+/// Reads a drive, out of several files where [`formats::drive_parts`] says so; what they leave out is told in `doubts`.
 pub(crate) fn read(path: &Path, mapping: &Mapping, doubts: &mut Vec<String>) -> Result<DriveLog, UsageError> {
+    let parts = formats::drive_parts(path);
+    let mut logs =
+        parts.iter().map(|part| read_part(part, mapping, doubts)).collect::<Result<Vec<_>, _>>()?;
+    if logs.len() == 1 {
+        return Ok(logs.remove(0));
+    }
+    DriveLog::joined(&logs).map_err(|error| UsageError(format!("{}: {error}", path.display())))
+}
+
+fn read_part(path: &Path, mapping: &Mapping, doubts: &mut Vec<String>) -> Result<DriveLog, UsageError> {
     let mut doubt = |what: String| doubts.push(format!("{}: {what}", path.display()));
     let early = |problem: String| format!("the recording ends early, {problem}");
     if !Bag::is_at(path) {

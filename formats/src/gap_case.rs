@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 
 use crate::{ConfigError, ConfigText};
-pub use drive::{DriveFileError, ReadDrive, read_drive, read_drive_named};
+pub use drive::{DriveFileError, ReadDrive, drive_parts, read_drive, read_drive_named};
 pub use grid::GapGround;
 pub use labels::{GapKind, GapLabel, parse_gap_labels, read_gap_labels};
 pub use vehicle::{

@@ -51,8 +51,8 @@ pub use elevation::{
 };
 pub use gap_case::{
     DescribedVehicle, DriveFileError, GapCase, GapGround, GapKind, GapLabel, GapNoise, GapVehicle,
-    GapVehicleError, ReadDrive, parse_gap_labels, parse_gap_vehicle, read_described_vehicle, read_drive,
-    read_drive_named, read_gap_case, read_gap_labels, read_gap_vehicle,
+    GapVehicleError, ReadDrive, drive_parts, parse_gap_labels, parse_gap_vehicle, read_described_vehicle,
+    read_drive, read_drive_named, read_gap_case, read_gap_labels, read_gap_vehicle,
 };
 pub use gap_case_write::{
     GapSeal, GapSealError, read_sealed_labels, write_gap_case, write_gap_labels, write_gap_seal,

@@ -86,15 +86,27 @@ fn drive(
     Ok((place.to_owned(), Table::new(place, found, &keys, names)?.log()?))
 }
 
+/// A drive out of one file, or of several with `+` between them.
 fn of_file(path: &Path, names: &ColumnNames, doubts: &mut Vec<String>) -> PyResult<(String, DriveLog)> {
+    let parts = formats::drive_parts(path);
+    let mut logs = parts.iter().map(|part| of_part(part, names, doubts)).collect::<PyResult<Vec<_>>>()?;
+    let name = path.display().to_string();
+    if logs.len() == 1 {
+        return Ok((name, logs.remove(0)));
+    }
+    let joined = DriveLog::joined(&logs).map_err(|error| refused_value(format!("{name}: {error}")))?;
+    Ok((name, joined))
+}
+
+fn of_part(path: &Path, names: &ColumnNames, doubts: &mut Vec<String>) -> PyResult<DriveLog> {
     let drive = formats::read_drive_named(path, names).map_err(|error| match error {
         DriveFileError::Csv(DriveLogFileError::Unreadable { source, .. })
         | DriveFileError::Mcap(McapReadError::Unreadable { source, .. }) => refused_file(path, &source),
         other => refused_value(other),
     })?;
-    let name = path.display().to_string();
-    doubts.extend(drive.ended_early.map(|problem| format!("{name}: the recording ends early, {problem}")));
-    Ok((name, drive.log))
+    let early = |problem| format!("{}: the recording ends early, {problem}", path.display());
+    doubts.extend(drive.ended_early.map(early));
+    Ok(drive.log)
 }
 
 /// The vehicle that was driven: a [`Vehicle`], the name of one, the path of a file, a dict or a dataclass.

@@ -10,8 +10,8 @@ use pyo3::types::{PyDict, PyString};
 use report::gap::Told;
 use sim_to_real::{
     Answer, Baseline, Case, Diagnosed, Diagnosis, Drives, InSimulatorDiagnosis, InSimulatorError, Manoeuvre,
-    PartUnknown, Verification, WithoutSimulator, controller_model, decide_in_simulator,
-    diagnose_without_simulator, own_runs, repaired, verify,
+    PartUnknown, PoseSensor, PoseUnknown, Verification, WithoutSimulator, controller_model,
+    decide_in_simulator, diagnose_without_simulator, own_runs, repaired, verify,
 };
 
 use crate::arrays::kind;
@@ -40,7 +40,8 @@ const MANOEUVRE: &str = "manoeuvre.csv";
 /// "max_steer" [rad], "max_speed" [m/s], "noise"). columns: a dict from our names to yours, {"vx": "wheel_speed"}.
 /// simulator: a callable that drives commands as your simulator does and so decides; see docs/python.md. model: a `Model` or
 /// a `Vehicle`, the controller's model to begin with, else the one that the simulator's drives calibrate; what is announced
-/// is fitted beside its effects for `apply`, and does not depend on it. name: for the report.
+/// is fitted beside its effects for `apply`, and does not depend on it. estimate: "time_offset" and "lever_arm" of the robot's
+/// pose sensor are estimated from its drives first and taken out of them. name: for the report.
 ///
 /// Returns a `GapReport`. Takes from seconds to minutes; Ctrl-C ends it. Raises `ValueError` for drives that would be
 /// misread, with what gave them away, and what the callable raises.
@@ -54,6 +55,7 @@ const MANOEUVRE: &str = "manoeuvre.csv";
     columns: "dict[str, str] | None" = None,
     simulator: "Callable[[dict[str, Any]], Mapping[str, Any]] | None" = None,
     model: "Model | Vehicle | None" = None,
+    estimate: "Sequence[str]" = Vec::new(),
     name=None,
 ))]
 #[expect(clippy::too_many_arguments, reason = "keywords in Python")]
@@ -66,13 +68,23 @@ pub fn diagnose(
     columns: Option<&Bound<'_, PyDict>>,
     simulator: Option<&Bound<'_, PyAny>>,
     model: Option<&Bound<'_, PyAny>>,
+    estimate: Vec<String>,
     name: Option<&str>,
 ) -> PyResult<GapReport> {
+    let unknowns = estimate.iter().map(|word| pose_unknown(word)).collect::<PyResult<Vec<_>>>()?;
     let own_effects = model.map(|model| Ok::<_, PyErr>(believed(model)?.effects)).transpose()?;
     let (names, mut doubts) = (column_names(columns)?, Vec::new());
     let (sim, real) = (drives("sim", sim, &names, &mut doubts)?, drives("real", real, &names, &mut doubts)?);
     let heldout = heldout.map(|heldout| drives("heldout", heldout, &names, &mut doubts)).transpose()?;
     let machine = machine(vehicle, &[&sim.logs[..], &real.logs[..]].concat())?;
+    let pose_sensor = (!unknowns.is_empty())
+        .then(|| PoseSensor::estimated(&real, machine.wheelbase_m, &unknowns).map_err(refused_value))
+        .transpose()?;
+    let without = |drives: Drives| match &pose_sensor {
+        Some(found) => found.taken_out_of(drives),
+        None => drives,
+    };
+    let (real, heldout) = (without(real), heldout.map(without));
     let screened = interruptible(py, move || {
         let case = Case::screened(machine, sim, real, &mut doubts);
         case.map(|case| (case, doubts))
@@ -84,9 +96,21 @@ pub fn diagnose(
     let name = name.unwrap_or(&work.case.machine.name).to_owned();
     let found = work.diagnosed(py)?;
     let (mut answer, manoeuvre) = work.advised(py, &found, name, own_effects)?;
+    answer.pose_sensor = pose_sensor;
     work.decide(own.as_ref(), &mut answer)?;
     let heldout = work.screened_heldout(py, heldout.unwrap_or_default())?;
     work.verified(py, own.as_ref(), Opened { found, answer, manoeuvre, heldout })
+}
+
+fn pose_unknown(word: &str) -> PyResult<PoseUnknown> {
+    match word {
+        "time_offset" => Ok(PoseUnknown::TimeOffset),
+        "lever_arm" => Ok(PoseUnknown::LeverArm),
+        other => {
+            let told = format!("estimate: expected \"time_offset\" and \"lever_arm\", found \"{other}\"");
+            Err(refused_value(told))
+        }
+    }
 }
 
 /// What the real drives have shown, and against what.

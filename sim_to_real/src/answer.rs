@@ -3,6 +3,7 @@
 use crate::controller_model::ControllerModel;
 use crate::findings::QuantityError;
 use crate::in_simulator::InSimulator;
+use crate::pose_sensor::PoseSensor;
 use crate::steering::Steering;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -169,6 +170,9 @@ pub struct Answer {
     /// Errors on the held-out drives in metres, radians and their rates; empty until they are opened.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub errors_by_quantity: Vec<QuantityError>,
+    /// What was estimated of the robot's pose sensor and taken out of its drives, where that was asked for.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub pose_sensor: Option<PoseSensor>,
     /// What a controller's model is to hold, where that was measured.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub controller_model: Option<ControllerModel>,
@@ -207,6 +211,7 @@ mod tests {
             places: Vec::new(),
             shrink: shrink(Some(3.0), 1.5),
             errors_by_quantity: Vec::new(),
+            pose_sensor: None,
             controller_model: None,
             in_simulator: None,
             advice: Vec::new(),

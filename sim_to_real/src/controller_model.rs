@@ -143,7 +143,7 @@ mod tests {
     use crate::engine_tests::{Made, arcs, effect};
 
     fn made(curvature_ratio: f64, speed_ratio: f64, seed: u64) -> Drive {
-        arcs(Made { curvature_ratio, left_ratio: 1.0, speed_ratio }, seed)
+        arcs(Made { curvature_ratio, speed_ratio, ..Made::RIGHT }, seed)
     }
 
     fn best(drives: &[Drive], nominal: &[Effect], announced: &[Effect]) -> ControllerModel {

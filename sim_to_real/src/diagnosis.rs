@@ -167,6 +167,7 @@ impl Diagnosis {
                 ..Shrink::default()
             },
             errors_by_quantity: Vec::new(),
+            pose_sensor: None,
             controller_model: None,
             in_simulator: None,
             advice: self.notes.clone(),

@@ -56,14 +56,15 @@ pub enum DrivesError {
 }
 
 impl Drives {
-    /// The drives without their breaks; what is doubtful is told in `doubts`.
+    /// The drives without their breaks, columns of slow sensors filled in; what is doubtful is told in `doubts`.
     ///
     /// # Errors
     /// A drive that would be misread.
     pub fn screened(self, machine: &Machine, doubts: &mut Vec<String>) -> Result<Self, DrivesError> {
         let mut screened_one = |(name, log): (&String, DriveLog)| {
-            let found = screen(machine, &log);
             let refused = |problem: String| DrivesError::Drive { drive: name.clone(), problem };
+            let log = DriveLog::joined(&[log]).map_err(|error| refused(error.to_string()))?;
+            let found = screen(machine, &log);
             if let Some(grave) = grave(&found) {
                 return Err(refused(grave.to_string()));
             }

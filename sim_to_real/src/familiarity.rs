@@ -124,7 +124,7 @@ mod tests {
     use crate::whitening::Whitening;
 
     fn driven(seed: u64) -> Drive {
-        arcs(Made { curvature_ratio: 1.0, left_ratio: 1.0, speed_ratio: 1.0 }, seed)
+        arcs(Made::RIGHT, seed)
     }
 
     fn faster(drive: &Drive, ratio: f32) -> Drive {

@@ -42,6 +42,7 @@ mod limits_shown;
 mod machine;
 mod manoeuvre;
 mod nuisance;
+mod pose_sensor;
 mod repair;
 mod residual_table;
 mod rollout;
@@ -87,8 +88,9 @@ pub use in_simulator::{
 pub use learned_bound::{LearnedBound, LearnedBoundError, learned_bound};
 pub use machine::{GroundMap, Machine, SensorNoise};
 pub use manoeuvre::{Manoeuvre, design_manoeuvre};
+pub use pose_sensor::{PoseSensor, PoseSensorError, PoseUnknown};
 pub use repair::{PartUnknown, RepairError, repaired};
-pub use screening::{Gravity, Place as RowPlace, Suspicion, screen, screen_sets, split_at_breaks};
+pub use screening::{Gravity, Hole, Place as RowPlace, Suspicion, screen, screen_sets, split_at_breaks};
 pub use signature::{Signature, signature};
 pub use steering::Steering;
 pub use unseen::unseen_effects;

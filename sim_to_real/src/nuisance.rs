@@ -91,8 +91,6 @@ mod tests {
     use crate::comparison::Yardstick;
     use crate::engine_tests::{Made, arcs, effect};
 
-    const RIGHT: Made = Made { curvature_ratio: 1.0, left_ratio: 1.0, speed_ratio: 1.0 };
-
     fn parameter(scale: f64) -> Coordinate {
         Coordinate { start: 0.0, low: -9.0, high: 9.0, scale, pull: None }
     }
@@ -118,7 +116,7 @@ mod tests {
     /// the calibration could be to blame for is a quarter of it.
     #[test]
     fn what_nominal_drives_contradict_stays_a_cause() {
-        let (nominal, real) = (arcs(RIGHT, 3), arcs(Made { curvature_ratio: 0.97, ..RIGHT }, 1));
+        let (nominal, real) = (arcs(Made::RIGHT, 3), arcs(Made { curvature_ratio: 0.97, ..Made::RIGHT }, 1));
         let rough = Yardstick::rough();
         let of = |drive, yardstick: &Yardstick| Comparison::new(1.0, vec![drive], yardstick);
         let yardstick = Yardstick::of(&of(&nominal, &rough).residuals(&[]), &rough);

@@ -6,6 +6,7 @@
 
 mod continuity;
 mod excitation;
+mod holes;
 mod sets;
 mod signals;
 mod signs;
@@ -19,12 +20,15 @@ use crate::Machine;
 pub use continuity::split_at_breaks;
 pub use sets::screen_sets;
 use signals::Signals;
-pub use suspicion::{Gravity, Place, Suspicion};
+pub(crate) use statistics::quantile;
+pub use suspicion::{Gravity, Hole, Place, Suspicion};
 
 /// What is suspicious in one drive, gravest first; empty when nothing is.
 pub fn screen(machine: &Machine, log: &DriveLog) -> Vec<Suspicion> {
-    let runs: Vec<Signals<'_>> = Signals::of(log);
-    let mut found = continuity::lacking(&runs, log);
+    let missing = holes::some_missing(&Signals::of(log), log);
+    let mut found = continuity::lacking(&Signals::of(log), log);
+    let bridged = holes::bridged(log);
+    let runs = Signals::of(&bridged);
     if found.is_empty() {
         found.extend(units::check(&runs, machine));
         found.extend(signs::check(&runs, machine));
@@ -36,6 +40,9 @@ pub fn screen(machine: &Machine, log: &DriveLog) -> Vec<Suspicion> {
         found.extend(excitation::frozen(&runs));
         found.extend(excitation::stalled(&runs));
         found.extend(excitation::beyond(&runs, machine));
+    }
+    if found.iter().all(|suspicion| suspicion.gravity() == Gravity::Doubtful) {
+        found.extend(missing);
     }
     found.sort_by_key(Suspicion::gravity);
     found

@@ -80,13 +80,6 @@ impl<'a> Signals<'a> {
             .map(|column| self.run.column(column).map(|_| filled(&self.interpolated(column))))
     }
 
-    /// Whether a row repeats the pose of the row before it: a sensor slower than the log is held until it speaks again.
-    fn repeats_pose(&self) -> Vec<bool> {
-        let columns: Vec<&[f64]> = POSE.iter().filter_map(|column| self.run.column(*column)).collect();
-        let repeats = |row: usize| row > 0 && columns.iter().all(|values| values[row] == values[row - 1]);
-        (0..self.run.time_s().len()).map(repeats).collect()
-    }
-
     /// For each even step the last row at or before it.
     fn rows(&self) -> impl Iterator<Item = (f64, usize)> {
         let time_s = self.run.time_s();
@@ -114,7 +107,7 @@ impl<'a> Signals<'a> {
         let mut continuous = if column == Column::Yaw { unwrapped(values) } else { values.to_vec() };
         let time_s = self.run.time_s();
         if POSE.contains(&column) {
-            bridge(&mut continuous, time_s, &self.repeats_pose());
+            bridge(&mut continuous, time_s, &repeats_pose(*self.run));
         }
         let between = |(now_s, row): (f64, usize)| match time_s.get(row + 1) {
             None => continuous[row],
@@ -125,6 +118,13 @@ impl<'a> Signals<'a> {
         };
         self.rows().map(between).collect()
     }
+}
+
+/// Whether a row repeats the pose of the row before it: a sensor slower than the log is held until it speaks again.
+pub(crate) fn repeats_pose(run: Run<'_>) -> Vec<bool> {
+    let columns: Vec<&[f64]> = POSE.iter().filter_map(|column| run.column(*column)).collect();
+    let repeats = |row: usize| row > 0 && columns.iter().all(|values| values[row] == values[row - 1]);
+    (0..run.time_s().len()).map(repeats).collect()
 }
 
 /// Puts values on a straight line between the rows around them that repeat none; at the end they stay.
@@ -145,7 +145,7 @@ fn over_steps(values: &[f64]) -> Vec<f64> {
 }
 
 /// Values with holes bridged in a straight line; before the first and after the last value, that one; without any, 0.
-fn filled(values: &[f64]) -> Vec<f64> {
+pub(crate) fn filled(values: &[f64]) -> Vec<f64> {
     let mut filled = values.to_vec();
     let known: Vec<usize> = (0..values.len()).filter(|&row| !values[row].is_nan()).collect();
     let (Some(&first), Some(&last)) = (known.first(), known.last()) else {

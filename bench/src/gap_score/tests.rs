@@ -45,6 +45,7 @@ fn answer(verdict: Verdict, announced: &[&str], ranking: &[(&str, f64)]) -> Answ
             position_error_2s_m: None,
         },
         errors_by_quantity: Vec::new(),
+        pose_sensor: None,
         controller_model: None,
         in_simulator: None,
         advice: Vec::new(),

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use clap::{Args, Subcommand};
+use clap::{Args, Subcommand, ValueEnum};
 
 use super::values;
 
@@ -91,6 +91,14 @@ pub struct GapDiagnoseArguments {
     #[arg(long, value_name = "FILE", help_heading = "Drives without a case file")]
     pub robot: Option<PathBuf>,
 
+    /// Estimate this of the robot's pose sensor first, from its drives alone, and take it out of them
+    ///
+    /// For poses that were recorded by another clock than the rest, or of an antenna that does not sit over the rear axle.
+    /// What was found is told with its interval, and the held-out drives are corrected by the same. A pose that is late in
+    /// the robot and not in the simulator is no cause any more then.
+    #[arg(long, value_name = "WHAT,..", value_enum, value_delimiter = ',')]
+    pub estimate: Vec<PoseUnknown>,
+
     /// Where the answer goes, besides the folder.
     #[command(flatten)]
     pub copy: super::JsonArguments,
@@ -136,6 +144,15 @@ pub struct GapDiagnoseArguments {
     /// [default: surefoot/baselines in the user's cache folder]
     #[arg(long, value_name = "DIR")]
     pub baseline_cache: Option<PathBuf>,
+}
+
+/// What is not known of a pose sensor.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum PoseUnknown {
+    /// How late its poses are against speed and yaw rate, at most half a second
+    TimeOffset,
+    /// Where it sits, ahead and to the left of the middle of the rear axle
+    LeverArm,
 }
 
 /// The user's own simulator.
@@ -216,6 +233,9 @@ Examples:
       far the gap shrinks in it.
   surefoot gap diagnose cases/own --map t=stamp,vx=wheel_speed
       Logs whose columns have names of their own.
+  surefoot gap diagnose --vehicle car.toml --sim sim_1.csv sim_2.csv sim_3.csv \\
+      --real a/gnss.csv+can.csv b/gnss.csv+can.csv --estimate time-offset,lever-arm
+      Every drive in several files of other rates, poses by another clock and of an antenna.
   surefoot gap diagnose --vehicle rc_car --sim nominal_bag --real bag_1,bag_2 --map odometry=/odom,command=/drive
       Drives out of bags of ROS 2.
   surefoot gap diagnose cases/nightly --fail-above 1.5 --json answer.json
@@ -240,6 +260,10 @@ Drives:
   needed columns   t, and a command: cmd_speed, cmd_steer or steer_meas
                    (cmd_wz for a skid-steered machine)
   used if there    x, y, yaw, vx, wz, roll, pitch; run (t restarts per run)
+  A drive may lie in several files with + between them (pose.csv+can.csv), of one
+  clock and each with columns and a rate of its own; those after the first are
+  looked for beside it. Columns of a slower sensor are filled in between, unless
+  it is silent for one and a half of its usual period.
   Gaps and leaps split a drive, which is told. Degrees, km/h, a mirrored sign,
   standstill and their like are refused with what gave them away.
 

@@ -5,8 +5,8 @@ use std::path::Path;
 use bicycle::Model;
 use report::gap::Told;
 use sim_to_real::{
-    Answer, Baseline, Case, ControllerModel, Diagnosed, Diagnosis, Drives, Verification, WithoutSimulator,
-    controller_model, diagnose, diagnose_without_simulator, verify,
+    Answer, Baseline, Case, ControllerModel, Diagnosed, Diagnosis, Drives, PoseSensor, Verification,
+    WithoutSimulator, controller_model, diagnose, diagnose_without_simulator, verify,
 };
 
 use super::in_simulator::Decider;
@@ -16,6 +16,12 @@ use super::request::Request;
 use super::{baseline, drives, follow_up, machine, model_file};
 use crate::arguments::GapDiagnoseArguments;
 use crate::{LimitExceeded, UsageError, summary};
+
+/// The drives of a case with what was found of the robot's pose sensor, and taken out of them.
+struct Asked {
+    case: Case,
+    pose_sensor: Option<PoseSensor>,
+}
 
 /// The held-out drives and what they say; without any there is nothing.
 struct Verified {
@@ -33,11 +39,12 @@ pub(super) fn run(arguments: &GapDiagnoseArguments) -> anyhow::Result<()> {
     let own_model = arguments.model.as_deref().map(model_file::read).transpose()?;
     let outputs = Outputs::prepare(arguments)?;
     let mut doubts = request.doubtful_names()?;
-    let case = read(&request, &mut doubts)?;
+    let Asked { case, pose_sensor } = read(&request, &mut doubts)?;
     let mut decider = Decider::start(&arguments.simulator, &case.machine, &case.sim.logs)?;
     let folder = arguments.baseline_cache.clone().or_else(baseline::default_folder);
     let (baseline, diagnosis) = diagnosed_against(&case, folder.as_deref(), &mut doubts)?;
     let mut predicted = diagnosis.answer(request.name.as_deref().unwrap_or(&case.machine.name));
+    predicted.pose_sensor = pose_sensor;
     let diagnosed = Diagnosed { case: &case, baseline: &baseline, diagnosis: &diagnosis };
     predicted.controller_model = Some(for_controller(&diagnosed, own_model.as_ref())?);
     follow_up::advise(&diagnosed, &mut predicted, (arguments, &outputs))?;
@@ -45,7 +52,7 @@ pub(super) fn run(arguments: &GapDiagnoseArguments) -> anyhow::Result<()> {
     outputs.write_json("prediction.json", &predicted)?;
 
     // From here on the prediction cannot change any more.
-    let verified = open_heldout(&request, &diagnosed, &mut doubts)?;
+    let verified = open_heldout(&request, (&diagnosed, pose_sensor), &mut doubts)?;
     let complete = |verification: &Verification| verification.complete(predicted.clone());
     let mut answer = verified.verification.as_ref().map_or_else(|| predicted.clone(), complete);
     decider.verify(&mut answer, &case.machine, &verified.heldout.logs)?;
@@ -109,22 +116,36 @@ fn for_controller(diagnosed: &Diagnosed<'_>, own: Option<&Model>) -> Result<Cont
         .map_err(UsageError::from_input)
 }
 
-fn read(request: &Request, doubts: &mut Vec<String>) -> Result<Case, UsageError> {
+fn read(request: &Request, doubts: &mut Vec<String>) -> Result<Asked, UsageError> {
     let mapping = &request.mapping;
     let (sim, real) =
         (drives::read(&request.sim, mapping, doubts)?, drives::read(&request.real, mapping, doubts)?);
     let machine = machine::read(&request.vehicle, &[&sim.logs[..], &real.logs[..]].concat())?;
-    Case::screened(machine, sim, real, doubts).map_err(UsageError::from_input)
+    let unknowns = &request.pose_unknowns;
+    let estimated =
+        || PoseSensor::estimated(&real, machine.wheelbase_m, unknowns).map_err(UsageError::from_input);
+    let pose_sensor = if unknowns.is_empty() { None } else { Some(estimated()?) };
+    let real = without(pose_sensor, real);
+    let case = Case::screened(machine, sim, real, doubts).map_err(UsageError::from_input)?;
+    Ok(Asked { case, pose_sensor })
+}
+
+/// Drives of the robot without what was found of its pose sensor.
+fn without(pose_sensor: Option<PoseSensor>, drives: Drives) -> Drives {
+    match pose_sensor {
+        Some(found) => found.taken_out_of(drives),
+        None => drives,
+    }
 }
 
 /// Opens the drives that nothing has looked at so far and judges the diagnosis on them.
 fn open_heldout(
     request: &Request,
-    diagnosed: &Diagnosed<'_>,
+    (diagnosed, pose_sensor): (&Diagnosed<'_>, Option<PoseSensor>),
     doubts: &mut Vec<String>,
 ) -> Result<Verified, UsageError> {
     let Diagnosed { case, baseline, diagnosis } = *diagnosed;
-    let heldout = drives::read(&request.heldout, &request.mapping, doubts)?;
+    let heldout = without(pose_sensor, drives::read(&request.heldout, &request.mapping, doubts)?);
     let heldout = case.heldout(heldout, doubts).map_err(UsageError::from_input)?;
     let judged = || verify(baseline, &case.machine, diagnosis, &heldout.logs);
     let verification =

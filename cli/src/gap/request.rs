@@ -4,8 +4,10 @@ use std::path::{Path, PathBuf};
 
 use formats::Bag;
 
+use sim_to_real::PoseUnknown;
+
 use crate::UsageError;
-use crate::arguments::GapDiagnoseArguments;
+use crate::arguments::{self, GapDiagnoseArguments};
 use crate::drive_file::Mapping;
 
 /// Which file or name stands for the vehicle, and which files hold its drives.
@@ -19,13 +21,20 @@ pub(super) struct Request {
     pub heldout: Vec<PathBuf>,
     /// What columns of CSV drives and topics of bags are called.
     pub mapping: Mapping,
+    /// What is not known of the robot's pose sensor.
+    pub pose_unknowns: Vec<PoseUnknown>,
 }
 
 impl Request {
     pub(super) fn of(arguments: &GapDiagnoseArguments) -> Result<Self, UsageError> {
         let mapping = Mapping::of("--map", &arguments.map, arguments.robot.as_deref())?;
+        let unknown = |unknown: &arguments::PoseUnknown| match unknown {
+            arguments::PoseUnknown::TimeOffset => PoseUnknown::TimeOffset,
+            arguments::PoseUnknown::LeverArm => PoseUnknown::LeverArm,
+        };
+        let pose_unknowns = arguments.estimate.iter().map(unknown).collect();
         let request = match (&arguments.case, &arguments.vehicle) {
-            (Some(case), _) => Self { mapping, ..Self::of_case(case)? },
+            (Some(case), _) => Self { mapping, pose_unknowns, ..Self::of_case(case)? },
             (None, vehicle) => Self {
                 name: None,
                 vehicle: vehicle.clone().unwrap_or_default(),
@@ -33,6 +42,7 @@ impl Request {
                 real: arguments.real.clone(),
                 heldout: arguments.heldout.clone(),
                 mapping,
+                pose_unknowns,
             },
         };
         request.check()?;
@@ -48,12 +58,14 @@ impl Request {
             real: case.real,
             heldout: case.heldout,
             mapping: Mapping::default(),
+            pose_unknowns: Vec::new(),
         })
     }
 
-    /// Every drive's file stands where it is said to and is named once. No message of the held-out ones is read for it.
+    /// Every file of a drive stands where it is said to and is named once. No message of the held-out ones is read for it.
     fn check(&self) -> Result<(), UsageError> {
-        let drives: Vec<&PathBuf> = self.sim.iter().chain(&self.real).chain(&self.heldout).collect();
+        let drives = self.sim.iter().chain(&self.real).chain(&self.heldout);
+        let drives: Vec<PathBuf> = drives.flat_map(|path| formats::drive_parts(path)).collect();
         if let Some(missing) = drives.iter().find(|path| !path.is_file() && !Bag::is_at(path)) {
             return Err(UsageError(format!("{}: expected a file, found none", missing.display())));
         }
@@ -101,6 +113,7 @@ mod tests {
             real: vec!["sim_real/drive.csv".into(), "SIM-2.csv".into()],
             heldout: Vec::new(),
             mapping: Mapping::default(),
+            pose_unknowns: Vec::new(),
         };
         let told = request.doubtful_names().unwrap();
         let expected = [
@@ -119,6 +132,7 @@ mod tests {
             real: real.iter().map(PathBuf::from).collect(),
             heldout: Vec::new(),
             mapping: Mapping::default(),
+            pose_unknowns: Vec::new(),
         };
         let told = with(&["real_1.csv", "real_2.csv"], &["sim_1.csv"]).doubtful_names().unwrap_err().0;
         assert!(told.contains("found them swapped? real_1.csv: given as a nominal drive"), "{told}");
@@ -138,6 +152,7 @@ mod tests {
             real: vec![real.to_owned()],
             heldout: Vec::new(),
             mapping: Mapping::default(),
+            pose_unknowns: Vec::new(),
         };
         let told = with(&file, &file).check().unwrap_err().0;
         assert!(told.ends_with("d.csv: expected each drive once, found it twice"), "{told}");

@@ -1,6 +1,6 @@
 //! A drive by the ending of its file: CSV, or a recording of our own.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use bicycle::DriveLog;
 
@@ -54,6 +54,27 @@ pub fn read_drive_named(path: &Path, names: &ColumnNames) -> Result<ReadDrive, D
     }
 }
 
+/// The files that hold a drive: one, or several with `+` between them, as `pose.csv+can.csv`. Those after the first are
+/// looked for in its folder, then as they are given. A file whose own name holds a `+` is one.
+pub fn drive_parts(path: &Path) -> Vec<PathBuf> {
+    let Some(mut rest) = path.to_str().filter(|_| !path.exists()) else { return vec![path.to_owned()] };
+    let mut parts: Vec<PathBuf> = Vec::new();
+    loop {
+        let placed = |name: &str| {
+            let beside = parts.first().and_then(|first| first.parent()).map(|folder| folder.join(name));
+            beside.filter(|path| path.exists()).unwrap_or_else(|| PathBuf::from(name))
+        };
+        let ends_a_part = |(at, _): &(usize, &str)| placed(&rest[..*at]).exists();
+        let cut = rest.match_indices('+').find(ends_a_part).map(|(at, _)| at);
+        let part = placed(&rest[..cut.unwrap_or(rest.len())]);
+        parts.push(part);
+        match cut {
+            Some(at) => rest = &rest[at + 1..],
+            None => return parts,
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -83,5 +104,26 @@ mod tests {
             told.ends_with("d.csv:4: t: expected a time > 0.1 s, the row before it in run '', found 0.05"),
             "{told}"
         );
+    }
+
+    #[test]
+    fn a_drive_may_lie_in_several_files() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        std::fs::create_dir(at("c++")).unwrap();
+        for name in ["c++/pose.csv", "c++/can.csv", "imu.csv", "c++/a+b.csv"] {
+            std::fs::write(at(name), "").unwrap();
+        }
+        let parts = |text: &str| drive_parts(&at(text));
+        assert_eq!(parts("imu.csv"), [at("imu.csv")]);
+        assert_eq!(parts("c++/a+b.csv"), [at("c++/a+b.csv")]);
+        assert_eq!(
+            parts("c++/pose.csv+can.csv+a+b.csv"),
+            ["c++/pose.csv", "c++/can.csv", "c++/a+b.csv"].map(at)
+        );
+        let elsewhere = format!("c++/pose.csv+{}", at("imu.csv").display());
+        assert_eq!(parts(&elsewhere), [at("c++/pose.csv"), at("imu.csv")]);
+        assert_eq!(parts("c++/pose.csv+none.csv"), [at("c++/pose.csv"), PathBuf::from("none.csv")]);
+        assert_eq!(parts("c++/none.csv+can.csv"), [at("c++/none.csv+can.csv")]);
     }
 }

@@ -47,6 +47,7 @@ pub(crate) fn answer() -> Answer {
                 floor: 0.003,
             })
             .to_vec(),
+        pose_sensor: None,
         controller_model: None,
         in_simulator: None,
         advice: vec!["drive steps of the steering & sines".to_owned()],

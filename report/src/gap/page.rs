@@ -33,6 +33,7 @@ pub fn page(page: &Page<'_>) -> String {
         html::heading(&answer.case, page.drives),
         format!("<p class=\"verdict\">{}</p>\n", escaped(&text::verdict(answer))),
         doubts(page.doubts),
+        answer.pose_sensor.as_ref().map_or(String::new(), |found| paragraph(&text::pose_sensor(found))),
         // What the user's own simulator says counts for more than its calibrated image.
         answer.in_simulator.as_ref().map_or(String::new(), in_simulator::section),
         section("Which", &(effects(answer) + &figures(&["ranking.png"]))),

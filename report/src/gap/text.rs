@@ -3,7 +3,7 @@
 use super::in_simulator::in_simulator;
 use super::words;
 use bicycle::effect::{CATALOGUE, Parameter};
-use sim_to_real::{Answer, Condition, Estimate, NamedEffect, Shrink, Verdict};
+use sim_to_real::{Answer, Condition, Estimate, NamedEffect, PoseSensor, Shrink, Verdict};
 
 /// The verdict in a sentence.
 pub(crate) fn verdict(answer: &Answer) -> String {
@@ -172,6 +172,7 @@ pub fn text(answer: &Answer, drives: &str) -> String {
     if matches!(answer.verdict, Verdict::Effects | Verdict::EffectsAndUnknown) {
         lines.extend(others(answer).map(|(what, names)| format!("    {what}: {}", names.join(", "))));
     }
+    lines.extend(answer.pose_sensor.iter().map(|found| format!("  pose     {}", pose_sensor(found))));
     if answer.verdict != Verdict::None {
         lines.push(format!("  where    {}", places(answer)));
     }
@@ -180,6 +181,21 @@ pub fn text(answer: &Answer, drives: &str) -> String {
     lines.extend(answer.in_simulator.iter().flat_map(|own| named("yours", &in_simulator(own))));
     lines.extend(named("next", &answer.advice));
     lines.join("\n") + "\n"
+}
+
+/// What was found of the robot's pose sensor, and taken out.
+pub(crate) fn pose_sensor(found: &PoseSensor) -> String {
+    let of = |name: &str, unit: &str, estimate: Option<Estimate>| {
+        let Estimate { value, low, high } = estimate?;
+        Some(format!("{name} {value:.3} {unit} ({low:.3} to {high:.3})"))
+    };
+    let told = [
+        of("late by", "s", found.time_offset_s),
+        of("ahead of the rear axle", "m", found.lever_arm_ahead_m),
+        of("to its left", "m", found.lever_arm_left_m),
+    ];
+    let told: Vec<String> = told.into_iter().flatten().collect();
+    format!("the robot's pose sensor is {}; taken out of its drives", told.join(", "))
 }
 
 /// How strongly the drives ask for an effect, where that is known.
@@ -238,6 +254,16 @@ mod tests {
             "  next     drive steps of the steering & sines",
         ];
         assert_eq!(lines[7..], rest);
+    }
+
+    #[test]
+    fn a_pose_sensor_is_told_as_far_as_it_was_asked_about() {
+        let time_offset_s = Some(Estimate { value: 0.12, low: 0.11, high: 0.1301 });
+        let found = PoseSensor { time_offset_s, ..PoseSensor::default() };
+        assert_eq!(
+            pose_sensor(&found),
+            "the robot's pose sensor is late by 0.120 s (0.110 to 0.130); taken out of its drives"
+        );
     }
 
     #[test]

@@ -6,12 +6,10 @@ use crate::comparison::{Comparison, Yardstick};
 use crate::explanation::{best_pair, single_explanations};
 use std::collections::BTreeSet;
 
-const RIGHT: Made = Made { curvature_ratio: 1.0, left_ratio: 1.0, speed_ratio: 1.0 };
-
 fn on<T>(made: Made, told: impl Fn(&Trial<'_>) -> T) -> T {
     let drives = [arcs(made, 1), arcs(made, 2)];
     // One set of drives of the bicycle itself tells the noise.
-    let nominal = arcs(RIGHT, 3);
+    let nominal = arcs(Made::RIGHT, 3);
     let rough = Yardstick::rough();
     let noise = Comparison::new(1.0, vec![&nominal], &rough).residuals(&[]);
     let yardstick = Yardstick::of(&noise, &rough);
@@ -21,7 +19,7 @@ fn on<T>(made: Made, told: impl Fn(&Trial<'_>) -> T) -> T {
 
 #[test]
 fn the_effect_that_was_put_in_is_the_best_alone_with_its_size() {
-    on(Made { curvature_ratio: 0.85, left_ratio: 1.0, speed_ratio: 1.0 }, |trial| {
+    on(Made { curvature_ratio: 0.85, ..Made::RIGHT }, |trial| {
         let singles = single_explanations(trial);
         let best = &singles[0];
         assert_eq!(best.ids(), ["steer_gain"], "{:?}", best.causes);
@@ -33,7 +31,7 @@ fn the_effect_that_was_put_in_is_the_best_alone_with_its_size() {
 
 #[test]
 fn every_cause_stands_once_however_many_forms_it_has() {
-    on(RIGHT, |trial| {
+    on(Made::RIGHT, |trial| {
         let ids: Vec<&str> = single_explanations(trial).iter().map(|single| single.ids()[0]).collect();
         let unique: BTreeSet<&str> = ids.iter().copied().collect();
         assert_eq!(unique.len(), ids.len(), "{ids:?}");
@@ -42,7 +40,7 @@ fn every_cause_stands_once_however_many_forms_it_has() {
 
 #[test]
 fn on_drives_of_the_model_itself_nothing_explains_anything() {
-    on(RIGHT, |trial| {
+    on(Made::RIGHT, |trial| {
         let (none, singles) = (trial.loss(&[]), single_explanations(trial));
         assert!(singles.iter().all(|single| (none / single.loss).ln() < 0.03), "{none} {:?}", singles[0]);
         assert!(singles.windows(2).all(|pair| pair[0].loss <= pair[1].loss));
@@ -51,7 +49,7 @@ fn on_drives_of_the_model_itself_nothing_explains_anything() {
 
 #[test]
 fn two_effects_that_were_put_in_are_the_best_pair() {
-    on(Made { curvature_ratio: 0.85, left_ratio: 1.0, speed_ratio: 0.9 }, |trial| {
+    on(Made { curvature_ratio: 0.85, speed_ratio: 0.9, ..Made::RIGHT }, |trial| {
         let singles = single_explanations(trial);
         let pair = best_pair(trial, &singles).unwrap();
         let mut ids = pair.ids();

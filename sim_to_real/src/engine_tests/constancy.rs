@@ -12,7 +12,7 @@ use bicycle::Effect;
 
 /// The bicycle with the noise of a drive of its own.
 fn bicycle() -> Baseline {
-    let nominal = arcs(Made { curvature_ratio: 1.0, left_ratio: 1.0, speed_ratio: 1.0 }, 3);
+    let nominal = arcs(Made::RIGHT, 3);
     let rough = Yardstick::rough();
     let noise = Comparison::new(1.0, vec![&nominal], &rough).residuals(&[]);
     let null = Null {
@@ -36,9 +36,9 @@ fn bicycle() -> Baseline {
 }
 
 /// The best single effects of a machine, and which of them is not the same throughout.
-fn found(left_ratio: f64) -> (Vec<Vec<Effect>>, Option<Changing>) {
+fn found(made: Made) -> (Vec<Vec<Effect>>, Option<Changing>) {
     let baseline = bicycle();
-    let drives = [1, 2].map(|seed| arcs(Made { curvature_ratio: 0.85, left_ratio, speed_ratio: 1.0 }, seed));
+    let drives = [1, 2].map(|seed| arcs(Made { curvature_ratio: 0.85, ..made }, seed));
     let singles = single_explanations(&baseline.trial(&drives.each_ref()));
     let best: Vec<Vec<Effect>> = singles.into_iter().take(3).map(|single| single.causes).collect();
     let changing = changing(&baseline, &drives, &best);
@@ -47,14 +47,14 @@ fn found(left_ratio: f64) -> (Vec<Vec<Effect>>, Option<Changing>) {
 
 #[test]
 fn a_gain_that_is_the_same_on_both_sides_is_constant() {
-    let (best, changing) = found(1.0);
+    let (best, changing) = found(Made::RIGHT);
     assert_eq!((best[0][0].description().cause, changing), ("steer_gain", None));
 }
 
 /// 0.85 to the right and 0.85 * 0.9 to the left.
 #[test]
 fn a_gain_of_one_side_is_told_to_differ() {
-    let changing = found(0.9).1.unwrap();
+    let changing = found(Made { left_ratio: 0.9, ..Made::RIGHT }).1.unwrap();
     assert_eq!(changing.halves, Halves::LeftAndRight);
     let told = changing.told();
     assert!(
@@ -63,13 +63,20 @@ fn a_gain_of_one_side_is_told_to_differ() {
     );
 }
 
+/// 0.85 below 2 m/s, which is the median, and 0.85 * 0.9 above.
+#[test]
+fn a_gain_that_falls_with_speed_is_told_to() {
+    let changing = found(Made { fast_ratio: 0.9, ..Made::RIGHT }).1.unwrap();
+    assert_eq!(changing.halves, Halves::SlowAndFast);
+    assert!(changing.told().ends_with("it is not the same at low and at high speed"), "{}", changing.told());
+}
+
 /// A gain of 0.85 is a bias to one side where one steers left and to the other where one steers right; beside the gain
 /// itself, which is the same on both, that tells nothing.
 #[test]
 fn what_something_constant_foretells_as_well_is_constant() {
     let baseline = bicycle();
-    let drives =
-        [1, 2].map(|seed| arcs(Made { curvature_ratio: 0.85, left_ratio: 1.0, speed_ratio: 1.0 }, seed));
+    let drives = [1, 2].map(|seed| arcs(Made { curvature_ratio: 0.85, ..Made::RIGHT }, seed));
     let wrong = vec![vec![effect("steer_bias", 0.01)], vec![effect("gyro_bias", 0.01)]];
     let right = [wrong.clone(), vec![vec![effect("steer_gain", 0.85)]]].concat();
     assert_eq!(changing(&baseline, &drives, &wrong).map(|found| found.halves), Some(Halves::LeftAndRight));

@@ -49,7 +49,7 @@ fn intervals_of_a_steering_ratio_hold_it_and_are_no_wider_than_they_need_be() {
     let description = candidates().find(|description| description.id == "steer_gain").unwrap();
     let mut n_held = 0;
     for seed in 0..12 {
-        let drive = arcs(Made { curvature_ratio: truth, left_ratio: 1.0, speed_ratio: 1.0 }, 100 + seed);
+        let drive = arcs(Made { curvature_ratio: truth, ..Made::RIGHT }, 100 + seed);
         let comparison = Comparison::new(1.0, vec![&drive], &Yardstick::rough());
         let trial = Trial::fixed(comparison, &[]);
         let found = trial.with_one_more(&[], description).unwrap();
@@ -65,7 +65,7 @@ fn intervals_of_a_steering_ratio_hold_it_and_are_no_wider_than_they_need_be() {
 /// Four times the drives, half the width where noise makes it; what the form may be wrong by stays.
 #[test]
 fn intervals_shrink_with_more_drives_down_to_the_error_of_the_form() {
-    let made = Made { curvature_ratio: 0.88, left_ratio: 1.0, speed_ratio: 1.0 };
+    let made = Made { curvature_ratio: 0.88, ..Made::RIGHT };
     let drives: Vec<_> = (0..4).map(|seed| arcs(made, 200 + seed)).collect();
     let width = |n: usize| {
         let comparison = Comparison::new(1.0, drives.iter().take(n).collect(), &Yardstick::rough());

@@ -1,10 +1,11 @@
-//! Gaps in time, leaps of the pose, missing numbers, and the drive without them.
+//! Gaps in time, leaps of the pose, and the drive without them.
 
 use std::f64::consts::TAU;
 
 use bicycle::{Column, DriveLog, DriveLogError};
 
 use super::Machine;
+use super::holes;
 use super::signals::Signals;
 use super::statistics::quantile;
 use super::suspicion::Suspicion;
@@ -53,35 +54,8 @@ pub(super) fn lacking(runs: &[Signals<'_>], log: &DriveLog) -> Vec<Suspicion> {
     if found_s < DURATION_MIN_S {
         found.push(Suspicion::TooShort { needed_s: DURATION_MIN_S, found_s });
     }
-    found.extend(missing(runs, log));
+    found.extend(holes::mostly_missing(runs, log));
     found
-}
-
-/// Columns that a diagnosis reads and that have no number somewhere.
-fn missing(runs: &[Signals<'_>], log: &DriveLog) -> Vec<Suspicion> {
-    let needed = [
-        Column::X,
-        Column::Y,
-        Column::Yaw,
-        Column::Vx,
-        Column::Wz,
-        Column::Roll,
-        Column::Pitch,
-        Column::CmdSpeed,
-        Column::CmdSteer,
-        Column::SteerMeas,
-    ];
-    let in_column = |column: Column| {
-        let is_missing = move |run: &Signals<'_>, row: usize| {
-            run.run.column(column).is_some_and(|values| values[row].is_nan())
-        };
-        let rows = runs.iter().flat_map(|run| (0..run.n()).map(move |row| (run, row)));
-        let places: Vec<_> = rows.filter(|(run, row)| is_missing(run, *row)).collect();
-        let (run, row) = places.first()?;
-        let (n_missing, n) = (places.len(), log.n_rows());
-        Some(Suspicion::NotANumber { column: column.name(), place: run.place(*row), n_missing, n })
-    };
-    needed.into_iter().filter_map(in_column).collect()
 }
 
 /// Gaps and leaps, or that there are too many.
@@ -180,8 +154,9 @@ fn yaw_leap(run: &Signals<'_>, row: usize) -> Option<[f64; 2]> {
 ///
 /// Errors: names of runs that clash once the pieces are numbered.
 pub fn split_at_breaks(machine: &Machine, log: &DriveLog) -> Result<DriveLog, DriveLogError> {
+    let bridged = holes::bridged(log);
+    let breaks = located(&Signals::of(&bridged), machine).into_iter().map(|(row, _)| row).collect::<Vec<_>>();
     let runs = Signals::of(log);
-    let breaks: Vec<usize> = located(&runs, machine).into_iter().map(|(row, _)| row).collect();
     let mut split = DriveLog::default();
     for run in &runs {
         let own = run.first_row..run.first_row + run.n();

@@ -2,6 +2,7 @@
 
 use bicycle::DriveLog;
 
+use super::holes;
 use super::signals::Signals;
 use super::statistics::mean_and_deviation;
 use super::suspicion::Suspicion;
@@ -16,7 +17,8 @@ const SPEED_LITTLE_SHARE: f64 = 0.04;
 /// What is suspicious in simulated and real drives together, gravest first.
 pub fn screen_sets(sim: &[DriveLog], real: &[DriveLog]) -> Vec<Suspicion> {
     let mut found = same_drives(sim, real);
-    let runs: Vec<Signals<'_>> = real.iter().flat_map(Signals::of).collect();
+    let bridged: Vec<DriveLog> = real.iter().map(holes::bridged).collect();
+    let runs: Vec<Signals<'_>> = bridged.iter().flat_map(Signals::of).collect();
     found.extend(excitation(&runs));
     found.sort_by_key(Suspicion::gravity);
     found

@@ -60,7 +60,7 @@ pub(super) fn mean_and_deviation(values: impl IntoIterator<Item = f64>) -> (f64,
 }
 
 /// The value below which `share` of the others lie; 0 for none.
-pub(super) fn quantile(mut values: Vec<f64>, share: f64) -> f64 {
+pub(crate) fn quantile(mut values: Vec<f64>, share: f64) -> f64 {
     values.sort_by(f64::total_cmp);
     let last = values.len().saturating_sub(1);
     values.get((share * last as f64).round() as usize).copied().unwrap_or(0.0)

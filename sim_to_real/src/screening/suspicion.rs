@@ -33,6 +33,19 @@ impl fmt::Display for Place {
     }
 }
 
+/// Rows in which a column that is read has no number.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Hole {
+    /// Column.
+    pub column: &'static str,
+    /// First such row.
+    pub place: Place,
+    /// Rows without a number.
+    pub n_missing: usize,
+    /// All rows.
+    pub n: usize,
+}
+
 /// What a drive, or a set of drives, is suspected of.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Suspicion {
@@ -42,20 +55,18 @@ pub enum Suspicion {
         /// What is needed.
         expected: &'static str,
     },
-    /// A needed value is missing.
+    /// Most of a column that is read.
     #[error(
-        "{column}: expected a number in every row, found none in {n_missing} of {n} rows, first in {place}"
+        "{}: expected a number in half of the rows at least, found none in {} of {}, first in {}",
+        .0.column, .0.n_missing, .0.n, .0.place
     )]
-    NotANumber {
-        /// Column.
-        column: &'static str,
-        /// First such row.
-        place: Place,
-        /// Rows without a number.
-        n_missing: usize,
-        /// All rows.
-        n: usize,
-    },
+    MostlyMissing(Hole),
+    /// Some of it.
+    #[error(
+        "{}: no number in {} of {} rows, first in {}; nothing is compared there",
+        .0.column, .0.n_missing, .0.n, .0.place
+    )]
+    Missing(Hole),
     /// Too little of it.
     #[error("expected at least {needed_s:.0} s of driving, found {found_s:.2} s")]
     TooShort {
@@ -279,7 +290,8 @@ impl Suspicion {
     /// How grave it is.
     pub fn gravity(&self) -> Gravity {
         match self {
-            Self::Gap { .. }
+            Self::Missing(_)
+            | Self::Gap { .. }
             | Self::Leap { .. }
             | Self::Reset { .. }
             | Self::YawLeap { .. }

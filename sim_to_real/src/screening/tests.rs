@@ -157,12 +157,31 @@ fn many_leaps_are_no_drive() {
     assert_eq!(found.gravity(), Gravity::Refused);
 }
 
+/// A hole is told, and is neither a leap nor a reason to refuse the drive, until most of a column is one.
 #[test]
-fn a_missing_number_is_told_with_its_row() {
-    let told = told(&with(Column::Yaw, |k, yaw| if (100..112).contains(&k) { f64::NAN } else { yaw }));
-    let expected =
-        "yaw: expected a number in every row, found none in 12 of 1000 rows, first in row 101 (t = 2.00 s)";
-    assert_eq!(told, expected);
+fn missing_numbers_are_told_with_their_row() {
+    let without = |column, rows: std::ops::Range<usize>| {
+        with(column, move |k, value| if rows.contains(&k) { f64::NAN } else { value })
+    };
+    for column in [Column::Yaw, Column::X, Column::Vx, Column::CmdSpeed] {
+        let found = screen(&machine(), &without(column, 100..112));
+        let expected = format!(
+            "{}: no number in 12 of 1000 rows, first in row 101 (t = 2.00 s); nothing is compared there",
+            column.name()
+        );
+        assert_eq!(found.iter().map(ToString::to_string).collect::<Vec<_>>(), [expected]);
+        assert_eq!(found[0].gravity(), Gravity::Doubtful);
+    }
+    let mostly = first(&without(Column::Yaw, 100..700));
+    let expected = "yaw: expected a number in half of the rows at least, found none in 600 of 1000, first in row 101 (t = 2.00 s)";
+    assert_eq!((mostly.to_string().as_str(), mostly.gravity()), (expected, Gravity::Refused));
+}
+
+/// Of what is not a number in degrees, the unit is told as ever.
+#[test]
+fn a_hole_hides_no_wrong_unit() {
+    let holed = with(Column::Yaw, |k, yaw| if (100..200).contains(&k) { f64::NAN } else { yaw.to_degrees() });
+    assert!(told(&holed).starts_with("yaw: expected radians, found degrees?"), "{}", told(&holed));
 }
 
 #[test]

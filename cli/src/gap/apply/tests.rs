@@ -34,6 +34,7 @@ fn answer(verdict: Verdict, effects: Vec<NamedEffect>) -> Answer {
             position_error_2s_m: None,
         },
         errors_by_quantity: Vec::new(),
+        pose_sensor: None,
         controller_model: None,
         in_simulator: None,
         advice: Vec::new(),

@@ -119,6 +119,7 @@ mod tests {
             places: Vec::new(),
             shrink,
             errors_by_quantity: Vec::new(),
+            pose_sensor: None,
             controller_model: None,
             in_simulator: None,
             advice: Vec::new(),

@@ -1,0 +1,71 @@
+//! Rows in which a sensor said nothing.
+
+use bicycle::{Column, DriveLog};
+
+use super::signals::Signals;
+use super::suspicion::{Hole, Suspicion};
+use crate::signals::{filled, unwrapped};
+
+/// Share of the rows that may be missing before a column is none.
+const MISSING_MAX: f64 = 0.5;
+
+/// Columns that a diagnosis reads.
+const READ: [Column; 10] = [
+    Column::X,
+    Column::Y,
+    Column::Yaw,
+    Column::Vx,
+    Column::Wz,
+    Column::Roll,
+    Column::Pitch,
+    Column::CmdSpeed,
+    Column::CmdSteer,
+    Column::SteerMeas,
+];
+
+/// Columns without a number in most rows.
+pub(super) fn mostly_missing(runs: &[Signals<'_>], log: &DriveLog) -> Vec<Suspicion> {
+    let mostly = |hole: &Hole| hole.n_missing as f64 > MISSING_MAX * hole.n as f64;
+    holes(runs, log).filter(mostly).map(Suspicion::MostlyMissing).collect()
+}
+
+/// Columns without a number in some.
+pub(super) fn some_missing(runs: &[Signals<'_>], log: &DriveLog) -> Vec<Suspicion> {
+    holes(runs, log).map(Suspicion::Missing).collect()
+}
+
+fn holes(runs: &[Signals<'_>], log: &DriveLog) -> impl Iterator<Item = Hole> {
+    let in_column = |column: Column| {
+        let is_missing = move |run: &Signals<'_>, row: usize| {
+            run.run.column(column).is_some_and(|values| values[row].is_nan())
+        };
+        let rows = runs.iter().flat_map(|run| (0..run.n()).map(move |row| (run, row)));
+        let places: Vec<_> = rows.filter(|(run, row)| is_missing(run, *row)).collect();
+        let (run, row) = places.first()?;
+        let (n_missing, n) = (places.len(), log.n_rows());
+        Some(Hole { column: column.name(), place: run.place(*row), n_missing, n })
+    };
+    READ.into_iter().filter_map(in_column)
+}
+
+/// The drive with a straight line across every hole, so that it can be looked at.
+pub(super) fn bridged(log: &DriveLog) -> DriveLog {
+    let mut bridged = DriveLog::default();
+    for run in log.runs() {
+        let of = |column: Column| {
+            let values = run.column(column).filter(|values| values.iter().any(|value| !value.is_nan()))?;
+            let is_whole = values.iter().all(|value| !value.is_nan());
+            let line = |values: &[f64]| {
+                filled(&if column == Column::Yaw { unwrapped(values) } else { values.to_vec() })
+            };
+            (!is_whole).then(|| (column, line(values)))
+        };
+        let columns: Vec<(Column, Vec<f64>)> = Column::ALL.into_iter().filter_map(of).collect();
+        for (place, row) in run.drive_rows().enumerate() {
+            let row = columns.iter().fold(row, |row, (column, values)| row.with(*column, values[place]));
+            // Times and runs are those of a log.
+            let _ = bridged.push(run.name(), &row);
+        }
+    }
+    bridged
+}
