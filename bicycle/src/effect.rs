@@ -27,6 +27,7 @@ mod steer_servo;
 mod steer_swing;
 mod wind;
 mod yaw_gain;
+mod yaw_load;
 
 pub use definition::{Description, Parameter, Role};
 pub(crate) use definition::{Driving, Moving};
@@ -172,6 +173,7 @@ catalogue! {
     actuator::SteerRate,
     actuator::SteerLag,
     steer_servo::SteerServo,
+    steer_servo::LimitedServo,
     steer_swing::SteerSwing,
     actuator::SpeedLag,
     actuator::AccelLimit,
@@ -196,6 +198,7 @@ catalogue! {
     steer_linkage::SteerLinkage,
     yaw_gain::Understeer,
     yaw_gain::SteerYield,
+    yaw_load::YawLoad,
     rear_slip::RearSlip,
     rear_slip::RearSteer,
     friction::Friction,

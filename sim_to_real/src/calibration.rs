@@ -7,7 +7,7 @@ use bicycle::Effect;
 use bicycle::effect::Parameter;
 
 /// What every machine has a little of, in order of action, with the values that the fit starts from.
-const ORDINARY: [(&str, [f64; 4]); 29] = [
+const ORDINARY: [(&str, [f64; 4]); 31] = [
     ("steer_delay", [0.02, 0.0, 0.0, 0.0]),
     ("speed_delay", [0.02, 0.0, 0.0, 0.0]),
     ("speed_scale", [1.0, 0.0, 0.0, 0.0]),
@@ -16,6 +16,7 @@ const ORDINARY: [(&str, [f64; 4]); 29] = [
     ("backlash", [0.004, 0.0, 0.0, 0.0]),
     ("steer_rate", [3.0, 0.0, 0.0, 0.0]),
     ("steer_servo", [0.1, 1.0, 0.0, 0.0]),
+    ("limited_servo", [0.1, 1.0, 3.0, 0.0]),
     (SWING, [0.0; 4]),
     ("accel_limit", [15.0, 0.0, 0.0, 0.0]),
     ("speed_lag", [0.03, 0.0, 0.0, 0.0]),
@@ -34,6 +35,7 @@ const ORDINARY: [(&str, [f64; 4]); 29] = [
     ("slope_gravity", [0.3, 0.0, 0.0, 0.0]),
     ("cross_slope", [0.0; 4]),
     ("understeer", [0.0; 4]),
+    ("yaw_load", [0.0; 4]),
     ("rear_slip", [0.0; 4]),
     ("rear_steer", [0.0; 4]),
     ("pose_latency", [0.01, 0.0, 0.0, 0.0]),
@@ -60,11 +62,13 @@ const GRAVITY: [&str; 2] = ["slope_gravity", "cross_slope"];
 /// What a controller does against the first of them.
 const COMPENSATION: &str = "hill_compensation";
 /// Effects whose time constant no machine is without.
-const LAGS: [&str; 2] = ["steer_servo", "speed_loop"];
+const LAGS: [&str; 3] = ["steer_servo", "limited_servo", "speed_loop"];
 /// What makes the turning lead the steering.
 const SWING: &str = "steer_swing";
 /// What a controller's model does without.
-const NOT_FOR_CONTROL: [&str; 3] = [SWING, "drive_limit", "drive_power"];
+const NOT_FOR_CONTROL: [&str; 5] = [SWING, "limited_servo", "yaw_load", "drive_limit", "drive_power"];
+/// What stands there for a servo within a rate, at less cost for each of many steps.
+const FOR_CONTROL: [&str; 2] = ["steer_rate", "steer_servo"];
 /// Below this share of gravity along the slope the simulator is one of a plane.
 const PLANE: f64 = 0.25;
 
@@ -72,7 +76,7 @@ const PLANE: f64 = 0.25;
 pub(crate) fn calibrated(wheelbase_m: f64, drives: &[&Drive]) -> (Vec<Effect>, Yardstick) {
     let rough = Yardstick::rough();
     let comparison = Comparison::new(wheelbase_m, drives.to_vec(), &rough);
-    let simplest = simplest_fit(&comparison, ordinary(CONTROLLERS[0]));
+    let simplest = simplest_fit(&comparison, ordinary(CONTROLLERS[0], &FOR_CONTROL));
     let mut yardstick = Yardstick::of(&comparison.residuals(&simplest), &rough);
     let mut effects = with_controller(&Comparison::new(wheelbase_m, drives.to_vec(), &yardstick), simplest);
     for _ in 0..2 {
@@ -119,16 +123,15 @@ pub(crate) fn recalibrated(
 /// controller; taken for limits of its force they would forbid slopes that it climbs.
 pub(crate) fn proportional(wheelbase_m: f64, drives: &[&Drive], yardstick: &Yardstick) -> Vec<Effect> {
     let comparison = Comparison::new(wheelbase_m, drives.to_vec(), yardstick);
-    let mut start = ordinary(CONTROLLERS[0]);
-    start.retain(|effect| !NOT_FOR_CONTROL.contains(&effect.description().id));
-    let effects = simplest_fit(&comparison, start);
+    let effects = simplest_fit(&comparison, ordinary(CONTROLLERS[0], &NOT_FOR_CONTROL));
     let whole = with_whole_gravity(effects);
     refined(&comparison, &whole, &held_of(&whole))
 }
 
-/// The ordinary effects with a speed controller of some kind.
-fn ordinary(controller: &[&str]) -> Vec<Effect> {
-    let has = |id: &str| controller.contains(&id) || !CONTROLLERS.concat().contains(&id);
+/// The ordinary effects with a speed controller of some kind, and without some.
+fn ordinary(controller: &[&str], without: &[&str]) -> Vec<Effect> {
+    let is_free = |id: &str| !CONTROLLERS.concat().contains(&id) && !without.contains(&id);
+    let has = |id: &str| controller.contains(&id) || is_free(id);
     let own = ORDINARY.iter().filter(|(id, _)| has(id));
     own.filter_map(|&(id, values)| Effect::from_values(id, values)).collect()
 }
@@ -171,7 +174,7 @@ fn grown(simpler: &[Effect], parts: &[&str]) -> Vec<Effect> {
     let start = |own: Effect| {
         known.next_if(|known| known.description().id == own.description().id).copied().unwrap_or(own)
     };
-    ordinary(parts).into_iter().map(start).collect()
+    ordinary(parts, &FOR_CONTROL).into_iter().map(start).collect()
 }
 
 /// Limits that nothing reached leave no slope to follow: each is tried at every value of the catalogue.

@@ -1,4 +1,4 @@
-//! Steering with inertia: a servo of second order.
+//! Steering with inertia: a servo of second order, without and with a limit of its rate.
 
 use super::definition::{Commanding, Constants, Definition, Role, Stage, parameters};
 use crate::lanes::{Lanes, Real};
@@ -64,5 +64,66 @@ impl Definition for SteerServo {
         state.memory[0] = next.1;
         state.memory[1] = (next + next_rate).1;
         state.steering = next;
+    }
+}
+
+/// Steps of a limited servo in one of the vehicle.
+const N_SUBSTEPS: usize = 4;
+
+parameters! {
+    /// Steering with inertia and a limit of its rate.
+    LimitedServo {
+        /// Delay of a ramp T: twice the damping over the natural frequency [s].
+        time_constant_s in "s": 0.0 to 2.0, neutral 0.0, tried [0.06, 0.15, 0.3, 0.7];
+        /// Damping ratio Z; below 1 it overshoots [-].
+        damping in "-": 0.3 to 3.0, neutral 1.0, tried [0.5, 0.7];
+        /// Fastest change R [rad/s].
+        rate_radps in "rad/s": 0.02 to 1e6, neutral 1e6, tried [0.15, 0.3, 0.6, 1.2, 2.4];
+    }
+}
+
+impl Definition for LimitedServo {
+    const ID: &'static str = "limited_servo";
+    const MEANING: &'static str = "second-order steering within a rate: dr/dt = W^2 (command - x) - 2 Z W r with W = 2 Z / T, \
+        dx/dt = r, |r| <= R";
+    const ROLE: Role = Role::Calibration;
+    const STAGES: &'static [Stage] = &[Stage::Command];
+
+    /// By the implicit Euler method, whose rate after a part h of a step is (r + h W^2 e) / (1 + 2 Z W h + W^2 h^2): what is
+    /// kept of the rate, what the distance adds to it, h, and R.
+    fn constants(&self, step_s: f64) -> [f64; 4] {
+        let part_s = step_s / N_SUBSTEPS as f64;
+        if self.time_constant_s <= 0.0 {
+            return [0.0, 1.0 / part_s, part_s, self.rate_radps];
+        }
+        let natural = 2.0 * self.damping / self.time_constant_s;
+        let stiffness = natural * natural * part_s;
+        let kept = 1.0 / (1.0 + 2.0 * self.damping * natural * part_s + stiffness * part_s);
+        [kept, stiffness * kept, part_s, self.rate_radps]
+    }
+
+    /// The angle, and the angle with the rate added, so that at rest both are the command.
+    fn n_slots(&self, _step_s: f64) -> usize {
+        2
+    }
+
+    fn steady_state(&self, command: [f64; 2]) -> f64 {
+        command[1]
+    }
+
+    #[inline(always)]
+    fn on_command<L: Lanes>(constants: &Constants, state: &mut Commanding<'_, L>) {
+        let lanes = state.steering.0;
+        let [kept, by_distance, part, limit] = constants.map(|value| Real::constant(lanes, value));
+        let mut reached = Real(lanes, state.memory[0]);
+        let mut rate = Real(lanes, state.memory[1]) - reached;
+        for _ in 0..N_SUBSTEPS {
+            let distance = state.steering - reached;
+            rate = distance.mul_add(by_distance, rate * kept).clamp(-limit, limit);
+            reached = rate.mul_add(part, reached);
+        }
+        state.memory[0] = reached.1;
+        state.memory[1] = (reached + rate).1;
+        state.steering = reached;
     }
 }

@@ -8,7 +8,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 
 /// Sets of effects that leave one another something to do; together they hold every effect that moves a vehicle.
 fn sets_of_effects() -> [Vec<Effect>; 2] {
-    let first: [(&str, &[f64]); 26] = [
+    let first: [(&str, &[f64]); 28] = [
         ("steer_delay", &[0.17]),
         ("speed_delay", &[0.25]),
         ("motor_deadband", &[0.8]),
@@ -18,6 +18,7 @@ fn sets_of_effects() -> [Vec<Effect>; 2] {
         ("backlash", &[0.02]),
         ("steer_lag", &[0.15]),
         ("steer_servo", &[0.12, 0.6]),
+        ("limited_servo", &[0.1, 0.8, 0.7]),
         ("steer_swing", &[0.1]),
         ("speed_lag", &[0.3]),
         ("speed_loop", &[0.4]),
@@ -33,6 +34,7 @@ fn sets_of_effects() -> [Vec<Effect>; 2] {
         ("slope_gravity", &[0.9]),
         ("steer_linkage", &[1.1]),
         ("understeer", &[0.02]),
+        ("yaw_load", &[-0.04, 0.02]),
         ("rear_slip", &[0.01]),
         ("rear_steer", &[0.2]),
     ];
