@@ -95,6 +95,24 @@ def test_the_controllers_own_model_is_begun_with(sim, real, report):
         gap.diagnose(sim, real, VEHICLE, model="rc_car")
 
 
+def test_a_pose_of_another_clock_and_place_is_corrected_first(sim, real, report):
+    def off(frame):
+        late = frame[["x", "y", "yaw"]].shift(5).bfill()
+        ahead_m, left_m = 0.5, -0.2
+        sine, cosine = np.sin(late["yaw"]), np.cos(late["yaw"])
+        x = late["x"] + cosine * ahead_m - sine * left_m
+        return frame.assign(x=x, y=late["y"] + sine * ahead_m + cosine * left_m, yaw=late["yaw"])
+
+    found = gap.diagnose(sim, [off(frame) for frame in real], VEHICLE, estimate=["time_offset", "lever_arm"])
+    sensor = found.answer["pose_sensor"]
+    assert sensor["time_offset_s"]["value"] == pytest.approx(0.1, abs=0.01)
+    assert sensor["lever_arm_ahead_m"]["value"] == pytest.approx(0.5, abs=0.05)
+    assert sensor["lever_arm_left_m"]["value"] == pytest.approx(-0.2, abs=0.05)
+    assert found.names == report.names
+    with pytest.raises(ValueError, match='estimate: expected "time_offset" and "lever_arm", found "clock"'):
+        gap.diagnose(sim, real, VEHICLE, estimate=["clock"])
+
+
 def test_the_manoeuvre_is_a_table_or_nothing(report):
     table = gap.manoeuvre(report)
     if table is not None:

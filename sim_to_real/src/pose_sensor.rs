@@ -94,7 +94,7 @@ impl PoseSensor {
     /// stretches of ten seconds.
     ///
     /// # Errors
-    /// A drive without pose, speed or yaw rate; less than 40 s; an offset of more than half a second; drives that do not
+    /// A drive without pose, speed or yaw rate; less than 30 s; an offset of more than half a second; drives that do not
     /// tell it.
     pub fn estimated(
         drives: &Drives,

@@ -11,7 +11,7 @@ const STEP_S: f64 = 0.01;
 /// Least turning that tells a lever arm [rad/s]: noise of the yaw rate adds up to a few thousandths within a window.
 const LEAST_TURNING_RADPS: f64 = 0.05;
 /// Shortest drives together that intervals can be told from [s].
-const SHORTEST_S: f64 = 40.0;
+const SHORTEST_S: f64 = 30.0;
 /// Residuals beyond this many standard deviations count as so many.
 const CLIPPED_AT: f64 = 2.5;
 /// Half of a 90 % interval in standard errors.

@@ -134,8 +134,8 @@ fn drives_that_do_not_tell_it_are_refused() {
     let told = |made: Made| PoseSensor::estimated(&drives(made), 1.6, &BOTH).unwrap_err().to_string();
     let straight = told(Made { turns: 0.0, ..MADE });
     assert!(straight.contains("expected drives that turn by 0.05 rad/s or more"), "{straight}");
-    let short = told(Made { duration_s: 15.0, ..MADE });
-    assert_eq!(short, "pose sensor: expected at least 40 s of drives, found 30 s");
+    let short = told(Made { duration_s: 10.0, ..MADE });
+    assert_eq!(short, "pose sensor: expected at least 30 s of drives, found 20 s");
     let far = told(Made { late_s: 0.5, duration_s: 60.0, ..MADE });
     assert_eq!(far, "pose sensor: expected a time offset within 0.5 s, found none that fits best there");
     let mut blind = drives(MADE);
