@@ -1,6 +1,6 @@
 """How often the intervals of diagnoses hold the truth, effect by effect.
 
-    coverage.py LABELS:ANSWERS ...
+    interval_coverage.py LABELS:ANSWERS ...
 
 ANSWERS are those that `surefoot gap score` keeps in its output. Of every single effect that was announced rightly, the
 parameters that the label has as the catalogue has them are compared; of limits their logarithms. The last column tells by
