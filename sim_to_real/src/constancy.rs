@@ -1,10 +1,8 @@
-//! Whether what separates the drives is the same throughout: early and late in them, to the left and to the right, slow
-//! and fast, on one class of ground and on others.
+//! Whether what separates the drives is the same throughout: early and late in them, to the left and to the right.
 
 use crate::baseline::Baseline;
 use crate::cross_validation::CrossValidation;
-use crate::drive::{Drive, VX};
-use crate::screening::quantile;
+use crate::drive::Drive;
 use bicycle::Effect;
 
 /// Causes that foretell other drives better by this in the logarithm of the loss than anything constant does, once their
@@ -12,7 +10,7 @@ use bicycle::Effect;
 const NOT_THE_SAME: f64 = 0.055;
 /// Rollouts that each drive must have in each half.
 const FEWEST: usize = 15;
-/// The steering counts over this many steps from a rollout's start, speed and ground so many after it.
+/// The steering counts over this many steps from a rollout's start.
 const LOOK_AHEAD: usize = 50;
 
 /// What may differ from one half of the rollouts to the other.
@@ -22,22 +20,16 @@ pub(crate) enum Halves {
     EarlyAndLate,
     /// Steering to the left and to the right.
     LeftAndRight,
-    /// Below the median of all speeds and above.
-    SlowAndFast,
-    /// Open ground and any other.
-    OpenAndOther,
 }
 
 impl Halves {
-    const ALL: [Self; 4] = [Self::EarlyAndLate, Self::LeftAndRight, Self::SlowAndFast, Self::OpenAndOther];
+    const ALL: [Self; 2] = [Self::EarlyAndLate, Self::LeftAndRight];
 
-    fn is_in_first(self, drive: &Drive, place: usize, median_mps: f64) -> bool {
-        let start = drive.starts[place];
+    fn is_in_first(self, drive: &Drive, place: usize) -> bool {
         match self {
             Self::EarlyAndLate => 2 * place < drive.starts.len(),
-            Self::SlowAndFast => drive.smooth[VX][start + LOOK_AHEAD] < median_mps,
-            Self::OpenAndOther => drive.class[start + LOOK_AHEAD] < 0.5,
             Self::LeftAndRight => {
+                let start = drive.starts[place];
                 let ahead = &drive.commands[start..start + LOOK_AHEAD];
                 ahead.iter().map(|command| command.steering_rad).sum::<f32>() > 0.0
             }
@@ -45,13 +37,9 @@ impl Halves {
     }
 
     fn of(self, drives: &[Drive]) -> Option<[Vec<Drive>; 2]> {
-        let speeds_mps =
-            drives.iter().flat_map(|drive| drive.starts.iter().map(|&i| drive.smooth[VX][i + LOOK_AHEAD]));
-        let median_mps = quantile(speeds_mps.collect(), 0.5);
         let part = |is_first: bool| {
             drives.iter().map(move |drive| {
-                let is_own = |place: &usize| self.is_in_first(drive, *place, median_mps) == is_first;
-                let places = (0..drive.starts.len()).filter(is_own);
+                let places = (0..drive.starts.len()).filter(|&i| self.is_in_first(drive, i) == is_first);
                 Drive { starts: places.map(|i| drive.starts[i]).collect(), ..drive.clone() }
             })
         };
@@ -75,8 +63,6 @@ impl Changing {
         let how = match self.halves {
             Halves::EarlyAndLate => "not the same early and late in the drives",
             Halves::LeftAndRight => "not the same to the left and to the right",
-            Halves::SlowAndFast => "not the same at low and at high speed",
-            Halves::OpenAndOther => "not the same on open ground and elsewhere",
         };
         format!(
             "{} foretells the drives better than anything constant once it is {how}",

@@ -63,14 +63,6 @@ fn a_gain_of_one_side_is_told_to_differ() {
     );
 }
 
-/// 0.85 below 2 m/s, which is the median, and 0.85 * 0.9 above.
-#[test]
-fn a_gain_that_falls_with_speed_is_told_to() {
-    let changing = found(Made { fast_ratio: 0.9, ..Made::RIGHT }).1.unwrap();
-    assert_eq!(changing.halves, Halves::SlowAndFast);
-    assert!(changing.told().ends_with("it is not the same at low and at high speed"), "{}", changing.told());
-}
-
 /// A gain of 0.85 is a bias to one side where one steers left and to the other where one steers right; beside the gain
 /// itself, which is the same on both, that tells nothing.
 #[test]

@@ -34,16 +34,13 @@ pub(crate) struct Made {
     pub(crate) curvature_ratio: f64,
     /// The same once more to the left.
     pub(crate) left_ratio: f64,
-    /// The same once more above 2 m/s.
-    pub(crate) fast_ratio: f64,
     /// Speed over the commanded one.
     pub(crate) speed_ratio: f64,
 }
 
 impl Made {
     /// The kinematic bicycle.
-    pub(crate) const RIGHT: Self =
-        Self { curvature_ratio: 1.0, left_ratio: 1.0, fast_ratio: 1.0, speed_ratio: 1.0 };
+    pub(crate) const RIGHT: Self = Self { curvature_ratio: 1.0, left_ratio: 1.0, speed_ratio: 1.0 };
 }
 
 /// Drives of 24 s in arcs of 0.02 s, with noise: speeds and angles that change every second and a half.
@@ -60,8 +57,7 @@ pub(crate) fn arcs(made: Made, seed: u64) -> Drive {
         }
         let speed = made.speed_ratio * asked;
         let side = if angle > 0.0 { made.left_ratio } else { 1.0 };
-        let pace = if speed > 2.0 { made.fast_ratio } else { 1.0 };
-        let yaw_rate = speed * made.curvature_ratio * side * pace * angle.tan();
+        let yaw_rate = speed * made.curvature_ratio * side * angle.tan();
         rows.push([
             x + 0.01 * noise(),
             y + 0.01 * noise(),

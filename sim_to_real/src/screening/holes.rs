@@ -26,26 +26,37 @@ const READ: [Column; 10] = [
 /// Columns without a number in most rows.
 pub(super) fn mostly_missing(runs: &[Signals<'_>], log: &DriveLog) -> Vec<Suspicion> {
     let mostly = |hole: &Hole| hole.n_missing as f64 > MISSING_MAX * hole.n as f64;
-    holes(runs, log).filter(mostly).map(Suspicion::MostlyMissing).collect()
+    holes(runs, log).into_iter().filter(mostly).map(Suspicion::MostlyMissing).collect()
 }
 
 /// Columns without a number in some.
 pub(super) fn some_missing(runs: &[Signals<'_>], log: &DriveLog) -> Vec<Suspicion> {
-    holes(runs, log).map(Suspicion::Missing).collect()
+    holes(runs, log).into_iter().map(Suspicion::Missing).collect()
 }
 
-fn holes(runs: &[Signals<'_>], log: &DriveLog) -> impl Iterator<Item = Hole> {
-    let in_column = |column: Column| {
-        let is_missing = move |run: &Signals<'_>, row: usize| {
-            run.run.column(column).is_some_and(|values| values[row].is_nan())
-        };
-        let rows = runs.iter().flat_map(|run| (0..run.n()).map(move |row| (run, row)));
-        let places: Vec<_> = rows.filter(|(run, row)| is_missing(run, *row)).collect();
-        let (run, row) = places.first()?;
-        let (n_missing, n) = (places.len(), log.n_rows());
-        Some(Hole { column: column.name(), place: run.place(*row), n_missing, n })
-    };
-    READ.into_iter().filter_map(in_column)
+/// Columns of one sensor are missing together, and told so.
+fn holes(runs: &[Signals<'_>], log: &DriveLog) -> Vec<Hole> {
+    let mut holes: Vec<Hole> = Vec::new();
+    for hole in READ.into_iter().filter_map(|column| hole_in(column, runs, log)) {
+        match holes.last_mut() {
+            Some(last) if (&last.place, last.n_missing) == (&hole.place, hole.n_missing) => {
+                last.columns += ", ";
+                last.columns += &hole.columns;
+            }
+            _ => holes.push(hole),
+        }
+    }
+    holes
+}
+
+fn hole_in(column: Column, runs: &[Signals<'_>], log: &DriveLog) -> Option<Hole> {
+    let is_missing =
+        |run: &Signals<'_>, row: usize| run.run.column(column).is_some_and(|values| values[row].is_nan());
+    let rows = runs.iter().flat_map(|run| (0..run.n()).map(move |row| (run, row)));
+    let places: Vec<_> = rows.filter(|(run, row)| is_missing(run, *row)).collect();
+    let (run, row) = places.first()?;
+    let columns = column.name().to_owned();
+    Some(Hole { columns, place: run.place(*row), n_missing: places.len(), n: log.n_rows() })
 }
 
 /// The drive with a straight line across every hole, so that it can be looked at.

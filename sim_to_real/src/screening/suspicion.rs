@@ -33,11 +33,11 @@ impl fmt::Display for Place {
     }
 }
 
-/// Rows in which a column that is read has no number.
+/// Rows in which columns that are read have no number.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Hole {
-    /// Column.
-    pub column: &'static str,
+    /// Columns, separated by commas.
+    pub columns: String,
     /// First such row.
     pub place: Place,
     /// Rows without a number.
@@ -58,13 +58,13 @@ pub enum Suspicion {
     /// Most of a column that is read.
     #[error(
         "{}: expected a number in half of the rows at least, found none in {} of {}, first in {}",
-        .0.column, .0.n_missing, .0.n, .0.place
+        .0.columns, .0.n_missing, .0.n, .0.place
     )]
     MostlyMissing(Hole),
     /// Some of it.
     #[error(
         "{}: no number in {} of {} rows, first in {}; nothing is compared there",
-        .0.column, .0.n_missing, .0.n, .0.place
+        .0.columns, .0.n_missing, .0.n, .0.place
     )]
     Missing(Hole),
     /// Too little of it.

@@ -177,6 +177,18 @@ fn missing_numbers_are_told_with_their_row() {
     assert_eq!((mostly.to_string().as_str(), mostly.gravity()), (expected, Gravity::Refused));
 }
 
+#[test]
+fn columns_of_one_sensor_are_missing_together() {
+    let mut rows = rows(1000);
+    for row in &mut rows[..10] {
+        *row = row.with(Column::X, f64::NAN).with(Column::Y, f64::NAN).with(Column::Yaw, f64::NAN);
+    }
+    let found = screen(&machine(), &log(&rows));
+    let expected =
+        "x, y, yaw: no number in 10 of 1000 rows, first in row 1 (t = 0.00 s); nothing is compared there";
+    assert_eq!(found.iter().map(ToString::to_string).collect::<Vec<_>>(), [expected]);
+}
+
 /// Of what is not a number in degrees, the unit is told as ever.
 #[test]
 fn a_hole_hides_no_wrong_unit() {
