@@ -120,7 +120,7 @@ fn a_pose_of_another_clock_and_place_in_a_file_of_its_own_changes_nothing_that_i
         assert!((estimate.value - truth).abs() < within, "{truth}: {estimate:?}");
     }
     let printed = String::from_utf8_lossy(&output.stdout).into_owned();
-    assert!(printed.contains("the robot's pose sensor is late by 0.1"), "{printed}");
+    assert!(printed.contains("The robot's pose sensor is late by 0.1"), "{printed}");
 }
 
 /// Rows of the pose and of the commands are missing: told, and the answer is the same.

@@ -185,17 +185,19 @@ pub fn text(answer: &Answer, drives: &str) -> String {
 
 /// What was found of the robot's pose sensor, and taken out.
 pub(crate) fn pose_sensor(found: &PoseSensor) -> String {
-    let of = |name: &str, unit: &str, estimate: Option<Estimate>| {
+    let of = |before: &str, estimate: Option<Estimate>, after: &str| {
         let Estimate { value, low, high } = estimate?;
-        Some(format!("{name} {value:.3} {unit} ({low:.3} to {high:.3})"))
+        let unit = if after.is_empty() { "s" } else { "m" };
+        Some(format!("{before} {value:.3} {unit} ({low:.3} to {high:.3}){after}"))
     };
     let told = [
-        of("late by", "s", found.time_offset_s),
-        of("ahead of the rear axle", "m", found.lever_arm_ahead_m),
-        of("to its left", "m", found.lever_arm_left_m),
+        of("is late by", found.time_offset_s, ""),
+        of("sits", found.lever_arm_ahead_m, " ahead of the rear axle"),
+        of("sits", found.lever_arm_left_m, " to its left"),
     ];
     let told: Vec<String> = told.into_iter().flatten().collect();
-    format!("the robot's pose sensor is {}; taken out of its drives", told.join(", "))
+    let told: Vec<&str> = told.iter().map(String::as_str).collect();
+    format!("The robot's pose sensor {}; taken out of its drives.", listed(&told))
 }
 
 /// How strongly the drives ask for an effect, where that is known.
@@ -259,10 +261,15 @@ mod tests {
     #[test]
     fn a_pose_sensor_is_told_as_far_as_it_was_asked_about() {
         let time_offset_s = Some(Estimate { value: 0.12, low: 0.11, high: 0.1301 });
-        let found = PoseSensor { time_offset_s, ..PoseSensor::default() };
+        let late = PoseSensor { time_offset_s, ..PoseSensor::default() };
+        let arm = |value: f64| Some(Estimate { value, low: value - 0.1, high: value + 0.1 });
+        let off = PoseSensor { lever_arm_ahead_m: arm(0.5), lever_arm_left_m: arm(-0.2), ..late };
+        let told = pose_sensor(&off);
+        let expected = "(0.110 to 0.130), sits 0.500 m (0.400 to 0.600) ahead of the rear axle and sits -0.200 m (-0.300 to -0.100) to its left; taken";
+        assert!(told.contains(expected), "{told}");
         assert_eq!(
-            pose_sensor(&found),
-            "the robot's pose sensor is late by 0.120 s (0.110 to 0.130); taken out of its drives"
+            pose_sensor(&late),
+            "The robot's pose sensor is late by 0.120 s (0.110 to 0.130); taken out of its drives."
         );
     }
 
