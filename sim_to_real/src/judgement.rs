@@ -7,12 +7,12 @@ use crate::causes::{Explanation, candidates};
 use bicycle::Effect;
 
 /// Logit of a single effect over none where nothing supports it,
-const UNSUPPORTED: f64 = -7.0;
+const UNSUPPORTED: f64 = -6.8;
 /// and what supports it counts for: the root of its gain, the logarithms of one more than its strength and than that of
 /// the weakest drive, and how much of it nominal drives ask for.
-const SUPPORT: [f64; 4] = [9.9, 1.3, 1.5, -2.6];
+const SUPPORT: [f64; 4] = [7.9, 1.2, 1.8, -2.9];
 /// An explanation is announced when it is this many times as probable as none.
-const BEYOND_DOUBT: f64 = 1.3;
+const BEYOND_DOUBT: f64 = 2.0;
 /// The names that are as good as the best hold the true one with this probability, if one of them is.
 const CREDIBLE: f64 = 0.85;
 /// Logarithmic gain in loss that a second effect must bring beyond chance: a wrong shape of the first one invites it.
