@@ -1201,7 +1201,7 @@ def attach(run: str | None=None) -> Run:
     where there is no such run.
     """
 
-def diagnose(sim: Sequence[_Drive], real: Sequence[_Drive], vehicle: Vehicle | _Path | _Description, *, heldout: Sequence[_Drive] | None=None, columns: dict[str, str] | None=None, simulator: Callable[[dict[str, Any]], Mapping[str, Any]] | None=None, model: Model | Vehicle | None=None, name: str | None=None) -> GapReport:
+def diagnose(sim: Sequence[_Drive], real: Sequence[_Drive], vehicle: Vehicle | _Path | _Description, *, heldout: Sequence[_Drive] | None=None, columns: dict[str, str] | None=None, simulator: Callable[[dict[str, Any]], Mapping[str, Any]] | None=None, model: Model | Vehicle | None=None, estimate: Sequence[str]=..., name: str | None=None) -> GapReport:
     """Says why simulator and robot disagree: where, which effect, how far the gap shrinks, and what to drive next.
 
     sim, real, heldout: lists of drives, each a data frame or a dict of arrays with the columns of a drive log (`t` [s] and a
@@ -1213,7 +1213,8 @@ def diagnose(sim: Sequence[_Drive], real: Sequence[_Drive], vehicle: Vehicle | _
     "max_steer" [rad], "max_speed" [m/s], "noise"). columns: a dict from our names to yours, {"vx": "wheel_speed"}.
     simulator: a callable that drives commands as your simulator does and so decides; see docs/python.md. model: a `Model` or
     a `Vehicle`, the controller's model to begin with, else the one that the simulator's drives calibrate; what is announced
-    is fitted beside its effects for `apply`, and does not depend on it. name: for the report.
+    is fitted beside its effects for `apply`, and does not depend on it. estimate: "time_offset" and "lever_arm" of the robot's
+    pose sensor are estimated from its drives first and taken out of them. name: for the report.
 
     Returns a `GapReport`. Takes from seconds to minutes; Ctrl-C ends it. Raises `ValueError` for drives that would be
     misread, with what gave them away, and what the callable raises.
