@@ -270,6 +270,17 @@ impl DriveLog {
         }
     }
 
+    /// The log with other values in its rows; of each the number of its run and its place there are told. Times stay.
+    pub fn with_rows(&self, mut change: impl FnMut(usize, usize, DriveRow) -> DriveRow) -> Self {
+        let mut changed = Self { runs: self.runs.clone(), ..Self::default() };
+        for (run, own) in self.runs().enumerate() {
+            for (place, row) in own.drive_rows().enumerate() {
+                changed.append(&DriveRow { time_s: row.time_s, ..change(run, place, row) });
+            }
+        }
+        changed
+    }
+
     /// Number of rows over all runs.
     pub fn n_rows(&self) -> usize {
         self.time_s.len()
@@ -370,6 +381,20 @@ mod tests {
             }
         }
         assert_eq!(log, copy);
+    }
+
+    #[test]
+    fn rows_are_changed_where_they_stand() {
+        let mut log = DriveLog::default();
+        for (run, time_s) in [("a", 0.0), ("a", 0.1), ("b", 5.0)] {
+            log.push(run, &DriveRow::new(time_s).with(Column::X, 1.0)).unwrap();
+        }
+        let changed = log.with_rows(|run, place, row| {
+            DriveRow::new(f64::NAN).with(Column::X, row.value(Column::X) + 10.0 * run as f64 + place as f64)
+        });
+        let told: Vec<_> = changed.runs().map(|run| (run.time_s(), run.column(Column::X).unwrap())).collect();
+        assert_eq!(told, [(&[0.0, 0.1][..], &[1.0, 2.0][..]), (&[5.0][..], &[11.0][..])]);
+        assert_eq!(log.with_rows(|_, _, row| row), log);
     }
 
     #[test]

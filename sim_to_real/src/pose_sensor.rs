@@ -116,16 +116,8 @@ impl PoseSensor {
     }
 
     fn taken_out(&self, log: &DriveLog) -> DriveLog {
-        let mut corrected = DriveLog::default();
-        for run in log.runs() {
-            let poses = Poses::of(run);
-            for row in run.drive_rows() {
-                let row = poses.as_ref().map_or(row, |poses| self.corrected(row, poses));
-                // Times and runs are those of a log.
-                let _ = corrected.push(run.name(), &row);
-            }
-        }
-        corrected
+        let poses: Vec<Option<Poses>> = log.runs().map(Poses::of).collect();
+        log.with_rows(|run, _, row| poses[run].as_ref().map_or(row, |poses| self.corrected(row, poses)))
     }
 
     fn corrected(&self, row: DriveRow, poses: &Poses) -> DriveRow {

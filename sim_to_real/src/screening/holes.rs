@@ -1,6 +1,6 @@
 //! Rows in which a sensor said nothing.
 
-use bicycle::{Column, DriveLog};
+use bicycle::{Column, DriveLog, Run};
 
 use super::signals::Signals;
 use super::suspicion::{Hole, Suspicion};
@@ -61,22 +61,19 @@ fn hole_in(column: Column, runs: &[Signals<'_>], log: &DriveLog) -> Option<Hole>
 
 /// The drive with a straight line across every hole, so that it can be looked at.
 pub(super) fn bridged(log: &DriveLog) -> DriveLog {
-    let mut bridged = DriveLog::default();
-    for run in log.runs() {
-        let of = |column: Column| {
-            let values = run.column(column).filter(|values| values.iter().any(|value| !value.is_nan()))?;
-            let is_whole = values.iter().all(|value| !value.is_nan());
-            let line = |values: &[f64]| {
-                filled(&if column == Column::Yaw { unwrapped(values) } else { values.to_vec() })
-            };
-            (!is_whole).then(|| (column, line(values)))
-        };
-        let columns: Vec<(Column, Vec<f64>)> = Column::ALL.into_iter().filter_map(of).collect();
-        for (place, row) in run.drive_rows().enumerate() {
-            let row = columns.iter().fold(row, |row, (column, values)| row.with(*column, values[place]));
-            // Times and runs are those of a log.
-            let _ = bridged.push(run.name(), &row);
-        }
-    }
-    bridged
+    let columns: Vec<Vec<(Column, Vec<f64>)>> = log.runs().map(filled_columns).collect();
+    log.with_rows(|run, place, row| {
+        columns[run].iter().fold(row, |row, (column, values)| row.with(*column, values[place]))
+    })
+}
+
+/// The columns of a run that have holes and are not one, without them.
+fn filled_columns(run: Run<'_>) -> Vec<(Column, Vec<f64>)> {
+    let of = |column: Column| {
+        let values = run.column(column)?;
+        let n_missing = values.iter().filter(|value| value.is_nan()).count();
+        let line = || filled(&if column == Column::Yaw { unwrapped(values) } else { values.to_vec() });
+        (n_missing > 0 && n_missing < values.len()).then(|| (column, line()))
+    };
+    Column::ALL.into_iter().filter_map(of).collect()
 }
