@@ -60,13 +60,13 @@ pub enum PoseSensorError {
     },
     /// Noise of the yaw rate would count as turning.
     #[error(
-        "pose sensor: expected drives that turn by {needed_radps} rad/s or more (root mean square) to tell its lever arm, found {found_radps:.3} rad/s"
+        "pose sensor: expected drives that turn by {needed_rad} rad or more within 2 s (root mean square) to tell its lever arm, found {found_rad:.3} rad"
     )]
     Straight {
-        /// Needed [rad/s].
-        needed_radps: f64,
-        /// Found [rad/s].
-        found_radps: f64,
+        /// Needed [rad].
+        needed_rad: f64,
+        /// Found [rad].
+        found_rad: f64,
     },
     /// Drives that hardly turn or change their speed.
     #[error(
@@ -88,8 +88,8 @@ const NEEDED_S: f64 = 0.05;
 const NEEDED_WHEELBASES: f64 = 0.25;
 
 impl PoseSensor {
-    /// From drives of the robot, by how far pose and heading move within a second against what speed and yaw rate say of
-    /// the second that began a time offset earlier. Scale of the speed, bias of the yaw rate, misalignment of the yaw and
+    /// From drives of the robot, by how far pose and heading move within two seconds against what speed and yaw rate say of
+    /// those that began a time offset earlier. Scale of the speed, bias of the yaw rate, misalignment of the yaw and
     /// slip of the rear axle in proportion to lateral acceleration are left free. Intervals are those of a jackknife over
     /// stretches of ten seconds.
     ///

@@ -1,4 +1,4 @@
-//! What a pose says of a second against what speed and yaw rate say of it.
+//! What a pose says of two seconds against what speed and yaw rate say of them.
 
 use super::{PoseSensorError, Poses};
 use crate::screening::quantile;

@@ -8,8 +8,8 @@ use nalgebra::{DMatrix, DVector, Matrix5, Vector5};
 
 /// From one time offset that is tried to the next [s].
 const STEP_S: f64 = 0.01;
-/// Least turning that tells a lever arm [rad/s]: noise of the yaw rate adds up to a few thousandths within a window.
-const LEAST_TURNING_RADPS: f64 = 0.05;
+/// Least turn within a window that tells a lever arm [rad]: noise of the yaw rate adds up to a few thousandths within a window.
+const LEAST_TURN_RAD: f64 = 0.05;
 /// Shortest drives together that intervals can be told from [s].
 const SHORTEST_S: f64 = 30.0;
 /// Residuals beyond this many standard deviations count as so many.
@@ -73,9 +73,9 @@ impl Search<'_> {
         let windows = self.windows(0.0);
         let n = windows.iter().flatten().count().max(1) as f64;
         let squares: f64 = windows.iter().flatten().map(|window| window.moves_of_a_lever().powi(2)).sum();
-        let found_radps = (squares / n).sqrt();
-        let straight = PoseSensorError::Straight { needed_radps: LEAST_TURNING_RADPS, found_radps };
-        if found_radps < LEAST_TURNING_RADPS { Err(straight) } else { Ok(()) }
+        let found_rad = (squares / n).sqrt();
+        let straight = PoseSensorError::Straight { needed_rad: LEAST_TURN_RAD, found_rad };
+        if found_rad < LEAST_TURN_RAD { Err(straight) } else { Ok(()) }
     }
 
     fn windows(&self, offset_s: f64) -> Vec<Option<Window>> {

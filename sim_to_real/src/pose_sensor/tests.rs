@@ -133,7 +133,7 @@ fn one_unknown_alone_leaves_the_other_out() {
 fn drives_that_do_not_tell_it_are_refused() {
     let told = |made: Made| PoseSensor::estimated(&drives(made), 1.6, &BOTH).unwrap_err().to_string();
     let straight = told(Made { turns: 0.0, ..MADE });
-    assert!(straight.contains("expected drives that turn by 0.05 rad/s or more"), "{straight}");
+    assert!(straight.contains("expected drives that turn by 0.05 rad or more within 2 s"), "{straight}");
     let short = told(Made { duration_s: 10.0, ..MADE });
     assert_eq!(short, "pose sensor: expected at least 30 s of drives, found 20 s");
     let far = told(Made { late_s: 0.5, duration_s: 60.0, ..MADE });
