@@ -13,6 +13,7 @@ mod definition;
 mod drag;
 mod drive_lag;
 mod feed_forward;
+mod felt_slope;
 mod friction;
 mod gravity;
 mod limit;
@@ -22,9 +23,11 @@ mod rear_slip;
 mod sensors;
 mod speed_integral;
 mod speed_loop;
+mod speed_ramp;
 mod steer_linkage;
 mod steer_servo;
 mod steer_swing;
+mod wheel_slip;
 mod wind;
 mod yaw_gain;
 mod yaw_load;
@@ -177,10 +180,13 @@ catalogue! {
     steer_swing::SteerSwing,
     actuator::SpeedLag,
     actuator::AccelLimit,
+    speed_ramp::SpeedRamp,
+    wheel_slip::WheelSlip,
     speed_loop::SpeedLoop,
     feed_forward::FeedForward,
     speed_integral::SpeedIntegral,
     gravity::HillCompensation,
+    felt_slope::FeltSlope,
     gravity::CompensationLoss,
     limit::DriveLimit,
     limit::DrivePower,

@@ -304,6 +304,7 @@ impl Stepper {
                 ground: *ground,
                 held: lanes.real(0.0),
                 withheld: lanes.real(0.0),
+                resisted: lanes.real(0.0),
             };
             self.effects.on_drive(memory, &mut driving);
             let step = Real::constant(lanes, self.step);

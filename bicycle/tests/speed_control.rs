@@ -11,6 +11,10 @@ fn effect(id: &str, value: f64) -> Effect {
 }
 
 fn stepper(effects: &[(&str, f64)]) -> Stepper {
+    stepper_of(effects.iter().map(|&(id, value)| effect(id, value)).collect())
+}
+
+fn stepper_of(effects: Vec<Effect>) -> Stepper {
     let limits = Limits {
         speed_max_mps: 5.0,
         reverse_speed_max_mps: 1.0,
@@ -21,7 +25,6 @@ fn stepper(effects: &[(&str, f64)]) -> Stepper {
         roll_max_rad: 0.5,
         pitch_max_rad: 0.5,
     };
-    let effects = effects.iter().map(|&(id, value)| effect(id, value)).collect();
     Stepper::new(&Model { wheelbase_m: 2.0, limits, effects }, STEP_S, 1.0).with_instant_actuators()
 }
 
@@ -123,6 +126,59 @@ fn an_integral_waits_while_the_drive_gives_less_than_it_asks_for() {
     assert_eq!(limited.held(&mut memory)[0], 0.0);
 }
 
+/// Held against a drag D the drive gives D, with which wheels of slip S read v (1 + S D): the loop holds these as far behind
+/// the command as without slip the vehicle.
+#[test]
+fn a_loop_that_reads_slipping_wheels_holds_the_wheels() {
+    let slip = Effect::from_values("wheel_slip", [0.1, 0.3, 0.0, 0.0]).unwrap();
+    let controlled = stepper_of(vec![slip, effect("speed_loop", 0.4), effect("rolling_drag", 0.5)]);
+    let (speeds, held) = speeds(&controlled, SPEED_MPS, 1000);
+    let behind_mps = 0.5 * STEP_S / (1.0 - (-STEP_S / 0.4).exp());
+    let expected_mps = (SPEED_MPS - behind_mps) / (1.0 + 0.1 * 0.5);
+    assert!((speeds[999] - expected_mps).abs() < 1e-9, "{}", speeds[999]);
+    assert!((held[0] - 0.5).abs() < 1e-9, "{held:?}");
+}
+
+/// On a slope that begins at once what is felt of it is 1 - exp(-t / T).
+#[test]
+fn a_slope_is_felt_late() {
+    let late = Effect::from_values("felt_slope", [0.6, 0.5, 0.0, 0.0]).unwrap();
+    let controlled = stepper_of(vec![effect("speed_loop", 0.4), late]);
+    let command = Command { speed_mps: SPEED_MPS as f32, steering_rad: 0.0 };
+    let ground = GroundSample { gradient: [0.05, 0.0], ..GroundSample::FIRM };
+    let mut memory = vec![0.0; controlled.n_slots()];
+    let mut state = State { speed_mps: SPEED_MPS, ..State::default() };
+    for step in 1..=100 {
+        state = controlled.step_state(&state, command, &ground, &mut memory, step - 1);
+        let felt = 1.0 - (-(step as f64) * STEP_S / 0.5).exp();
+        let held = controlled.held(&mut memory)[0];
+        assert!((held - 0.6 * 9.80665 * 0.05 * felt).abs() < 1e-9, "{step}: {held}");
+    }
+}
+
+/// A reference grows by A and falls by B a second, forwards and, being one of speed, backwards.
+#[test]
+fn ramps_are_one_up_and_one_down() {
+    let ramps = Effect::from_values("speed_ramp", [0.5, 0.8, 0.0, 0.0]).unwrap();
+    let after_1_s = |from_mps: f64, to_mps: f64| {
+        let stepper = stepper_of(vec![ramps]);
+        let mut memory = vec![0.0; stepper.n_slots()];
+        let command = |speed_mps: f64| Command { speed_mps: speed_mps as f32, steering_rad: 0.0 };
+        stepper.fill_steady_state(command(from_mps), &mut memory);
+        let mut state = State { speed_mps: from_mps, ..State::default() };
+        for step in 0..50 {
+            state = stepper.step_state(&state, command(to_mps), &GroundSample::FIRM, &mut memory, step);
+        }
+        memory[0]
+    };
+    for (from_mps, to_mps, expected_mps) in
+        [(1.0, 3.0, 1.5), (3.0, 1.0, 2.2), (-0.2, -1.0, -0.7), (-1.0, 0.0, -0.2), (0.0, 2.0, 0.5)]
+    {
+        let reached_mps = after_1_s(from_mps, to_mps);
+        assert!((reached_mps - expected_mps).abs() < 1e-5, "{from_mps} to {to_mps}: {reached_mps}");
+    }
+}
+
 /// Behind a ramp of A a loop of time constant T lags by A T; the whole of the command's acceleration fed forward leaves
 /// nothing of that, half of it the half.
 #[test]
@@ -135,7 +191,7 @@ fn feed_forward_takes_the_lag_behind_a_ramp() {
     }
 }
 
-/// A speed that stays where it is although 1 m/s2 is held: what is held falls by the share dt / (1.5 s) every step.
+/// A speed that stays where it is although 1 m/s2 is held: what is held falls by the share sqrt(J) dt / 4 every step.
 #[test]
 fn what_is_held_follows_what_was_measured() {
     let controlled = stepper(&[("speed_loop", 0.4), ("speed_integral", 1.5)]);
@@ -146,7 +202,7 @@ fn what_is_held_follows_what_was_measured() {
     for step in 1..=50 {
         let foretold = controlled.step_state(&state, command, &GroundSample::FIRM, &mut memory, step);
         controlled.correct_held(&mut memory, SPEED_MPS - foretold.speed_mps);
-        let expected_mps2 = (1.0 - STEP_S / 1.5).powi(step as i32);
+        let expected_mps2 = (1.0 - 1.5_f64.sqrt() * STEP_S / 4.0).powi(step as i32);
         assert!((controlled.held(&mut memory)[0] - expected_mps2).abs() < 1e-9);
     }
 }

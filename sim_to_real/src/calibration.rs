@@ -7,7 +7,7 @@ use bicycle::Effect;
 use bicycle::effect::Parameter;
 
 /// What every machine has a little of, in order of action, with the values that the fit starts from.
-const ORDINARY: [(&str, [f64; 4]); 31] = [
+const ORDINARY: [(&str, [f64; 4]); 33] = [
     ("steer_delay", [0.02, 0.0, 0.0, 0.0]),
     ("speed_delay", [0.02, 0.0, 0.0, 0.0]),
     ("speed_scale", [1.0, 0.0, 0.0, 0.0]),
@@ -18,12 +18,14 @@ const ORDINARY: [(&str, [f64; 4]); 31] = [
     ("steer_servo", [0.1, 1.0, 0.0, 0.0]),
     ("limited_servo", [0.1, 1.0, 3.0, 0.0]),
     (SWING, [0.0; 4]),
-    ("accel_limit", [15.0, 0.0, 0.0, 0.0]),
+    ("speed_ramp", [15.0, 15.0, 0.0, 0.0]),
     ("speed_lag", [0.03, 0.0, 0.0, 0.0]),
+    ("wheel_slip", [0.01, 0.1, 0.0, 0.0]),
     ("speed_loop", [0.3, 0.0, 0.0, 0.0]),
     ("feed_forward", [0.1, 0.0, 0.0, 0.0]),
     ("speed_integral", [0.3, 0.0, 0.0, 0.0]),
     ("hill_compensation", [0.0; 4]),
+    ("felt_slope", [0.0, 0.1, 0.0, 0.0]),
     ("drive_limit", [8.0, 8.0, 0.0, 0.0]),
     ("drive_power", [1e4, 0.0, 0.0, 0.0]),
     ("drive_lag", [0.03, 0.0, 0.0, 0.0]),
@@ -46,8 +48,8 @@ const CONTROLLERS: [&[&str]; 5] = [
     &[],
     &["drive_lag"],
     &["speed_integral", "drive_lag"],
-    &["accel_limit", "speed_lag", "feed_forward", "drive_lag"],
-    &["accel_limit", "speed_lag", "feed_forward", "speed_integral", "drive_lag"],
+    &["speed_ramp", "speed_lag", "feed_forward", "drive_lag"],
+    &["speed_ramp", "speed_lag", "feed_forward", "speed_integral", "drive_lag"],
 ];
 /// A controller is taken for a less simple one when that foretells the drives better by this for each of its parts, in the
 /// logarithm of the loss.
@@ -60,15 +62,21 @@ const PULL: f64 = 1.5;
 /// Shares of gravity, along and across.
 const GRAVITY: [&str; 2] = ["slope_gravity", "cross_slope"];
 /// What a controller does against the first of them.
-const COMPENSATION: &str = "hill_compensation";
+const COMPENSATIONS: [&str; 2] = ["hill_compensation", "felt_slope"];
 /// Effects whose time constant no machine is without.
 const LAGS: [&str; 3] = ["steer_servo", "limited_servo", "speed_loop"];
+/// What drive and brakes can do, and the ramps of a controller's reference within it.
+const DRIVE_LIMIT: &str = "drive_limit";
+const RAMP: &str = "speed_ramp";
+/// What a drive can do, in what its controller's ramps ask of it, where nothing else is known.
+const DRIVE_OVER_RAMP: f64 = 1.5;
 /// What makes the turning lead the steering.
 const SWING: &str = "steer_swing";
 /// What a controller's model does without.
-const NOT_FOR_CONTROL: [&str; 5] = [SWING, "limited_servo", "yaw_load", "drive_limit", "drive_power"];
-/// What stands there for a servo within a rate, at less cost for each of many steps.
-const FOR_CONTROL: [&str; 2] = ["steer_rate", "steer_servo"];
+const NOT_FOR_CONTROL: [&str; 7] =
+    [SWING, "limited_servo", "yaw_load", "drive_limit", "drive_power", "wheel_slip", "felt_slope"];
+/// What stands there for a servo within a rate and a late compensation, at less cost for each of many steps.
+const FOR_CONTROL: [&str; 3] = ["steer_rate", "steer_servo", "hill_compensation"];
 /// Below this share of gravity along the slope the simulator is one of a plane.
 const PLANE: f64 = 0.25;
 
@@ -98,13 +106,13 @@ fn fitted(comparison: &Comparison<'_>, start: Vec<Effect>, held: &[&str]) -> Vec
 /// is gone, from other starts around there too: play can stand for a servo, and limits of the drive for a speed loop, well
 /// enough that a fit stays at a loop which no force has power over.
 fn simplest_fit(comparison: &Comparison<'_>, start: Vec<Effect>) -> Vec<Effect> {
-    let found = fitted(comparison, start, &[COMPENSATION]);
+    let found = fitted(comparison, start, &COMPENSATIONS);
     let is_gone = |own: &Effect| LAGS.contains(&own.description().id) && own.values()[0] < STEP_S;
     if !found.iter().any(is_gone) {
         return found;
     }
     let residuals = |values: &[f64]| comparison.residuals(&with_values(&found, values));
-    with_values(&found, &fit_from_several(&coordinates_beside(&found, &[COMPENSATION]), residuals).values)
+    with_values(&found, &fit_from_several(&coordinates_beside(&found, &COMPENSATIONS), residuals).values)
 }
 
 /// The same effects fitted to other drives, from where they are.
@@ -147,8 +155,11 @@ fn with_controller(comparison: &Comparison<'_>, simplest: Vec<Effect>) -> Vec<Ef
     for parts in &CONTROLLERS[1..] {
         let contained = fits.iter().filter(|simpler| simpler.parts.iter().all(|part| parts.contains(part)));
         let best = contained.min_by(|a, b| a.loss.total_cmp(&b.loss));
-        let start = best.map(|simpler| grown(&simpler.effects, parts));
-        fits.extend(start.map(|start| fit(parts, fitted(comparison, start, &[COMPENSATION]))));
+        let starts = best.map_or_else(Vec::new, |simpler| {
+            let start = grown(&simpler.effects, parts);
+            ramped(&start).into_iter().chain([start]).collect()
+        });
+        fits.extend(starts.into_iter().map(|start| fit(parts, fitted(comparison, start, &COMPENSATIONS))));
     }
     let best = fits.into_iter().min_by(|a, b| a.energy().total_cmp(&b.energy()));
     best.map_or_else(Vec::new, |best| best.effects)
@@ -175,6 +186,25 @@ fn grown(simpler: &[Effect], parts: &[&str]) -> Vec<Effect> {
         known.next_if(|known| known.description().id == own.description().id).copied().unwrap_or(own)
     };
     ordinary(parts, &FOR_CONTROL).into_iter().map(start).collect()
+}
+
+/// The same start with ramps where the drive's limits are, if it has ramps: without them these were taken for limits.
+fn ramped(start: &[Effect]) -> Option<Vec<Effect>> {
+    let limits = start.iter().find(|own| own.description().id == DRIVE_LIMIT)?.values();
+    start.iter().find(|own| own.description().id == RAMP)?;
+    let moved = |own: &Effect| {
+        let id = own.description().id;
+        let values = match id {
+            RAMP => limits,
+            DRIVE_LIMIT => limits.map(|limit| DRIVE_OVER_RAMP * limit),
+            "speed_lag" => [0.2, 0.0, 0.0, 0.0],
+            "feed_forward" => [0.5, 0.0, 0.0, 0.0],
+            "speed_loop" => own.values().map(|time_s| 0.5 * time_s),
+            _ => return *own,
+        };
+        Effect::from_values(id, values).unwrap_or(*own)
+    };
+    Some(start.iter().map(moved).collect())
 }
 
 /// Limits that nothing reached leave no slope to follow: each is tried at every value of the catalogue.
@@ -208,10 +238,12 @@ fn with_whole_gravity(mut effects: Vec<Effect>) -> Vec<Effect> {
         let id = effect.description().id;
         let share = match id {
             _ if GRAVITY.contains(&id) => whole,
-            COMPENSATION if !is_found_whole => (whole - along).max(0.0),
+            _ if COMPENSATIONS.contains(&id) && !is_found_whole => (whole - along).max(0.0),
             _ => continue,
         };
-        *effect = Effect::from_values(id, [share, 0.0, 0.0, 0.0]).unwrap_or(*effect);
+        let [_, others @ ..] = effect.values();
+        let [second, third, fourth] = others;
+        *effect = Effect::from_values(id, [share, second, third, fourth]).unwrap_or(*effect);
     }
     effects
 }
@@ -228,7 +260,7 @@ fn is_heavy(effects: &[Effect]) -> bool {
 
 /// What is not fitted once gravity is whole: its shares, and on a plane what would compensate them.
 fn held_of(effects: &[Effect]) -> Vec<&'static str> {
-    if is_heavy(effects) { GRAVITY.to_vec() } else { vec![GRAVITY[0], GRAVITY[1], COMPENSATION] }
+    if is_heavy(effects) { GRAVITY.to_vec() } else { [GRAVITY, COMPENSATIONS].concat() }
 }
 
 /// All parameters of all effects fitted together, but for those of effects that are held.

@@ -114,13 +114,15 @@ impl Evidence {
         let is_commanded = matches!(self.turn_input, TurnInput::CommandedAngle | TurnInput::CommandedYawRate);
         match id {
             "motor_deadband" | "accel_limit" | "drive_force_limit" | "speed_loop" | "feed_forward"
-            | "speed_integral" | "drive_lag" => {
+            | "speed_integral" | "drive_lag" | "speed_ramp" | "wheel_slip" => {
                 self.judges_speed() && self.speed_input == SpeedInput::Commanded
             }
             "speed_delay" | "speed_scale" | "speed_lag" | "drive_limit" | "drive_power" | "mass"
             | "rolling_drag" | "quad_drag" | "wind" => self.judges_speed(),
             "cornering_drag" => self.judges_speed() && by_angle,
-            "slope_gravity" | "hill_compensation" | "compensation_loss" => self.judges_speed() && self.slopes,
+            "slope_gravity" | "hill_compensation" | "felt_slope" | "compensation_loss" => {
+                self.judges_speed() && self.slopes
+            }
             "veg_drag" | "loose_drag" => self.judges_speed() && self.classes,
             "cross_slope" => self.slopes,
             "steer_rate" | "backlash" => is_commanded,

@@ -32,8 +32,6 @@ const MOST_NAMES: usize = 4;
 pub(crate) const UNKNOWN_IN_NULLS: f64 = 1.7;
 /// this share of what there was above it.
 pub(crate) const UNKNOWN_SHARE: f64 = 0.45;
-/// An unknown rest beside less than this part of the squared gap makes a name worthless.
-pub(crate) const WORTH_A_NAME: f64 = 0.45;
 /// A second effect is sought where the best single leaves more than its price above so many losses of the null: what nominal
 /// drives leave, easier drives undercut without one.
 const PAIRS_ABOVE_NULLS: f64 = 0.9;
@@ -132,7 +130,6 @@ impl Weighed {
             (true, false) => (Verdict::None, Vec::new()),
             (true, true) => (Verdict::Unknown, Vec::new()),
             (false, false) => (Verdict::Effects, best.causes.clone()),
-            (false, true) if 1.0 - left < WORTH_A_NAME => (Verdict::Unknown, Vec::new()),
             (false, true) => (Verdict::EffectsAndUnknown, best.causes.clone()),
         }
     }

@@ -90,6 +90,8 @@ pub struct Driving<L: Lanes> {
     pub held: Real<L>,
     /// What was wanted of the drive beyond what its limits let it give [m/s2].
     pub withheld: Real<L>,
+    /// What forces took from what the drive gave [m/s2].
+    pub resisted: Real<L>,
 }
 
 impl<L: Lanes> Driving<L> {
@@ -118,6 +120,7 @@ impl<L: Lanes> Driving<L> {
     #[inline(always)]
     pub fn resist(&mut self, less: Real<L>) {
         self.acceleration = self.acceleration - less;
+        self.resisted = self.resisted + less;
     }
 
     /// 1 on ground of this class, 0 on other ground, in between on the border.

@@ -11,8 +11,9 @@ parameters! {
     }
 }
 
-/// Time in which what the integral holds follows a force that the model does not know [s].
-const OBSERVER_S: f64 = 1.5;
+/// What the integral holds follows a force that the model does not know so many times more slowly than the controller's
+/// own integral answers it, 1 / sqrt(J): faster, and the observer would take for built up what an effect does.
+const OBSERVER_PERIODS: f64 = 4.0;
 
 impl Definition for SpeedIntegral {
     const ID: &'static str = "speed_integral";
@@ -25,7 +26,7 @@ impl Definition for SpeedIntegral {
     }
 
     fn held_follows_per_s(&self) -> Option<f64> {
-        Some(1.0 / OBSERVER_S)
+        Some(self.gain_per_s2.sqrt() / OBSERVER_PERIODS)
     }
 
     #[inline(always)]

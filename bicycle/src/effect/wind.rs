@@ -23,7 +23,7 @@ impl Definition for Wind {
         let lanes = state.speed.0;
         let [east, north] = [constants[0], constants[1]].map(|value| Real::constant(lanes, value));
         let [sine, cosine] = state.heading;
-        state.acceleration = state.acceleration + east.mul_add(cosine, north * sine);
+        state.resist(-east.mul_add(cosine, north * sine));
         state.side_acceleration = state.side_acceleration + north.mul_add(cosine, -(east * sine));
     }
 }

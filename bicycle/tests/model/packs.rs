@@ -8,7 +8,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 
 /// Sets of effects that leave one another something to do; together they hold every effect that moves a vehicle.
 fn sets_of_effects() -> [Vec<Effect>; 2] {
-    let first: [(&str, &[f64]); 28] = [
+    let first: [(&str, &[f64]); 29] = [
         ("steer_delay", &[0.17]),
         ("speed_delay", &[0.25]),
         ("motor_deadband", &[0.8]),
@@ -21,6 +21,7 @@ fn sets_of_effects() -> [Vec<Effect>; 2] {
         ("limited_servo", &[0.1, 0.8, 0.7]),
         ("steer_swing", &[0.1]),
         ("speed_lag", &[0.3]),
+        ("wheel_slip", &[0.1, 0.2]),
         ("speed_loop", &[0.4]),
         ("feed_forward", &[0.4]),
         ("speed_integral", &[1.5]),
@@ -38,10 +39,12 @@ fn sets_of_effects() -> [Vec<Effect>; 2] {
         ("rear_slip", &[0.01]),
         ("rear_steer", &[0.2]),
     ];
-    let second: [(&str, &[f64]); 11] = [
+    let second: [(&str, &[f64]); 13] = [
         ("steer_rate", &[0.8]),
         ("accel_limit", &[1.5]),
+        ("speed_ramp", &[1.1, 0.7]),
         ("compensation_loss", &[0.3]),
+        ("felt_slope", &[0.4, 0.3]),
         ("drive_force_limit", &[1.1]),
         ("mass", &[1.3]),
         ("quad_drag", &[0.1]),

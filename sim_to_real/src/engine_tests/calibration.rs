@@ -18,10 +18,20 @@ struct Controller {
     gravity: f64,
     /// Most that the drive gives, forwards and backwards.
     limit_mps2: f64,
+    /// How fast the reference grows and falls.
+    ramps_mps2: [f64; 2],
+    /// By what share of the speed the wheels that are read slip for each acceleration of the drive.
+    slip_s2_per_m: f64,
 }
 
-const STRONG: Controller =
-    Controller { time_constant_s: 0.5, integral_per_s2: 0.0, gravity: 1.0, limit_mps2: f64::INFINITY };
+const STRONG: Controller = Controller {
+    time_constant_s: 0.5,
+    integral_per_s2: 0.0,
+    gravity: 1.0,
+    limit_mps2: f64::INFINITY,
+    ramps_mps2: [f64::INFINITY; 2],
+    slip_s2_per_m: 0.0,
+};
 
 /// Drives of 40 s over hills of 10 %: new speeds every three seconds, a slow weave, small steps of Euler's.
 fn drive(controller: Controller, seed: u64) -> Drive {
@@ -31,6 +41,8 @@ fn drive(controller: Controller, seed: u64) -> Drive {
     let n = (40.0 / STEP_S) as usize;
     let mut rows = Vec::with_capacity(n);
     let mut asked = 2.0;
+    let [mut reference, mut given] = [asked, 0.0];
+    let [up, down] = controller.ramps_mps2;
     for row in 0..n {
         if row % 150 == 0 {
             asked = 2.0 + 0.8 * noise().clamp(-1.5, 1.5);
@@ -50,9 +62,10 @@ fn drive(controller: Controller, seed: u64) -> Drive {
         ]);
         for _ in 0..SUBSTEPS {
             let step_s = STEP_S / SUBSTEPS as f64;
-            let distance = asked - speed;
+            reference += (asked - reference).clamp(-down * step_s, up * step_s);
+            let distance = reference - speed * (1.0 + controller.slip_s2_per_m * given);
             let wanted = distance / controller.time_constant_s + integral;
-            let given = wanted.clamp(-controller.limit_mps2, controller.limit_mps2);
+            given = wanted.clamp(-controller.limit_mps2, controller.limit_mps2);
             if (wanted - given) * distance <= 0.0 {
                 integral += controller.integral_per_s2 * distance * step_s;
             }
@@ -129,6 +142,24 @@ fn in_a_world_without_gravity_none_is_calibrated() {
 fn a_controller_that_pushes_against_slopes_is_found() {
     let effects = found(Controller { gravity: 0.4, ..STRONG });
     assert_eq!(value(&effects, "slope_gravity"), Some(1.0));
-    assert!((value(&effects, "hill_compensation").unwrap() - 0.6).abs() < 0.05, "{effects:?}");
+    assert!((value(&effects, "felt_slope").unwrap() - 0.6).abs() < 0.05, "{effects:?}");
     assert!((value(&effects, "speed_loop").unwrap() - 0.5).abs() < 0.03, "{effects:?}");
+}
+
+/// A reference that grows by 0.7 m/s and falls by 1.1 m/s in a second.
+#[test]
+fn ramps_are_not_taken_for_limits_of_the_drive() {
+    let effects = found(Controller { time_constant_s: 0.2, ramps_mps2: [0.7, 1.1], ..STRONG });
+    let ramps = effects.iter().find(|effect| effect.description().id == "speed_ramp").map(Effect::values);
+    let [up, down, ..] = ramps.unwrap();
+    assert!((up - 0.7).abs() < 0.07 && (down - 1.1).abs() < 0.11, "{effects:?}");
+    assert!((value(&effects, "speed_loop").unwrap() - 0.2).abs() < 0.05, "{effects:?}");
+}
+
+/// Wheels that slip by 0.06 for each m/s2: braked by 1 m/s2 at 2 m/s they turn 0.12 m/s too slowly.
+#[test]
+fn slip_of_the_wheels_that_are_read_is_found() {
+    let effects = found(Controller { slip_s2_per_m: 0.06, ..STRONG });
+    assert!((value(&effects, "wheel_slip").unwrap() - 0.06).abs() < 0.02, "{effects:?}");
+    assert!((value(&effects, "speed_loop").unwrap() - 0.5).abs() < 0.05, "{effects:?}");
 }

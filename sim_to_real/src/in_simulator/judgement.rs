@@ -10,7 +10,7 @@ use super::trial::Trial;
 use super::types::{InSimulator, SimulatorCandidate, SimulatorCause, SimulatorDescription};
 use crate::answer::{Shrink, Verdict};
 use crate::diagnosis::METRIC;
-use crate::judgement::{PRICE_OF_TWO, UNKNOWN_IN_NULLS, UNKNOWN_SHARE, WORTH_A_NAME};
+use crate::judgement::{PRICE_OF_TWO, UNKNOWN_IN_NULLS, UNKNOWN_SHARE};
 
 /// A cause is announced only when it takes this share off the loss: less than beside a calibrated model, whose own misfit
 /// an effect may make up for.
@@ -18,6 +18,8 @@ const BEYOND_DOUBT: f64 = 0.085;
 /// The loss that a drive may have at best, in losses of the null.
 const LEAST_LOSS: f64 = 0.65;
 
+/// An unknown rest beside less than this part of the squared gap makes a cause worthless.
+const WORTH_A_NAME: f64 = 0.45;
 /// A cause is clearly better when it gains so many standard errors.
 const CLEARLY: f64 = 2.0;
 

@@ -37,7 +37,16 @@ const FORCES: [&str; 12] = [
 ];
 /// Shapes that tell a calibrated machine more finely than effects that are sought anyway: few drives without a simulator
 /// do not tell the one from the other.
-const FINER: [&str; 5] = ["steer_servo", "limited_servo", "steer_swing", "yaw_load", "rear_steer"];
+const FINER: [&str; 8] = [
+    "steer_servo",
+    "limited_servo",
+    "steer_swing",
+    "yaw_load",
+    "rear_steer",
+    "speed_ramp",
+    "wheel_slip",
+    "felt_slope",
+];
 /// Additions that are fitted together with all that is known, best first, and how often the next few get their turn.
 const N_REFINED: usize = 3;
 const N_BATCHES: usize = 2;
