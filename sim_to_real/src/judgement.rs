@@ -17,11 +17,11 @@ const BEYOND_DOUBT: f64 = 2.0;
 const CREDIBLE: f64 = 0.85;
 /// Logarithmic gain in loss that a second effect must bring beyond chance: a wrong shape of the first one invites it.
 pub(crate) const PRICE_OF_TWO: f64 = 0.12;
-/// The same on top where both are in one actuator: two of them are the usual shape of a third that has no name.
-const PRICE_OF_ONE_ACTUATOR: f64 = 0.18;
-/// Effects of one actuator.
-const ACTUATORS: [&[&str]; 2] = [
-    &["steer_lag", "steer_delay", "steer_rate", "backlash"],
+/// The same on top where both shape the answer to one command: two of them are the usual shape of a third that has no name.
+const PRICE_OF_ONE_ANSWER: f64 = 0.18;
+/// Effects that shape the answer to one command: of the yaw rate to the steering, of the speed to its own.
+const ANSWERS: [&[&str]; 2] = [
+    &["steer_lag", "steer_delay", "steer_rate", "backlash", "understeer"],
     &["speed_lag", "speed_delay", "accel_limit", "motor_deadband"],
 ];
 /// Difference in energy that makes one explanation e times as probable as another.
@@ -76,8 +76,8 @@ fn logit(support: &Support) -> f64 {
 /// What a second effect must gain to be believed.
 fn price(pair: &Explanation, null: &Null) -> f64 {
     let ids = pair.ids();
-    let is_one_actuator = ACTUATORS.iter().any(|own| ids.iter().all(|id| own.contains(id)));
-    null.gain_of_two + PRICE_OF_TWO + if is_one_actuator { PRICE_OF_ONE_ACTUATOR } else { 0.0 }
+    let is_one_answer = ANSWERS.iter().any(|own| ids.iter().all(|id| own.contains(id)));
+    null.gain_of_two + PRICE_OF_TWO + if is_one_answer { PRICE_OF_ONE_ANSWER } else { 0.0 }
 }
 
 impl Weighed {

@@ -120,16 +120,17 @@ fn a_second_effect_that_mends_the_first_is_none() {
     assert_eq!((announced_of(73.0), announced_of(20.0)), (1, 2));
 }
 
-/// A second effect of the same actuator is dearer: 0.25 in the logarithm is enough for a gain and not for a delay.
+/// A second effect that shapes the same answer is dearer: 0.25 in the logarithm is enough for a gain, and for neither a delay
+/// nor understeer.
 #[test]
-fn a_second_effect_in_the_same_actuator_is_dearer() {
+fn a_second_effect_in_the_same_answer_is_dearer() {
     let with = |second: (&str, f64)| {
         let pair = Explanation::new(vec![effect("steer_lag", 0.2), effect(second.0, second.1)], 2.0);
         let singles = vec![single(SINGLES[0], 6.0, 2.0 * 0.25_f64.exp())];
         let weighed = Weighed { none: Explanation::new(Vec::new(), 6.0), singles, pairs: vec![pair] };
         weighed.judge(&null()).announced.len()
     };
-    assert_eq!((with(SINGLES[1]), with(SINGLES[2])), (1, 2));
+    assert_eq!([SINGLES[1], ("understeer", 0.01), SINGLES[2]].map(with), [1, 1, 2]);
 }
 
 /// Nothing worth a name is explained and much is left: unknown. Much is left beside a name beyond doubt: both. Little is left:
