@@ -118,10 +118,29 @@ pub(crate) fn condition_tables(real: &[StartRecord], null: &[StartRecord]) -> Ve
     tables
 }
 
-/// Conditions that explain more than their null.
+/// The same tables with what an explanation tells of the real residuals: the shares of what it takes off them, in which there
+/// is neither noise nor what the model misses besides. The strongest of these comes first.
+pub(crate) fn with_announced(
+    tables: &[ConditionTable],
+    (real, taken_off): (&[StartRecord], &[StartRecord]),
+) -> Vec<ConditionTable> {
+    let [of_real, of_taken] = [real, taken_off].map(|records| squares(&windows(records).collect::<Vec<_>>()));
+    let part = of_taken / of_real.max(f64::MIN_POSITIVE);
+    let told = condition_tables(taken_off, &[]).into_iter();
+    let with_share = |told: ConditionTable| {
+        let table = tables.iter().find(|table| table.condition == told.condition)?;
+        Some(ConditionTable { announced_share: Some(told.share * part), ..table.clone() })
+    };
+    told.filter_map(with_share).collect()
+}
+
+/// Conditions where the gap lies: by what is announced where that is all of it, else by what they explain beyond their null.
 pub(crate) fn places(tables: &[ConditionTable]) -> Vec<Place> {
-    let stands_out = tables.iter().filter(|table| table.share > 0.0);
-    stands_out.map(|table| Place { condition: table.condition, share: table.share }).collect()
+    let shares = tables.iter().map(|table| Place {
+        condition: table.condition,
+        share: table.announced_share.unwrap_or(table.share),
+    });
+    shares.filter(|place| place.share > 0.0).collect()
 }
 
 fn condition_table(place: usize, real: &[StartRecord], null: &[StartRecord]) -> Option<ConditionTable> {
@@ -150,6 +169,7 @@ fn condition_table(place: usize, real: &[StartRecord], null: &[StartRecord]) -> 
         condition: MEASURED[place],
         share: explained(place, real, &edges) - null_share,
         null_share,
+        announced_share: None,
         bins: bins.filter(|bin| bin.n > 0).collect(),
     })
 }
@@ -169,6 +189,7 @@ fn constant_table(real: &[StartRecord], null: &[StartRecord]) -> ConditionTable 
         condition: Condition::Constant,
         share: share(real) - null_share,
         null_share,
+        announced_share: None,
         bins: Vec::new(),
     }
 }

@@ -4,7 +4,7 @@ use crate::answer::{Answer, NamedEffect, Ranked, SCHEMA_VERSION, Shrink, Verdict
 use crate::baseline::{Baseline, GapError, drives_of};
 use crate::causes::{Explanation, Trial};
 use crate::comparison::root_mean_square;
-use crate::conditions::{StartRecord, condition_tables, ground_residuals, places};
+use crate::conditions::{StartRecord, condition_tables, ground_residuals, places, with_announced};
 use crate::constancy::changing;
 use crate::cross_validation::{CrossValidation, Split, foretold};
 use crate::drive::Drive;
@@ -71,9 +71,13 @@ pub fn diagnose(baseline: &Baseline, machine: &Machine, real: &[DriveLog]) -> Re
     }
     let after = trial.residuals(&causes);
     let (own, repaired) = (StartRecord::of(&all, &before), StartRecord::of(&all, &after));
-    let tables = condition_tables(&own, &baseline.null.starts);
+    let mut conditions = condition_tables(&own, &baseline.null.starts);
+    if judgement.verdict == Verdict::Effects {
+        let taken_off: Vec<f32> = before.iter().zip(&after).map(|(before, after)| before - after).collect();
+        conditions = with_announced(&conditions, (&own, &StartRecord::of(&all, &taken_off)));
+    }
     let findings = Findings {
-        conditions: tables,
+        conditions,
         residuals: residual_cells(&before, &after, Some(&baseline.null.cells)),
         map: ground_residuals(&own, &repaired),
     };

@@ -24,6 +24,10 @@ pub struct ConditionTable {
     pub share: f64,
     /// The same between nominal drives, 95 % quantile [-].
     pub null_share: f64,
+    /// The share of the residual's square that bins of this condition explain through what is announced, where that is all
+    /// of the gap [-].
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub announced_share: Option<f64>,
     /// The condition from low to high; empty bins are left out.
     pub bins: Vec<ConditionBin>,
 }

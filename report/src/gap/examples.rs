@@ -69,6 +69,7 @@ pub(crate) fn findings() -> Findings {
         condition,
         share,
         null_share: 0.04,
+        announced_share: (share > 0.0).then_some(0.9 * share),
         bins: (0..8)
             .map(|bin| ConditionBin {
                 low: reach * f64::from(bin) / 8.0,

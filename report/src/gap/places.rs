@@ -2,7 +2,7 @@
 
 use sim_to_real::{Condition, ConditionBin, ConditionTable};
 
-use super::{BEFORE, FLOOR, Pictures, Reference, draw_legend, words};
+use super::{AFTER, BEFORE, FLOOR, Pictures, Reference, draw_legend, words};
 use crate::axes::{Axes, Range, number};
 use crate::canvas::MARGIN;
 use crate::canvas::{Anchor, Canvas, Point, Rect, Stroke, TextStyle};
@@ -18,7 +18,8 @@ const PANELS: usize = 6;
 pub(super) fn page(pictures: &Pictures<'_>) -> Option<Canvas> {
     let mut tables: Vec<&ConditionTable> =
         pictures.findings.conditions.iter().filter(|table| table.share.is_finite()).collect();
-    tables.sort_by(|a, b| b.share.total_cmp(&a.share));
+    let rank = |table: &ConditionTable| announced(table).unwrap_or(table.share);
+    tables.sort_by(|a, b| rank(b).total_cmp(&rank(a)));
     if tables.is_empty() {
         return None;
     }
@@ -34,6 +35,11 @@ pub(super) fn page(pictures: &Pictures<'_>) -> Option<Canvas> {
     Some(canvas)
 }
 
+/// Through what is announced, where that is told.
+fn announced(table: &ConditionTable) -> Option<f64> {
+    table.announced_share.filter(|share| share.is_finite())
+}
+
 fn draw_bars(tables: &[&ConditionTable], (frame, reference): (Rect, Reference), canvas: &mut Canvas) {
     let whole = |table: &ConditionTable| (table.share + table.null_share).max(0.0);
     let most = tables.iter().map(|table| whole(table)).fold(0.1, f64::max);
@@ -45,6 +51,10 @@ fn draw_bars(tables: &[&ConditionTable], (frame, reference): (Rect, Reference), 
         let stands_out = table.share > crate::gap::text::STANDS_OUT;
         let colour = if stands_out { BEFORE } else { Rgb::RULE };
         canvas.rect(Rect { x: frame.x, y: y - 12.0, width: x - frame.x, height: 24.0 }, colour, 0.9);
+        if let Some(share) = announced(table) {
+            let right = axes.place(share.clamp(0.0, axes.x.high), centre).0;
+            canvas.rect(Rect { x: frame.x, y: y - 4.0, width: right - frame.x, height: 8.0 }, AFTER, 1.0);
+        }
         let null_x = axes.place(table.null_share.clamp(0.0, axes.x.high), centre).0;
         canvas.line((null_x, y - 17.0), (null_x, y + 17.0), Stroke::solid(Rgb::INK, 3.0));
         let style =
@@ -67,6 +77,10 @@ fn draw_bars(tables: &[&ConditionTable], (frame, reference): (Rect, Reference), 
     let name = format!("the null: {}", reference.floor());
     let null = [(name.as_str(), Stroke::solid(Rgb::INK, 3.0))];
     draw_legend(&null, (frame.right() + 260.0, frame.y + 64.0), canvas);
+    if tables.iter().any(|table| announced(table).is_some()) {
+        let told = [("through what is announced, which orders them", Stroke::solid(AFTER, 8.0))];
+        draw_legend(&told, (frame.right() + 260.0, frame.y + 98.0), canvas);
+    }
 }
 
 fn draw_panels(tables: &[&ConditionTable], (top, reference): (f64, Reference), canvas: &mut Canvas) {

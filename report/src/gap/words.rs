@@ -39,7 +39,8 @@ impl Reference {
     /// Below the page of places.
     pub(super) fn places(self) -> String {
         format!(
-            "Where: how much of the residual each condition explains, less what it explains of the null ({}).",
+            "Where: how much of the residual each condition explains, less what it explains of the null ({}); where the \
+             announced effects are all of the gap, by what each condition explains through them.",
             self.floor()
         )
     }

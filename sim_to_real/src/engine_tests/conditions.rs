@@ -2,7 +2,8 @@
 
 use super::normal;
 use crate::answer::Condition;
-use crate::conditions::{MEASURED, StartRecord, Window, condition_tables, places};
+use crate::conditions::{MEASURED, StartRecord, Window, condition_tables, places, with_announced};
+use crate::findings::ConditionTable;
 use crate::rollout::N_QUANTITIES;
 
 /// Records whose residuals are noise and, in their first quantity, a function of the conditions' values.
@@ -100,6 +101,32 @@ fn a_shortfall_in_proportion_to_the_speed_belongs_to_the_speed() {
     let (condition, share, next) = off(|_| 6.0);
     assert_eq!(condition, Condition::Constant);
     assert!((share - 36.0 / 41.0).abs() < 0.03 && next < 0.02, "{share} {next}");
+}
+
+/// A residual of 2 v beside one of 3 p that the model misses: the second is the larger part, and an explanation takes the
+/// first off. Variances of 4, 9 and the noise of five quantities: 4 / 18 is the speed's, less what eight bins leave of a
+/// normal variable, 0.055 of it.
+#[test]
+fn an_explanation_lies_where_what_it_takes_off_does() {
+    let pitch = MEASURED.iter().position(|own| *own == Condition::Pitch).unwrap();
+    let real = records(2000, 13, |values| 2.0 * values[0] + 3.0 * values[pitch]);
+    let measured = condition_tables(&real, &records(600, 14, |_| 0.0));
+    assert_eq!(measured[0].condition, Condition::Pitch);
+    let mut taken_off = real.clone();
+    for window in taken_off.iter_mut().flat_map(|record| &mut record.windows) {
+        window.residual = [0.0; N_QUANTITIES];
+        window.residual[0] = 2.0 * window.values[0];
+    }
+    let tables = with_announced(&measured, (&real, &taken_off));
+    let told = places(&tables);
+    assert_eq!(told[0].condition, Condition::Speed);
+    assert!((told[0].share - 0.945 * 4.0 / 18.0).abs() < 0.01, "{}", told[0].share);
+    assert!(told[1..].iter().all(|place| place.share < 0.01), "{told:?}");
+    // What was measured in the bins stays.
+    let bins = |tables: &[ConditionTable]| {
+        tables.iter().find(|table| table.condition == Condition::Pitch).unwrap().bins.clone()
+    };
+    assert_eq!(bins(&tables), bins(&measured));
 }
 
 /// Classes are names: each has its own bin, and one between two others is neither.
