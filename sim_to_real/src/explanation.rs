@@ -1,11 +1,14 @@
 //! Which explanations there are, and how much each is to be believed.
 
 use crate::causes::{Explanation, Trial, candidates, tried};
+use crate::score_test::Score;
 use bicycle::Effect;
 use bicycle::effect::Description;
 
 /// Seconds are sought beside this many of the best singles.
 const N_FIRSTS: usize = 3;
+/// So many of the seconds that promise most are fitted beside each of them.
+const N_SECONDS: usize = 8;
 /// So many of the best singles, and of the best pairs, are fitted as a whole.
 const N_REFINED: usize = 5;
 
@@ -68,9 +71,18 @@ pub(crate) fn pairs<'a>(
     sorted(pairs.into_iter().map(|pair| trial.refined(pair)).collect())
 }
 
-/// An explanation with every other effect added.
+/// An explanation with each of the other effects added that promise most beside it.
 pub(crate) fn with_a_second(trial: &Trial<'_>, first: &Explanation) -> Vec<Explanation> {
     let known = first.ids();
+    let before = trial.judged_residuals(&first.causes);
+    let promise = |description: &Description| {
+        let with = |cause| trial.judged_residuals(&[&first.causes[..], &[cause]].concat());
+        let gain = |cause| Score::of(&before, &with(cause)).gain();
+        tried(description).into_iter().map(gain).fold(0.0, f64::max)
+    };
     let others = judged(trial).filter(|description| !known.contains(&description.cause));
-    others.filter_map(|description| trial.with_one_more(&first.causes, description)).collect()
+    let mut others: Vec<_> = others.map(|description| (promise(description), description)).collect();
+    others.sort_by(|a, b| b.0.total_cmp(&a.0));
+    others.truncate(N_SECONDS);
+    others.into_iter().filter_map(|(_, second)| trial.with_one_more(&first.causes, second)).collect()
 }

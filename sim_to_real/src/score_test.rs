@@ -34,7 +34,7 @@ pub(crate) struct Score {
 
 impl Score {
     /// What runs away beyond all numbers tells nothing.
-    fn of(before: &[f32], after: &[f32]) -> Self {
+    pub(crate) fn of(before: &[f32], after: &[f32]) -> Self {
         let add = |sum: Self, (before, after): (&f32, &f32)| {
             let [before, change] = [*before, before - after].map(f64::from);
             let weighed = f64::from(weight(before as f32)) * change;
@@ -42,6 +42,11 @@ impl Score {
         };
         let told = before.iter().zip(after).filter(|(before, after)| (*before - *after).is_finite());
         told.fold(Self::default(), add)
+    }
+
+    /// What the best size of the effect would take off the sum of squares, were the change in proportion to the size.
+    pub(crate) fn gain(self) -> f64 {
+        self.score.max(0.0).powi(2) / self.information.max(f64::MIN_POSITIVE)
     }
 
     /// Of the effect as it is and not of its size: what nominal drives ask for, up to all of it either way.
@@ -201,6 +206,16 @@ mod tests {
         let of = |score: f64| Score { score, information: 9.0 }.strength(4.0);
         assert!((of(12.0) - 2.0).abs() < 1e-12);
         assert!(of(-12.0).abs() < 1e-12);
+    }
+
+    /// Half of an effect takes residuals of 1 and 1 to 0, which is 2 off their squares: at the whole of it they are -1, the change
+    /// is 2 of each, the score 4 and the information 8, but for the weight of a residual of 1, the root of 0.9. One that makes
+    /// them larger gains nothing.
+    #[test]
+    fn a_gain_is_that_of_the_best_size() {
+        let gain = Score::of(&[1.0, 1.0], &[-1.0, -1.0]).gain();
+        assert!((gain - 2.0 * 0.9_f64.sqrt()).abs() < 1e-6, "{gain}");
+        assert_eq!(Score::of(&[1.0, 1.0], &[2.0, 2.0]).gain(), 0.0);
     }
 
     /// Two residuals of 1 and -2 that an effect takes to 0.5 and -2: w d r is 0.5 and w d d is 0.25 of the first alone,
