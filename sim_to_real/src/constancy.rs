@@ -7,7 +7,7 @@ use bicycle::Effect;
 
 /// Causes that foretell other drives better by this in the logarithm of the loss than anything constant does, once their
 /// parameters may differ from one half to the other, are not the same throughout.
-const NOT_THE_SAME: f64 = 0.055;
+const NOT_THE_SAME: f64 = 0.04;
 /// Rollouts that each drive must have in each half.
 const FEWEST: usize = 15;
 /// The steering counts over this many steps from a rollout's start.
