@@ -22,7 +22,7 @@ pub struct ConditionTable {
     pub condition: Condition,
     /// Share of the squared normalised residual's variance that its bins explain, less the null's [-].
     pub share: f64,
-    /// The same between nominal drives, 95 % quantile [-].
+    /// The share that the same bins explain of nominal drives [-].
     pub null_share: f64,
     /// The share of the residual's square that bins of this condition explain through what is announced, where that is all
     /// of the gap [-].
