@@ -92,11 +92,19 @@ impl Weighed {
 
     pub(crate) fn judge(&self, null: &Null) -> Judgement {
         let all = self.by_logit(null);
-        let (logit, likeliest) = all[0];
-        let would_show = likeliest.causes.iter().all(|own| null.limits_shown.would_show(own));
-        let best = if would_show && logit > BEYOND_DOUBT.ln() { likeliest } else { &self.none };
+        let best = self.told(&all, null);
         let (verdict, announced) = self.verdict(best, null);
         Judgement { verdict, announced, ranking: self.ranking(&all), credible_set: self.credible_set(best) }
+    }
+
+    /// The likeliest explanation where it is beyond doubt. In place of a pair with a limit that nominal drives never came
+    /// near, which they may have too, its other effect alone.
+    fn told<'a>(&'a self, all: &[(f64, &'a Explanation)], null: &Null) -> &'a Explanation {
+        let likeliest = all[0].1.ids();
+        let is_part = |own: &Explanation| own.ids().iter().all(|id| likeliest.contains(id));
+        let would_show = |own: &Explanation| own.causes.iter().all(|own| null.limits_shown.would_show(own));
+        let told = all.iter().find(|(_, own)| is_part(own) && would_show(own));
+        told.filter(|(logit, _)| *logit > BEYOND_DOUBT.ln()).map_or(&self.none, |(_, told)| told)
     }
 
     /// Every explanation with its logit over none, the largest first.

@@ -166,6 +166,20 @@ fn a_limit_that_nominal_drives_would_not_have_shown_is_no_sign() {
     assert!(announced(&at(2.1)).is_empty());
 }
 
+/// Beside such a limit the other effect of a pair is announced as it would be alone; beside a limit that was reached, both.
+#[test]
+fn a_limit_that_would_not_have_shown_takes_no_other_name_with_it() {
+    let at = |value: f64| {
+        let limit = effect("accel_limit", value);
+        let pair = Explanation::new(vec![effect("steer_lag", 0.2), limit], 1.0);
+        let singles = vec![single(SINGLES[0], 3.0, 1.6), single(("accel_limit", value), 3.0, 2.9)];
+        let null = Null { limits_shown: LimitsShown::from_iter([("accel_limit", 2.0)]), ..null() };
+        Weighed { none: Explanation::new(Vec::new(), 3.0), singles, pairs: vec![pair] }.judge(&null)
+    };
+    assert_eq!(announced(&at(1.9)), ["steer_lag", "accel_limit"]);
+    assert_eq!(announced(&at(2.1)), ["steer_lag"]);
+}
+
 /// One that foretells other drives a tenth worse has half a tenth more energy.
 #[test]
 fn what_foretells_worse_has_more_energy() {
