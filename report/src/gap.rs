@@ -4,12 +4,14 @@
 mod ground;
 mod heldout;
 mod in_simulator;
+mod left;
 mod page;
 mod places;
 mod predictions;
 mod ranking;
 mod residuals;
 pub(crate) mod text;
+mod throughout;
 mod told;
 mod words;
 
@@ -54,7 +56,9 @@ pub fn pictures(pictures: &Pictures<'_>) -> Result<Vec<Picture>, EncodeError> {
     let reference = pictures.reference;
     let pages = [
         ("ranking.png", words::RANKING.to_owned(), ranking::page(pictures.answer)),
+        ("throughout.png", words::THROUGHOUT.to_owned(), throughout::page(pictures.answer)),
         ("places.png", reference.places(), places::page(pictures)),
+        ("left.png", words::LEFT.to_owned(), left::page(pictures.answer, reference)),
         ("residuals.png", words::RESIDUALS.to_owned(), residuals::page(pictures)),
         ("ground.png", words::GROUND.to_owned(), ground::page(pictures)),
         (

@@ -1,7 +1,7 @@
 //! The answer of a diagnosis, as it stands in files.
 
 use crate::controller_model::ControllerModel;
-use crate::findings::QuantityError;
+use crate::findings::{LeftOver, QuantityError};
 use crate::in_simulator::InSimulator;
 use crate::pose_sensor::PoseSensor;
 use crate::steering::Steering;
@@ -43,6 +43,44 @@ pub struct NamedEffect {
     pub form: Option<String>,
     /// Parameters by name.
     pub parameters: BTreeMap<String, Estimate>,
+}
+
+/// What drives are divided by, to ask whether an effect is the same throughout.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Division {
+    /// Share of the drive that was driven before, in [0, 1].
+    Time,
+    /// Number of the drive, from 1.
+    Drive,
+    /// Commanded steering, to the left above 0 [rad].
+    Steering,
+    /// Forward speed [m/s].
+    Speed,
+    /// Number of the terrain's class.
+    TerrainClass,
+}
+
+/// What a parameter would be in a part of the real drives alone.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PartEstimate {
+    /// Name of the cause.
+    pub effect: String,
+    /// Name of its parameter.
+    pub parameter: String,
+    /// What the drives are divided by.
+    pub division: Division,
+    /// Where the part begins; absent where nothing bounds it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub from: Option<f64>,
+    /// Where it ends.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub to: Option<f64>,
+    /// Rollouts in it.
+    pub n_rollouts: usize,
+    /// The parameter, with an interval that holds what differs from part to part by chance, and no error that all parts
+    /// share.
+    pub estimate: Estimate,
 }
 
 /// An effect with the probability that it is the cause.
@@ -158,6 +196,9 @@ pub struct Answer {
     pub verdict: Verdict,
     /// Announced effects, strongest first.
     pub effects: Vec<NamedEffect>,
+    /// What their parameters would be in parts of the real drives; empty where nothing is announced.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub by_part: Vec<PartEstimate>,
     /// Every effect with its probability, best first.
     pub ranking: Vec<Ranked>,
     /// Single explanations that the data cannot tell apart.
@@ -165,6 +206,9 @@ pub struct Answer {
     /// Where the residual lies, strongest first.
     #[serde(rename = "where")]
     pub places: Vec<Place>,
+    /// What the announced effects leave, quantity by quantity, where a part of the gap is unknown; the largest share first.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub left: Vec<LeftOver>,
     /// How far the gap shrinks.
     pub shrink: Shrink,
     /// Errors on the held-out drives in metres, radians and their rates; empty until they are opened.
@@ -206,9 +250,11 @@ mod tests {
             steering: Steering::Angle,
             verdict: Verdict::None,
             effects: Vec::new(),
+            by_part: Vec::new(),
             ranking: Vec::new(),
             credible_set: Vec::new(),
             places: Vec::new(),
+            left: Vec::new(),
             shrink: shrink(Some(3.0), 1.5),
             errors_by_quantity: Vec::new(),
             pose_sensor: None,

@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 const N_BINS: usize = 8;
 /// Horizons at which the residual is laid out over the conditions, as places in [`HORIZONS`]: long enough for a motion to
 /// show, short enough for the conditions to be one.
-const LAID_OUT: [usize; 2] = [1, 2];
+pub(crate) const LAID_OUT: [usize; 2] = [1, 2];
 /// A change of the command counts from this long before the rollout, for steering and for speed [s].
 const BEFORE_S: [f64; 2] = [0.2, 0.5];
 
@@ -251,7 +251,7 @@ fn mean(values: &[f64]) -> f64 {
 }
 
 /// Edges between bins with equally many values; fewer where values repeat.
-fn quantiles(mut values: Vec<f64>) -> Vec<f64> {
+pub(crate) fn quantiles(mut values: Vec<f64>) -> Vec<f64> {
     values.sort_by(f64::total_cmp);
     let last = values.len() - 1;
     let mut edges: Vec<f64> = (0..=N_BINS).map(|k| values[last * k / N_BINS]).collect();
@@ -260,12 +260,12 @@ fn quantiles(mut values: Vec<f64>) -> Vec<f64> {
 }
 
 /// Edges half way between the numbers of the classes.
-fn between_classes(values: Vec<f64>) -> Vec<f64> {
+pub(crate) fn between_classes(values: Vec<f64>) -> Vec<f64> {
     let last = values.into_iter().fold(0.0, f64::max).round() as u8;
     (0..=u16::from(last) + 1).map(|class| f64::from(class) - 0.5).collect()
 }
 
 /// The bin of a value; what lies outside belongs to the nearest.
-fn bin_of(value: f64, edges: &[f64]) -> usize {
+pub(crate) fn bin_of(value: f64, edges: &[f64]) -> usize {
     edges[1..edges.len() - 1].partition_point(|edge| *edge <= value)
 }

@@ -1,72 +1,48 @@
 //! Whether what separates the drives is the same throughout: early and late in them, to the left and to the right.
 
+use crate::answer::Division;
 use crate::baseline::Baseline;
+use crate::causes::Explanation;
 use crate::cross_validation::CrossValidation;
 use crate::drive::Drive;
+use crate::parts::Parts;
 use bicycle::Effect;
 
 /// Causes that foretell other drives better by this in the logarithm of the loss than anything constant does, once their
 /// parameters may differ from one half to the other, are not the same throughout.
 const NOT_THE_SAME: f64 = 0.04;
-/// Rollouts that each drive must have in each half.
-const FEWEST: usize = 15;
-/// The steering counts over this many steps from a rollout's start.
-const LOOK_AHEAD: usize = 50;
-
-/// What may differ from one half of the rollouts to the other.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Halves {
-    /// The first half of every drive and the second.
-    EarlyAndLate,
-    /// Steering to the left and to the right.
-    LeftAndRight,
-}
-
-impl Halves {
-    const ALL: [Self; 2] = [Self::EarlyAndLate, Self::LeftAndRight];
-
-    fn is_in_first(self, drive: &Drive, place: usize) -> bool {
-        match self {
-            Self::EarlyAndLate => 2 * place < drive.starts.len(),
-            Self::LeftAndRight => {
-                let start = drive.starts[place];
-                let ahead = &drive.commands[start..start + LOOK_AHEAD];
-                ahead.iter().map(|command| command.steering_rad).sum::<f32>() > 0.0
-            }
-        }
-    }
-
-    fn of(self, drives: &[Drive]) -> Option<[Vec<Drive>; 2]> {
-        let part = |is_first: bool| {
-            drives.iter().map(move |drive| {
-                let places = (0..drive.starts.len()).filter(|&i| self.is_in_first(drive, i) == is_first);
-                Drive { starts: places.map(|i| drive.starts[i]).collect(), ..drive.clone() }
-            })
-        };
-        let parts = [true, false].map(|is_first| part(is_first).collect::<Vec<_>>());
-        parts.iter().flatten().all(|drive| drive.starts.len() >= FEWEST).then_some(parts)
-    }
-}
 
 /// Causes that are not the same throughout.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Changing {
-    pub(crate) causes: Vec<Effect>,
-    /// Between which they differ.
-    pub(crate) halves: Halves,
+    /// As they are in each of two parts of the drives.
+    pub(crate) causes: [Vec<Effect>; 2],
+    /// What the parts are.
+    pub(crate) division: Division,
 }
 
 impl Changing {
-    /// In words.
+    /// In words, with the parameters in both parts.
     pub(crate) fn told(&self) -> String {
-        let names: Vec<&str> = self.causes.iter().map(|cause| cause.description().cause).collect();
-        let how = match self.halves {
-            Halves::EarlyAndLate => "not the same early and late in the drives",
-            Halves::LeftAndRight => "not the same to the left and to the right",
+        let [one, other] = &self.causes;
+        let names: Vec<&str> = one.iter().map(|cause| cause.description().cause).collect();
+        let how = match self.division {
+            Division::Steering => ["to the right", "to the left"],
+            _ => ["early in the drives", "late"],
         };
+        let parameters = one.iter().zip(other).flat_map(|(one, other)| {
+            let values = one.values().into_iter().zip(other.values());
+            one.description().parameters.iter().zip(values)
+        });
+        let told = parameters.map(|(parameter, (one, other))| {
+            format!("{} {one:.3} {}, {other:.3} {}", parameter.name, how[0], how[1])
+        });
         format!(
-            "{} foretells the drives better than anything constant once it is {how}",
-            names.join(" with ")
+            "{} foretells the drives better than anything constant once it is not the same {} and {}: {}",
+            names.join(" with "),
+            how[0],
+            how[1],
+            told.collect::<Vec<_>>().join("; ")
         )
     }
 }
@@ -81,16 +57,24 @@ pub(crate) fn changing(
     let with_none: Vec<Vec<Effect>> = explanations.iter().cloned().chain([Vec::new()]).collect();
     let constant = foretold_losses(baseline, &[drives.to_vec()], &with_none);
     let least = constant.into_iter().fold(f64::INFINITY, f64::min);
-    let mut best: Option<(f64, Changing)> = None;
-    for halves in Halves::ALL {
-        let Some(parts) = halves.of(drives) else { continue };
-        for (loss, causes) in foretold_losses(baseline, &parts, explanations).into_iter().zip(explanations) {
-            if best.as_ref().is_none_or(|(least, _)| loss < *least) {
-                best = Some((loss, Changing { causes: causes.clone(), halves }));
-            }
-        }
-    }
-    best.filter(|(loss, _)| (least / loss).ln() > NOT_THE_SAME).map(|(_, changing)| changing)
+    let halves = [Parts::early_and_late(), Parts::right_and_left()];
+    let split: Vec<(Division, [Vec<Drive>; 2])> =
+        halves.iter().filter_map(|parts| Some((parts.division, parts.split(drives)?))).collect();
+    let tried = split.iter().flat_map(|half| {
+        let losses = foretold_losses(baseline, &half.1, explanations).into_iter().zip(explanations);
+        losses.map(move |(loss, causes)| (loss, half, causes))
+    });
+    let (loss, (division, parts), causes) = tried.min_by(|a, b| a.0.total_cmp(&b.0))?;
+    let fitted = |part: &Vec<Drive>| fitted(baseline, part, causes);
+    ((least / loss).ln() > NOT_THE_SAME)
+        .then(|| Changing { causes: parts.each_ref().map(fitted), division: *division })
+}
+
+/// Causes fitted to all that a part has of the drives.
+fn fitted(baseline: &Baseline, part: &[Drive], causes: &[Effect]) -> Vec<Effect> {
+    let trial = baseline.held_trial(&part.iter().collect::<Vec<_>>());
+    let start = Explanation::new(causes.to_vec(), trial.loss(causes));
+    trial.refined(start).causes
 }
 
 /// Of every explanation the mean loss of the drives, each foretold by the others, where its parameters are fitted to every

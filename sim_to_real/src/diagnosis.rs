@@ -1,6 +1,6 @@
 //! The diagnosis: which effects separate the real drives from the calibrated nominal model.
 
-use crate::answer::{Answer, NamedEffect, Ranked, SCHEMA_VERSION, Shrink, Verdict};
+use crate::answer::{Answer, NamedEffect, PartEstimate, Ranked, SCHEMA_VERSION, Shrink, Verdict};
 use crate::baseline::{Baseline, GapError, drives_of};
 use crate::causes::{Explanation, Trial};
 use crate::comparison::root_mean_square;
@@ -9,11 +9,13 @@ use crate::constancy::changing;
 use crate::cross_validation::{CrossValidation, Split, foretold};
 use crate::drive::Drive;
 use crate::explanation::{pairs, single_explanations};
-use crate::findings::Findings;
+use crate::findings::{Findings, LeftOver};
 use crate::intervals::named_effects;
 use crate::judgement::{Single, Weighed};
 use crate::least_squares::mean_loss;
+use crate::left_over::left_over;
 use crate::machine::Machine;
+use crate::parts::by_part;
 use crate::residual_table::residual_cells;
 use crate::steering::Steering;
 use crate::without_simulator::of_evidence;
@@ -29,6 +31,8 @@ pub struct Diagnosis {
     /// Error of the calibrated nominal model and of the repaired one on the real drives, in standard deviations.
     pub errors: [f64; 2],
     pub(crate) effects: Vec<Effect>,
+    pub(crate) by_part: Vec<PartEstimate>,
+    pub(crate) left: Vec<LeftOver>,
     pub(crate) steering: Steering,
     pub(crate) verdict: Verdict,
     pub(crate) ranking: Vec<Ranked>,
@@ -76,6 +80,12 @@ pub fn diagnose(baseline: &Baseline, machine: &Machine, real: &[DriveLog]) -> Re
         let taken_off: Vec<f32> = before.iter().zip(&after).map(|(before, after)| before - after).collect();
         conditions = with_announced(&conditions, (&own, &StartRecord::of(&all, &taken_off)));
     }
+    let left = match judgement.verdict {
+        Verdict::Unknown | Verdict::EffectsAndUnknown => {
+            left_over(&repaired, &baseline.null.starts, &baseline.yardstick)
+        }
+        Verdict::None | Verdict::Effects => Vec::new(),
+    };
     let findings = Findings {
         conditions,
         residuals: residual_cells(&before, &after, Some(&baseline.null.cells)),
@@ -83,6 +93,8 @@ pub fn diagnose(baseline: &Baseline, machine: &Machine, real: &[DriveLog]) -> Re
     };
     Ok(Diagnosis {
         named: named_effects(&trial, &causes),
+        by_part: by_part(&baseline.held_trial(&all), &causes),
+        left,
         findings,
         errors: [root_mean_square(&before), root_mean_square(&after)],
         predicted_closed: predicted_closed(baseline, &splits, &causes),
@@ -161,9 +173,11 @@ impl Diagnosis {
             steering: self.steering,
             verdict: self.verdict,
             effects: self.named.clone(),
+            by_part: self.by_part.clone(),
             ranking: self.ranking.clone(),
             credible_set: self.credible_set.clone(),
             places: places(&self.findings.conditions),
+            left: self.left.clone(),
             shrink: Shrink {
                 metric: METRIC.to_owned(),
                 floor: self.floor,

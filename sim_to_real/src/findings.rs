@@ -47,6 +47,38 @@ pub struct ConditionBin {
     pub null_mean_square: f64,
 }
 
+/// What is left of one quantity once the announced effects act, over the condition that it follows most.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct LeftOver {
+    /// Quantity.
+    pub quantity: ResidualState,
+    /// Condition.
+    pub condition: Condition,
+    /// Time since the rollout's start [s].
+    pub horizon_s: f64,
+    /// Share of the square of all that is left then, in standard deviations, that the means of the bins make, less what
+    /// those of nominal drives make of theirs [-].
+    pub share: f64,
+    /// The condition from low to high; empty bins are left out.
+    pub bins: Vec<LeftBin>,
+}
+
+/// One bin of what is left.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct LeftBin {
+    /// Lower end, in the condition's unit.
+    pub low: f64,
+    /// Upper end, in the condition's unit.
+    pub high: f64,
+    /// Number of rollouts.
+    pub n: usize,
+    /// Mean of what was measured less what was foretold, in the quantity's unit.
+    pub mean: f64,
+    /// The same of the nominal drives; absent where they never were.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub null_mean: Option<f64>,
+}
+
 /// A predicted quantity.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]

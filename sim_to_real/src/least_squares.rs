@@ -11,6 +11,8 @@ const N_ITERATIONS: usize = 25;
 /// and how far each is followed before the best of them is followed to the end.
 const N_OTHER_STARTS: usize = 12;
 const N_ITERATIONS_TRIED: usize = 4;
+/// Steps to the least loss of residuals that are linear in the parameters, each with the weights that the one before leaves.
+const N_REWEIGHTED: usize = 5;
 /// A minimum of at most this share of the loss is another one, and not the same one found better.
 const ANOTHER_MINIMUM: f64 = 0.98;
 
@@ -209,7 +211,33 @@ impl Linearised {
         }
     }
 
-    /// Standard error of each parameter, by leaving out one of `n` stretches after the other and taking the step that
+    /// Of some rows of residuals alone, each of so many numbers.
+    pub(crate) fn of_rows(&self, rows: &[usize], n_per_row: usize) -> Self {
+        let own = |values: &Vec<f32>| -> Vec<f32> {
+            rows.iter().flat_map(|row| &values[row * n_per_row..][..n_per_row]).copied().collect()
+        };
+        Self {
+            columns: self.columns.iter().map(own).collect(),
+            weights: own(&self.weights),
+            here: own(&self.here),
+        }
+    }
+
+    /// The change of the parameters with which the loss is least where the residuals are linear in them, and the residuals
+    /// there; `None` where they tell nothing of a parameter.
+    pub(crate) fn at_its_least(&self) -> Option<(DVector<f64>, Self)> {
+        let (mut change, mut least) = (DVector::zeros(self.columns.len()), self.clone());
+        for _ in 0..N_REWEIGHTED {
+            let Normal { matrix, gradient } = least.normal(0..least.here.len());
+            let step = -matrix.cholesky()?.solve(&gradient);
+            self.move_by(&step, &mut least.here);
+            least.weights = least.here.iter().copied().map(weight).collect();
+            change += step;
+        }
+        Some((change, least))
+    }
+
+    /// Standard error of each parameter at the least of the loss, by leaving out one of `n` stretches after the other and taking the step that
     /// the rest then asks for: sqrt((n - 1) / n sum of squares).
     pub(crate) fn jackknife(&self, n: usize) -> Vec<f64> {
         let whole = self.normal(0..self.here.len());
@@ -302,6 +330,24 @@ mod tests {
         assert_eq!(bounded.values, [3.0]);
         let pulled = fit(&[Coordinate { pull: Some((1.5, 1.0)), ..coordinate(0.0) }], |_| vec![0.0; 4]);
         assert!((pulled.values[0] - 1.5).abs() < 1e-3);
+    }
+
+    /// Rows of two numbers, the first three at 1 and the others at 3, in hundredths: the rows 3 to 5 alone ask for 3, with nothing
+    /// left there, and all of them for the mean of both, 2, which leaves 1 of each.
+    #[test]
+    fn rows_alone_have_a_least_of_their_own() {
+        let measured = |k: usize| if k < 6 { 1.0 } else { 3.0 };
+        let parameters = [coordinate(0.0)];
+        let all = Linearised::at(&parameters, &[2.0], |values| {
+            (0..12).map(|k| 0.01 * (values[0] - measured(k)) as f32).collect()
+        });
+        let (change, least) = all.of_rows(&[3, 4, 5], 2).at_its_least().unwrap();
+        assert!((change[0] - 1.0).abs() < 1e-3 && least.here.iter().all(|left| left.abs() < 1e-5));
+        assert_eq!(least.here.len(), 6);
+        let (change, least) = all.at_its_least().unwrap();
+        assert!(change[0].abs() < 1e-3 && least.here.iter().all(|left| (left.abs() - 0.01).abs() < 1e-5));
+        let nothing = Linearised::at(&parameters, &[2.0], |_| vec![1.0; 4]);
+        assert!(nothing.at_its_least().is_none());
     }
 
     /// A small residual counts as its square, a large one as 2 b |r|.

@@ -38,10 +38,12 @@ mod intervals;
 mod judgement;
 mod learned_bound;
 mod least_squares;
+mod left_over;
 mod limits_shown;
 mod machine;
 mod manoeuvre;
 mod nuisance;
+mod parts;
 mod pose_sensor;
 mod repair;
 mod residual_table;
@@ -61,8 +63,8 @@ mod without_simulator;
 mod engine_tests;
 
 pub use answer::{
-    Answer, BeforeAfter, Condition, Estimate, NamedEffect, Place, Ranked, SCHEMA_VERSION, Shrink, Support,
-    Verdict,
+    Answer, BeforeAfter, Condition, Division, Estimate, NamedEffect, PartEstimate, Place, Ranked,
+    SCHEMA_VERSION, Shrink, Support, Verdict,
 };
 pub use baseline::{Baseline, GapError};
 pub use causes::composed;
@@ -71,8 +73,8 @@ pub use diagnosis::{Diagnosis, diagnose};
 pub use drive::DriveError;
 pub use drives::{Case, Drives, DrivesError};
 pub use findings::{
-    ConditionBin, ConditionTable, Findings, GroundResidual, Prediction, PredictionModel, QuantityError,
-    ResidualCell, ResidualState,
+    ConditionBin, ConditionTable, Findings, GroundResidual, LeftBin, LeftOver, Prediction, PredictionModel,
+    QuantityError, ResidualCell, ResidualState,
 };
 pub use follow_up::Diagnosed;
 pub use ground_belief::{

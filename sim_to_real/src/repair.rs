@@ -146,6 +146,8 @@ mod tests {
             steering: Steering::Angle,
             verdict,
             effects,
+            by_part: Vec::new(),
+            left: Vec::new(),
             ranking: Vec::new(),
             credible_set: Vec::new(),
             places: Vec::new(),

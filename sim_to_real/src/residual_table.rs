@@ -5,7 +5,8 @@ use crate::drive::{HORIZONS, STEP_S};
 use crate::findings::{QuantityError, ResidualCell, ResidualState};
 use crate::rollout::{N_QUANTITIES, PER_START};
 
-const STATES: [ResidualState; N_QUANTITIES] = [
+/// The quantities in the order of a rollout's residuals.
+pub(crate) const STATES: [ResidualState; N_QUANTITIES] = [
     ResidualState::Along,
     ResidualState::Across,
     ResidualState::Yaw,

@@ -20,6 +20,7 @@ use crate::intervals::named_effects;
 use crate::least_squares::mean_loss;
 use crate::limits_shown::LimitsShown;
 use crate::machine::Machine;
+use crate::parts::by_part;
 use crate::residual_table::residual_cells;
 use crate::score_test::Chance;
 use crate::whitening::Whitening;
@@ -115,6 +116,9 @@ fn diagnosis(baseline: &Baseline, all: &[&Drive], folds: &Folds<'_>, selection: 
     }
     Diagnosis {
         named: named_effects(&trial, &causes),
+        by_part: by_part(&trial, &causes),
+        // Of what is left nobody knows whether nominal drives would leave it too.
+        left: Vec::new(),
         findings: Findings {
             conditions: condition_tables(&own, &baseline.null.starts),
             residuals: residual_cells(&before, &after, Some(&baseline.null.cells)),

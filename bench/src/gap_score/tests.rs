@@ -26,6 +26,8 @@ fn answer(verdict: Verdict, announced: &[&str], ranking: &[(&str, f64)]) -> Answ
         steering: Steering::Angle,
         verdict,
         effects: announced.iter().map(named).collect(),
+        by_part: Vec::new(),
+        left: Vec::new(),
         ranking: ranking
             .iter()
             .map(|(id, score)| Ranked { id: (*id).to_owned(), score: *score, support: None })

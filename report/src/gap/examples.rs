@@ -3,8 +3,9 @@
 use std::collections::BTreeMap;
 
 use sim_to_real::{
-    BeforeAfter, Condition, ConditionBin, ConditionTable, Estimate, GroundResidual, NamedEffect, Place,
-    QuantityError, Ranked, ResidualState, Shrink, Steering, Support, Verdict,
+    BeforeAfter, Condition, ConditionBin, ConditionTable, Division, Estimate, GroundResidual, LeftBin,
+    LeftOver, NamedEffect, PartEstimate, Place, QuantityError, Ranked, ResidualState, Shrink, Steering,
+    Support, Verdict,
 };
 
 use super::{HeldOutSample, HeldOutStrip};
@@ -22,6 +23,8 @@ pub(crate) fn answer() -> Answer {
         steering: Steering::Angle,
         verdict: Verdict::Effects,
         effects: vec![NamedEffect { id: "steer_lag".to_owned(), form: None, parameters }],
+        by_part: by_part(),
+        left: Vec::new(),
         ranking: ranking.map(ranked).to_vec(),
         credible_set: vec!["steer_lag".to_owned(), "steer_delay".to_owned()],
         places: vec![Place { condition: Condition::SteeringChange, share: 0.61 }],
@@ -52,6 +55,49 @@ pub(crate) fn answer() -> Answer {
         in_simulator: None,
         advice: vec!["drive steps of the steering & sines".to_owned()],
     }
+}
+
+/// A lag that grows along the drives, and is told badly by the first of them.
+fn by_part() -> Vec<PartEstimate> {
+    let part = |division, [from, to]: [Option<f64>; 2], [value, half]: [f64; 2]| PartEstimate {
+        effect: "steer_lag".to_owned(),
+        parameter: "time_constant_s".to_owned(),
+        division,
+        from,
+        to,
+        n_rollouts: 90,
+        estimate: Estimate { value, low: value - half, high: value + half },
+    };
+    let quarters = (0..4).map(|k| {
+        let ends = [k, k + 1].map(|k| Some(0.25 * f64::from(k)));
+        part(Division::Time, ends, [0.15 + 0.04 * f64::from(k), 0.02])
+    });
+    let others = [
+        part(Division::Drive, [Some(1.0); 2], [0.25, 2.0]),
+        part(Division::Drive, [Some(2.0); 2], [0.2, 0.02]),
+        part(Division::Steering, [None, Some(0.0)], [0.21, 0.02]),
+        part(Division::Steering, [Some(0.0), None], [0.22, 0.02]),
+    ];
+    quarters.chain(others).collect()
+}
+
+/// A yaw rate that falls short to the right and a speed that does on class 2.
+pub(crate) fn left() -> Vec<LeftOver> {
+    let bin = |[low, high]: [f64; 2], mean: f64| LeftBin { low, high, n: 40, mean, null_mean: Some(0.001) };
+    let side = (0..8).map(|k| {
+        let ends = [k, k + 1].map(|k| 0.75 * f64::from(k) - 3.0);
+        bin(ends, -0.04 + 0.01 * f64::from(k))
+    });
+    let class = (0..3).map(|k| {
+        let ends = [k, k + 1].map(|k| f64::from(k) - 0.5);
+        LeftBin { null_mean: None, ..bin(ends, -0.15 * f64::from(k) + 0.0) }
+    });
+    let shape =
+        |quantity, condition, share, bins| LeftOver { quantity, condition, horizon_s: 1.2, share, bins };
+    vec![
+        shape(ResidualState::YawRate, Condition::LateralAcceleration, 0.31, side.collect()),
+        shape(ResidualState::ForwardSpeed, Condition::TerrainClass, 0.12, class.collect()),
+    ]
 }
 
 /// Residuals that grow with the change of steering and lie in the north.

@@ -36,8 +36,11 @@ pub fn page(page: &Page<'_>) -> String {
         answer.pose_sensor.as_ref().map_or(String::new(), |found| paragraph(&text::pose_sensor(found))),
         // What the user's own simulator says counts for more than its calibrated image.
         answer.in_simulator.as_ref().map_or(String::new(), in_simulator::section),
-        section("Which", &(effects(answer) + &figures(&["ranking.png"]))),
-        section("Where", &(places(answer) + &figures(&["places.png", "ground.png"]))),
+        section("Which", &(effects(answer) + &figures(&["ranking.png", "throughout.png"]))),
+        section(
+            "Where",
+            &(places(answer) + &left(answer) + &figures(&["places.png", "left.png", "ground.png"])),
+        ),
         section(
             "How far",
             &(shrink(answer) + &in_units(answer) + &figures(&["residuals.png", "heldout.png"])),
@@ -108,6 +111,11 @@ fn places(answer: &Answer) -> String {
         return paragraph("Without a gap there is no place.");
     }
     paragraph(&format!("The residual follows: {}.", text::places(answer)))
+}
+
+/// What no announced effect explains.
+fn left(answer: &Answer) -> String {
+    text::left(answer).iter().map(|line| paragraph(&format!("Left: {line}."))).collect()
 }
 
 fn shrink(answer: &Answer) -> String {

@@ -3,7 +3,7 @@
 use super::in_simulator::in_simulator;
 use super::words;
 use bicycle::effect::{CATALOGUE, Parameter};
-use sim_to_real::{Answer, Condition, Estimate, NamedEffect, PoseSensor, Shrink, Verdict};
+use sim_to_real::{Answer, Condition, Estimate, LeftBin, LeftOver, NamedEffect, PoseSensor, Shrink, Verdict};
 
 /// The verdict in a sentence.
 pub(crate) fn verdict(answer: &Answer) -> String {
@@ -93,6 +93,30 @@ pub(crate) fn places(answer: &Answer) -> String {
     if told.is_empty() { "nowhere in particular".to_owned() } else { told.join(", ") }
 }
 
+/// What the announced effects leave, line by line: where it is least and where it is most.
+pub(crate) fn left(answer: &Answer) -> Vec<String> {
+    let told = |shape: &LeftOver| {
+        let by_mean = |a: &&LeftBin, b: &&LeftBin| a.mean.total_cmp(&b.mean);
+        let [least, most] = [shape.bins.iter().min_by(by_mean)?, shape.bins.iter().max_by(by_mean)?];
+        let (name, unit) = words::condition(shape.condition);
+        let at = |bin: &LeftBin| match shape.condition {
+            Condition::TerrainClass => format!("on class {:.0}", 0.5 * (bin.low + bin.high)),
+            _ => format!("at {} to {} {unit}", rounded(bin.low), rounded(bin.high)),
+        };
+        let off = |bin: &LeftBin| format!("{} {} {}", rounded(bin.mean), shape.quantity.unit(), at(bin));
+        let told = format!(
+            "{}, by {name}: off by {}, by {} ({:.0} % of what is left, {} s ahead)",
+            words::state(shape.quantity),
+            off(least),
+            off(most),
+            100.0 * shape.share,
+            shape.horizon_s
+        );
+        Some(told)
+    };
+    answer.left.iter().filter_map(told).collect()
+}
+
 /// How far the gap shrinks, line by line.
 pub(crate) fn shrink(shrink: &Shrink) -> Vec<String> {
     let mut lines = Vec::new();
@@ -176,6 +200,7 @@ pub fn text(answer: &Answer, drives: &str) -> String {
     if answer.verdict != Verdict::None {
         lines.push(format!("  where    {}", places(answer)));
     }
+    lines.extend(named("left", &left(answer)));
     let how_far = shrink(&answer.shrink).into_iter().chain(in_units(answer)).collect::<Vec<_>>();
     lines.extend(named("how far", &how_far));
     lines.extend(answer.in_simulator.iter().flat_map(|own| named("yours", &in_simulator(own))));
@@ -256,6 +281,16 @@ mod tests {
             "  next     drive steps of the steering & sines",
         ];
         assert_eq!(lines[7..], rest);
+    }
+
+    #[test]
+    fn what_is_left_is_told_by_its_ends() {
+        let told = left(&Answer { left: examples::left(), ..examples::answer() });
+        let expected = "yaw rate, by lateral acceleration: off by -0.0400 rad/s at -3.00 to -2.25 m/s², by 0.0300 rad/s at 2.25 to 3.00 m/s² (31 % of what is left, 1.2 s ahead)";
+        assert_eq!(told[0], expected);
+        let on_class = "forward speed, by terrain class: off by -0.300 m/s on class 2, by 0 m/s on class 0 (12 % of what is left, 1.2 s ahead)";
+        assert_eq!(told[1], on_class);
+        assert!(left(&examples::answer()).is_empty());
     }
 
     #[test]

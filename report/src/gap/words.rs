@@ -1,6 +1,6 @@
 //! Names and units on the pictures.
 
-use sim_to_real::{Condition, ResidualState};
+use sim_to_real::{Condition, Division, ResidualState};
 
 /// What the real drives were held against.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -48,6 +48,10 @@ impl Reference {
 
 pub(super) const RANKING: &str =
     "Which effect: the probability of every effect of the catalogue to be a part of the cause.";
+pub(super) const THROUGHOUT: &str =
+    "Is it the same throughout: what each announced parameter would be in parts of the real drives alone.";
+pub(super) const LEFT: &str =
+    "What is left: by how much each quantity is still off, over the condition that it follows most.";
 pub(super) const RESIDUALS: &str =
     "How large: the residual of every predicted quantity, by how far ahead it is predicted.";
 pub(super) const GROUND: &str =
@@ -67,6 +71,17 @@ pub(super) fn condition(condition: Condition) -> (&'static str, &'static str) {
         Condition::TerrainClass => ("terrain class", "number"),
         Condition::Heading => ("heading", "rad"),
         Condition::Constant => ("everywhere the same", "-"),
+    }
+}
+
+/// Name and unit of what drives are divided by.
+pub(super) fn division(division: Division) -> &'static str {
+    match division {
+        Division::Time => "driven before [%]",
+        Division::Drive => "drive [number]",
+        Division::Steering => "steering to the",
+        Division::Speed => "speed [m/s]",
+        Division::TerrainClass => "terrain class [number]",
     }
 }
 

@@ -7,7 +7,11 @@ use crate::findings::ConditionTable;
 use crate::rollout::N_QUANTITIES;
 
 /// Records whose residuals are noise and, in their first quantity, a function of the conditions' values.
-fn records(n: usize, seed: u64, residual: impl Fn(&[f64; MEASURED.len()]) -> f64) -> Vec<StartRecord> {
+pub(super) fn records(
+    n: usize,
+    seed: u64,
+    residual: impl Fn(&[f64; MEASURED.len()]) -> f64,
+) -> Vec<StartRecord> {
     let mut noise = normal(seed);
     let mut window = || {
         let mut values: [f64; MEASURED.len()] = std::array::from_fn(|_| noise());

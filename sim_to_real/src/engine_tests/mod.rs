@@ -7,6 +7,8 @@ mod conditions;
 mod constancy;
 mod intervals;
 mod judgement;
+mod left_over;
+mod parts;
 mod score_test;
 
 use crate::drive::testing::{log, machine};

@@ -18,6 +18,8 @@ fn answer(verdict: Verdict, effects: Vec<NamedEffect>) -> Answer {
         steering: Steering::Angle,
         verdict,
         effects,
+        by_part: Vec::new(),
+        left: Vec::new(),
         ranking: Vec::new(),
         credible_set: Vec::new(),
         places: Vec::new(),

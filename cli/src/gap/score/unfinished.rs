@@ -114,6 +114,8 @@ mod tests {
             steering: sim_to_real::Steering::Angle,
             verdict: Verdict::None,
             effects: Vec::new(),
+            by_part: Vec::new(),
+            left: Vec::new(),
             ranking: Vec::new(),
             credible_set: Vec::new(),
             places: Vec::new(),
