@@ -114,6 +114,12 @@ pub(crate) fn left(answer: &Answer) -> Vec<String> {
         );
         Some(told)
     };
+    let is_unknown = matches!(answer.verdict, Verdict::Unknown | Verdict::EffectsAndUnknown);
+    if is_unknown && answer.left.is_empty() {
+        return vec![
+            "nothing that follows a condition: it comes and goes, or is faster than a second".to_owned(),
+        ];
+    }
     answer.left.iter().filter_map(told).collect()
 }
 
@@ -291,6 +297,8 @@ mod tests {
         let on_class = "forward speed, by terrain class: off by -0.300 m/s on class 2, by 0 m/s on class 0 (12 % of what is left, 1.2 s ahead)";
         assert_eq!(told[1], on_class);
         assert!(left(&examples::answer()).is_empty());
+        let shapeless = left(&Answer { verdict: Verdict::Unknown, ..examples::answer() });
+        assert!(shapeless.len() == 1 && shapeless[0].starts_with("nothing that follows"), "{shapeless:?}");
     }
 
     #[test]

@@ -111,10 +111,9 @@ fn shown(parts: &[&PartEstimate], whole: Estimate) -> Range {
 
 /// What a part of the drives is called below it.
 fn name(part: &PartEstimate) -> String {
-    let percent = |share: Option<f64>| number(100.0 * share.unwrap_or(0.0), 0);
     let whole = |value: Option<f64>| number(value.unwrap_or(0.0), 0);
     match part.division {
-        Division::Time => format!("{} to {}", percent(part.from), percent(part.to)),
+        Division::Time => format!("to {}", whole(part.to.map(|share| 100.0 * share))),
         Division::Steering if part.from.is_none() => "right".to_owned(),
         Division::Steering => "left".to_owned(),
         Division::Speed => {

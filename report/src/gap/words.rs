@@ -77,7 +77,7 @@ pub(super) fn condition(condition: Condition) -> (&'static str, &'static str) {
 /// Name and unit of what drives are divided by.
 pub(super) fn division(division: Division) -> &'static str {
     match division {
-        Division::Time => "driven before [%]",
+        Division::Time => "of each drive [%]",
         Division::Drive => "drive [number]",
         Division::Steering => "steering to the",
         Division::Speed => "speed [m/s]",
