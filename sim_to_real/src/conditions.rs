@@ -145,11 +145,7 @@ pub(crate) fn places(tables: &[ConditionTable]) -> Vec<Place> {
 
 fn condition_table(place: usize, real: &[StartRecord], null: &[StartRecord]) -> Option<ConditionTable> {
     let values = windows(real).map(|window| window.values[place]).collect();
-    let edges =
-        if MEASURED[place] == Condition::TerrainClass { between_classes(values) } else { quantiles(values) };
-    if edges.len() < 3 {
-        return None;
-    }
+    let edges = edges(place, values)?;
     let null_share = explained(place, null, &edges);
     let bins = edges.windows(2).enumerate().map(|(bin, edge)| {
         let inside = |records: &[StartRecord]| {
@@ -250,11 +246,18 @@ fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len() as f64
 }
 
-/// Edges between bins with equally many values; fewer where values repeat.
-pub(crate) fn quantiles(mut values: Vec<f64>) -> Vec<f64> {
+/// Edges between the bins of a condition; `None` where it has one value.
+pub(crate) fn edges(condition: usize, values: Vec<f64>) -> Option<Vec<f64>> {
+    let is_class = MEASURED[condition] == Condition::TerrainClass;
+    let edges = if is_class { between_classes(values) } else { quantiles(values, N_BINS) };
+    (edges.len() > 2).then_some(edges)
+}
+
+/// Edges between so many bins with equally many values; fewer where values repeat.
+pub(crate) fn quantiles(mut values: Vec<f64>, n_bins: usize) -> Vec<f64> {
     values.sort_by(f64::total_cmp);
     let last = values.len() - 1;
-    let mut edges: Vec<f64> = (0..=N_BINS).map(|k| values[last * k / N_BINS]).collect();
+    let mut edges: Vec<f64> = (0..=n_bins).map(|k| values[last * k / n_bins]).collect();
     edges.dedup();
     edges
 }

@@ -4,7 +4,7 @@
 use crate::answer::{Division, Estimate, PartEstimate};
 use crate::calibration::{coordinates_of_causes, value_at, with_values};
 use crate::causes::Trial;
-use crate::conditions::{between_classes, bin_of};
+use crate::conditions::{between_classes, bin_of, quantiles};
 use crate::drive::{Drive, VX};
 use crate::least_squares::Linearised;
 use crate::rollout::PER_START;
@@ -54,7 +54,7 @@ impl Parts {
             Self { division: Division::Time, edges: even(N_QUARTERS) },
             Self { division: Division::Drive, edges: of_drives },
             Self::right_and_left(),
-            Self { division: Division::Speed, edges: thirds(all(&speed_mps)) },
+            Self { division: Division::Speed, edges: quantiles(all(&speed_mps), N_SPEEDS) },
             Self { division: Division::TerrainClass, edges: between_classes(all(&class)) },
         ];
         shown.into_iter().filter(|parts| parts.edges.len() > 2).collect()
@@ -123,16 +123,6 @@ fn class(drive: &Drive, place: usize) -> f64 {
     f64::from(drive.class[drive.starts[place]])
 }
 
-/// Edges between parts with as many of the values; fewer where they repeat.
-fn thirds(mut values: Vec<f64>) -> Vec<f64> {
-    values.sort_by(f64::total_cmp);
-    let last = values.len().saturating_sub(1);
-    let mut edges: Vec<f64> =
-        (0..=N_SPEEDS).filter_map(|k| values.get(last * k / N_SPEEDS).copied()).collect();
-    edges.dedup();
-    edges
-}
-
 /// What the parameters of announced effects would be in every part of the drives: one step of Gauss and Newton from where
 /// all drives put them, the calibration held, with the interval of a jackknife over the part's stretches. What the model and
 /// the effects' forms add to the intervals of the whole is the same in every part, and not in these.
@@ -147,12 +137,13 @@ pub(crate) fn by_part(trial: &Trial<'_>, causes: &[Effect]) -> Vec<PartEstimate>
     let drives: Vec<&Drive> = trial.comparison.drives().collect();
     let of_part = |parts: &Parts, part: usize| {
         let rollouts = parts.rollouts(&drives, part);
+        (rollouts.len() >= FEWEST).then_some(())?;
         let (change, own) = linearised.of_rows(&rollouts, PER_START).at_its_least()?;
         let n = (rollouts.len() / STRETCH).clamp(N_STRETCHES[0], N_STRETCHES[1]);
         let half = own.jackknife(n).into_iter().map(move |error| STUDENT_90[n - N_STRETCHES[0]] * error);
         let places = whole.iter().zip(change.iter()).map(|(whole, change)| whole + change);
         let found: Vec<(f64, f64)> = places.zip(half).collect();
-        (rollouts.len() >= FEWEST).then(|| estimates(causes, &found, (parts, part, rollouts.len())))
+        Some(estimates(causes, &found, (parts, part, rollouts.len())))
     };
     let all = Parts::shown(&drives);
     let of_division = |parts: &Parts| -> Vec<PartEstimate> {
