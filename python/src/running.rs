@@ -86,7 +86,7 @@ fn opened<'a, H: Header, T: Element>(
 /// true on the machine's monotonic clock (`time.monotonic_ns()`) and what it says, or `None`; the first call begins to
 /// listen. Messages of another layout, out of order, from the future or with numbers that cannot be are not given, as
 /// nowhere in Surefoot. Orders return what the vehicle is told to do from then on, as a dict, and raise `RuntimeError` with
-/// the reason where they are refused or nobody answers within two seconds.
+/// the reason where they are refused or nobody answers within five seconds.
 #[pyclass(frozen, module = "surefoot")]
 pub struct Run {
     name: String,
