@@ -132,6 +132,8 @@ pub enum Condition {
     Heading,
     /// The same everywhere.
     Constant,
+    /// Share of the drive that was driven before. Told of what is left alone: drives of two kinds may be of two lengths.
+    Time,
 }
 
 /// How much of the residual a condition explains.

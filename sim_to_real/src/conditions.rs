@@ -8,7 +8,7 @@ use crate::rollout::{N_QUANTITIES, PER_START};
 use serde::{Deserialize, Serialize};
 
 /// Bins of a condition, each with as many rollouts as the next.
-const N_BINS: usize = 8;
+pub(crate) const N_BINS: usize = 8;
 /// Horizons at which the residual is laid out over the conditions, as places in [`HORIZONS`]: long enough for a motion to
 /// show, short enough for the conditions to be one.
 pub(crate) const LAID_OUT: [usize; 2] = [1, 2];

@@ -82,7 +82,7 @@ pub fn diagnose(baseline: &Baseline, machine: &Machine, real: &[DriveLog]) -> Re
     }
     let left = match judgement.verdict {
         Verdict::Unknown | Verdict::EffectsAndUnknown => {
-            left_over(&repaired, &baseline.null.starts, &baseline.yardstick)
+            left_over((&all, &repaired), &baseline.null.starts, &baseline.yardstick)
         }
         Verdict::None | Verdict::Effects => Vec::new(),
     };

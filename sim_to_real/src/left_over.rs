@@ -1,8 +1,9 @@
 //! What is left once the announced effects act, as a shape: which quantity is off, and under which condition by how much.
 
+use crate::answer::Condition;
 use crate::comparison::Yardstick;
-use crate::conditions::{LAID_OUT, MEASURED, StartRecord, Window, bin_of, edges};
-use crate::drive::{HORIZONS, STEP_S};
+use crate::conditions::{LAID_OUT, MEASURED, N_BINS, StartRecord, Window, bin_of, edges, quantiles};
+use crate::drive::{Drive, HORIZONS, STEP_S};
 use crate::findings::{LeftBin, LeftOver};
 use crate::residual_table::STATES;
 use crate::rollout::N_QUANTITIES;
@@ -13,12 +14,17 @@ const TOLD: usize = LAID_OUT.len() - 1;
 const STANDS_OUT: f64 = 0.03;
 
 /// Every quantity over the condition that it follows most, if it follows one; the largest share of what is left first.
-pub(crate) fn left_over(real: &[StartRecord], null: &[StartRecord], yardstick: &Yardstick) -> Vec<LeftOver> {
+pub(crate) fn left_over(
+    (drives, real): (&[&Drive], &[StartRecord]),
+    null: &[StartRecord],
+    yardstick: &Yardstick,
+) -> Vec<LeftOver> {
     let windows = |records| Vec::from_iter(<[StartRecord]>::iter(records).map(|own| &own.windows[TOLD]));
     let (real, null) = (windows(real), windows(null));
+    let axes = axes(drives, &real, &null);
     let of_quantity = |quantity: usize| {
-        let shapes =
-            (0..MEASURED.len()).filter_map(|place| shape((place, quantity), (&real, &null), yardstick));
+        let unit = yardstick.0[LAID_OUT[TOLD] * N_QUANTITIES + quantity];
+        let shapes = axes.iter().map(|axis| shape(axis, (quantity, unit), (&real, &null)));
         shapes.filter(|shape| shape.share > STANDS_OUT).max_by(|a, b| a.share.total_cmp(&b.share))
     };
     let mut shapes: Vec<LeftOver> = (0..N_QUANTITIES).filter_map(of_quantity).collect();
@@ -26,34 +32,53 @@ pub(crate) fn left_over(real: &[StartRecord], null: &[StartRecord], yardstick: &
     shapes
 }
 
-fn shape(
-    (condition, quantity): (usize, usize),
-    (real, null): (&[&Window], &[&Window]),
-    yardstick: &Yardstick,
-) -> Option<LeftOver> {
-    let edges = edges(condition, real.iter().map(|window| window.values[condition]).collect())?;
-    let horizon = LAID_OUT[TOLD];
-    let unit = yardstick.0[horizon * N_QUANTITIES + quantity];
-    let of = |windows: &[&Window]| {
-        let mut sums = vec![Sum::default(); edges.len() - 1];
-        for window in windows {
-            sums[bin_of(window.values[condition], &edges)].add(window.residual[quantity]);
+/// A condition with its value at every window, and the edges of its bins.
+struct Axis {
+    condition: Condition,
+    edges: Vec<f64>,
+    real: Vec<f64>,
+    null: Vec<f64>,
+}
+
+fn axes(drives: &[&Drive], real: &[&Window], null: &[&Window]) -> Vec<Axis> {
+    let measured = MEASURED.into_iter().enumerate().filter_map(|(place, condition)| {
+        let of =
+            |windows: &[&Window]| windows.iter().map(|window| window.values[place]).collect::<Vec<f64>>();
+        Some(Axis { condition, edges: edges(place, of(real))?, real: of(real), null: of(null) })
+    });
+    let n_starts = drives.iter().map(|drive| drive.starts.len());
+    let driven: Vec<f64> = n_starts.flat_map(|n| (0..n).map(move |place| place as f64 / n as f64)).collect();
+    let edges = quantiles(driven.clone(), N_BINS);
+    let time = Axis { condition: Condition::Time, edges, real: driven, null: Vec::new() };
+    measured.chain([time]).collect()
+}
+
+fn shape(axis: &Axis, (quantity, unit): (usize, f64), (real, null): (&[&Window], &[&Window])) -> LeftOver {
+    let of = |values: &[f64], windows: &[&Window]| {
+        let mut sums = vec![Sum::default(); axis.edges.len() - 1];
+        for (value, window) in values.iter().zip(windows) {
+            sums[bin_of(*value, &axis.edges)].add(window.residual[quantity]);
         }
         sums
     };
-    let (own, nominal) = (of(real), of(null));
-    let bins = edges.windows(2).zip(own.iter().zip(&nominal)).filter_map(|(edge, (own, nominal))| {
+    let (own, nominal) = (of(&axis.real, real), of(&axis.null, null));
+    // What is the same at all times is no change along the drives.
+    let without = match axis.condition {
+        Condition::Time => share(&[own.iter().sum()], real),
+        _ => share(&nominal, null),
+    };
+    let bins = axis.edges.windows(2).zip(own.iter().zip(&nominal)).filter_map(|(edge, (own, nominal))| {
         // A residual is what was foretold less what was measured.
         let mean = |sum: &Sum| sum.mean().map(|mean| -unit * mean);
         Some(LeftBin { low: edge[0], high: edge[1], n: own.n, mean: mean(own)?, null_mean: mean(nominal) })
     });
-    Some(LeftOver {
+    LeftOver {
         quantity: STATES[quantity],
-        condition: MEASURED[condition],
-        horizon_s: HORIZONS[horizon] as f64 * STEP_S,
-        share: share(&own, real) - share(&nominal, null),
+        condition: axis.condition,
+        horizon_s: HORIZONS[LAID_OUT[TOLD]] as f64 * STEP_S,
+        share: share(&own, real) - without,
         bins: bins.collect(),
-    })
+    }
 }
 
 /// Residuals of a bin.
@@ -71,6 +96,12 @@ impl Sum {
 
     fn mean(&self) -> Option<f64> {
         (self.n > 0).then(|| self.sum / self.n as f64)
+    }
+}
+
+impl<'a> std::iter::Sum<&'a Self> for Sum {
+    fn sum<I: Iterator<Item = &'a Self>>(bins: I) -> Self {
+        bins.fold(Self::default(), |all, own| Self { n: all.n + own.n, sum: all.sum + own.sum })
     }
 }
 

@@ -79,6 +79,7 @@ pub(crate) fn condition(condition: Condition) -> &'static str {
         Condition::TerrainClass => "terrain class",
         Condition::Heading => "heading",
         Condition::Constant => "everywhere the same",
+        Condition::Time => "time",
     }
 }
 

@@ -71,6 +71,7 @@ pub(super) fn condition(condition: Condition) -> (&'static str, &'static str) {
         Condition::TerrainClass => ("terrain class", "number"),
         Condition::Heading => ("heading", "rad"),
         Condition::Constant => ("everywhere the same", "-"),
+        Condition::Time => ("share of each drive", "-"),
     }
 }
 

@@ -1,6 +1,7 @@
 //! What is left, as a shape.
 
 use super::conditions::records;
+use super::{Made, arcs};
 use crate::answer::Condition;
 use crate::comparison::Yardstick;
 use crate::findings::ResidualState;
@@ -13,8 +14,10 @@ use crate::rollout::PER_START;
 #[test]
 fn what_follows_a_condition_is_told_with_its_shape() {
     let (null, yardstick) = (records(600, 1, |_| 0.0), Yardstick(vec![0.5; PER_START]));
+    let drive = arcs(Made::RIGHT, 1);
     let real = records(1200, 2, |values| 4.0 * values[3]);
-    let left = left_over(&real, &null, &yardstick);
+    let drives = vec![&drive; 1200_usize.div_ceil(drive.starts.len())];
+    let left = left_over((&drives, &real), &null, &yardstick);
     let [along] = &left[..] else { panic!("expected one shape, found {left:?}") };
     assert_eq!((along.quantity, along.condition), (ResidualState::Along, Condition::SpeedChange));
     assert!((0.68..0.80).contains(&along.share), "{}", along.share);
@@ -29,7 +32,32 @@ fn what_follows_a_condition_is_told_with_its_shape() {
 fn what_nominal_drives_show_as_well_is_no_shape() {
     let yardstick = Yardstick(vec![1.0; PER_START]);
     let same = |seed| records(600, seed, |values| 2.0 * values[0]);
-    assert!(left_over(&same(5), &same(6), &yardstick).is_empty());
+    let drive = arcs(Made::RIGHT, 1);
+    let drives = vec![&drive; 600_usize.div_ceil(drive.starts.len())];
+    assert!(left_over((&drives, &same(5)), &same(6), &yardstick).is_empty());
     let noise = |seed| records(600, seed, |_| 0.0);
-    assert!(left_over(&noise(7), &noise(8), &yardstick).is_empty());
+    assert!(left_over((&drives, &noise(7)), &noise(8), &yardstick).is_empty());
+}
+
+/// A yaw rate that falls short by 3 standard deviations more at the end of every drive than at its beginning is told over the
+/// time, from the first eighth, 3 / 16 on average, to the last, 45 / 16; one that always falls short by as much is not.
+#[test]
+fn what_grows_along_the_drives_is_told_over_the_time() {
+    let (null, yardstick) = (records(600, 1, |_| 0.0), Yardstick(vec![1.0; PER_START]));
+    let drive = arcs(Made::RIGHT, 1);
+    let (drives, n) = ([&drive; 8], drive.starts.len());
+    let left = |grows: f64, always: f64| {
+        let mut real = records(8 * n, 9, |_| 0.0);
+        for (place, record) in real.iter_mut().enumerate() {
+            let driven = (place % n) as f64 / n as f64;
+            record.windows.iter_mut().for_each(|window| window.residual[4] += grows * driven + always);
+        }
+        left_over((&drives, &real), &null, &yardstick)
+    };
+    let grown = left(3.0, 0.0);
+    assert_eq!((grown[0].quantity, grown[0].condition), (ResidualState::YawRate, Condition::Time));
+    let [first, last] = [&grown[0].bins[0], &grown[0].bins[7]].map(|bin| bin.mean);
+    assert!((first + 3.0 / 16.0).abs() < 0.3 && (last + 45.0 / 16.0).abs() < 0.3, "{first} {last}");
+    assert_eq!(grown[0].bins[0].null_mean, None);
+    assert!(left(0.0, 3.0).iter().all(|shape| shape.condition != Condition::Time));
 }
