@@ -11,7 +11,7 @@ use std::sync::LazyLock;
 use bicycle::{Column, DriveLog};
 use formats::{DriveLogFile, GapGround, GapNoise, GapVehicle};
 use scenarios::{Deviation, Style, TestMachine, World, test_drive};
-use sim_to_real::Answer;
+use sim_to_real::{Answer, Division};
 use terrain::TerrainClass;
 
 /// By this the servo of the robot answers later than that of its simulator [s].
@@ -174,23 +174,23 @@ fn a_case_is_diagnosed_verified_written_and_applied() {
     assert_eq!(answer.effects[0].id, "steer_lag", "{:?}", answer.effects);
     let lag = answer.effects[0].parameters["time_constant_s"];
     assert!((lag.value - LATE_S).abs() < 0.07 && lag.low <= lag.value && lag.value <= lag.high, "{lag:?}");
+    let quarters: Vec<f64> = answer
+        .by_part
+        .iter()
+        .filter(|part| part.division == Division::Time)
+        .map(|part| part.estimate.value)
+        .collect();
+    assert!(quarters.len() == 4 && quarters.iter().all(|lag_s| (lag_s - LATE_S).abs() < 0.1), "{quarters:?}");
     assert!(
         told.contains("The gap comes from steer_lag") && told.contains("position error after 2 s"),
         "{told}"
     );
 
     assert_eq!(fs::read(path("a.json")).unwrap(), fs::read(path("r/answer.json")).unwrap());
-    let pictures = ["ground.png", "heldout.png", "places.png", "ranking.png", "residuals.png"];
-    let written = [
-        "answer.json",
-        pictures[0],
-        pictures[1],
-        pictures[2],
-        "prediction.json",
-        pictures[3],
-        "report.html",
-        pictures[4],
-    ];
+    let pictures =
+        ["ground.png", "heldout.png", "places.png", "ranking.png", "residuals.png", "throughout.png"];
+    let mut written = [&["answer.json", "prediction.json", "report.html"][..], &pictures].concat();
+    written.sort_unstable();
     assert_eq!(names(&path("r")), written);
     let html = fs::read_to_string(path("r/report.html")).unwrap();
     assert_eq!(html.matches("data:image/png;base64,").count(), pictures.len());
