@@ -102,6 +102,7 @@ pub(crate) fn left(answer: &Answer) -> Vec<String> {
         let (name, unit) = words::condition(shape.condition);
         let at = |bin: &LeftBin| match shape.condition {
             Condition::TerrainClass => format!("on class {:.0}", 0.5 * (bin.low + bin.high)),
+            Condition::Time => format!("at {:.0} to {:.0} % of it", 100.0 * bin.low, 100.0 * bin.high),
             _ => format!("at {} to {} {unit}", rounded(bin.low), rounded(bin.high)),
         };
         let off = |bin: &LeftBin| format!("{} {} {}", rounded(bin.mean), shape.quantity.unit(), at(bin));
@@ -297,6 +298,12 @@ mod tests {
         assert_eq!(told[0], expected);
         let on_class = "forward speed, by terrain class: off by -0.300 m/s on class 2, by 0 m/s on class 0 (12 % of what is left, 1.2 s ahead)";
         assert_eq!(told[1], on_class);
+        let mut sagging = examples::left();
+        (sagging[0].condition, sagging[0].bins) = (Condition::Time, sagging[1].bins.clone());
+        (sagging[0].bins[0].low, sagging[0].bins[0].high) = (0.0, 0.125);
+        let told = left(&Answer { left: sagging, ..examples::answer() });
+        assert!(told[0].starts_with("yaw rate, by share of each drive: off by "), "{}", told[0]);
+        assert!(told[0].contains("by 0 rad/s at 0 to 12 % of it"), "{}", told[0]);
         assert!(left(&examples::answer()).is_empty());
         let shapeless = left(&Answer { verdict: Verdict::Unknown, ..examples::answer() });
         assert!(shapeless.len() == 1 && shapeless[0].starts_with("nothing that follows"), "{shapeless:?}");
