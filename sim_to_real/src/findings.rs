@@ -47,7 +47,7 @@ pub struct ConditionBin {
     pub null_mean_square: f64,
 }
 
-/// What is left of one quantity once the announced effects act, over the condition that it follows most.
+/// What is left of one quantity once the announced effects act: over the condition that it follows most, or everywhere.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LeftOver {
     /// Quantity.
@@ -56,10 +56,10 @@ pub struct LeftOver {
     pub condition: Condition,
     /// Time since the rollout's start [s].
     pub horizon_s: f64,
-    /// Share of the square of all that is left then, in standard deviations, that the means of the bins make, less what
-    /// those of nominal drives make of theirs [-].
+    /// Share of the square of all that is left then, in standard deviations, that the means of the bins make beyond the
+    /// mean of all, less what those of nominal drives make of theirs [-].
     pub share: f64,
-    /// The condition from low to high; empty bins are left out.
+    /// The condition from low to high; empty bins are left out. One where it is the same everywhere, its ends 0.
     pub bins: Vec<LeftBin>,
 }
 

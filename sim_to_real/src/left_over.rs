@@ -13,7 +13,8 @@ const TOLD: usize = LAID_OUT.len() - 1;
 /// A shape is told where it is this much of what is left, beyond what the same bins show of nominal drives.
 const STANDS_OUT: f64 = 0.03;
 
-/// Every quantity over the condition that it follows most, if it follows one; the largest share of what is left first.
+/// Every quantity that is off everywhere, and over the condition that it follows most, if it follows one; the largest share of
+/// what is left first.
 pub(crate) fn left_over(
     (drives, real): (&[&Drive], &[StartRecord]),
     null: &[StartRecord],
@@ -25,9 +26,13 @@ pub(crate) fn left_over(
     let of_quantity = |quantity: usize| {
         let unit = yardstick.0[LAID_OUT[TOLD] * N_QUANTITIES + quantity];
         let shapes = axes.iter().map(|axis| shape(axis, (quantity, unit), (&real, &null)));
-        shapes.filter(|shape| shape.share > STANDS_OUT).max_by(|a, b| a.share.total_cmp(&b.share))
+        let told = shapes.filter(|shape| shape.share > STANDS_OUT);
+        let (mut told, followed): (Vec<_>, Vec<_>) =
+            told.partition(|shape| shape.condition == Condition::Constant);
+        told.extend(followed.into_iter().max_by(|a, b| a.share.total_cmp(&b.share)));
+        told
     };
-    let mut shapes: Vec<LeftOver> = (0..N_QUANTITIES).filter_map(of_quantity).collect();
+    let mut shapes: Vec<LeftOver> = (0..N_QUANTITIES).flat_map(of_quantity).collect();
     shapes.sort_by(|a, b| b.share.total_cmp(&a.share));
     shapes
 }
@@ -50,7 +55,14 @@ fn axes(drives: &[&Drive], real: &[&Window], null: &[&Window]) -> Vec<Axis> {
     let driven: Vec<f64> = n_starts.flat_map(|n| (0..n).map(move |place| place as f64 / n as f64)).collect();
     let edges = quantiles(driven.clone(), N_BINS);
     let time = Axis { condition: Condition::Time, edges, real: driven, null: Vec::new() };
-    measured.chain([time]).collect()
+    let nothing = |windows: &[&Window]| vec![0.0; windows.len()];
+    let constant = Axis {
+        condition: Condition::Constant,
+        edges: vec![0.0; 2],
+        real: nothing(real),
+        null: nothing(null),
+    };
+    measured.chain([time, constant]).collect()
 }
 
 fn shape(axis: &Axis, (quantity, unit): (usize, f64), (real, null): (&[&Window], &[&Window])) -> LeftOver {
@@ -62,10 +74,10 @@ fn shape(axis: &Axis, (quantity, unit): (usize, f64), (real, null): (&[&Window],
         sums
     };
     let (own, nominal) = (of(&axis.real, real), of(&axis.null, null));
-    // What is the same at all times is no change along the drives.
-    let without = match axis.condition {
-        Condition::Time => share(&[own.iter().sum()], real),
-        _ => share(&nominal, null),
+    // What is the same in all bins is told as such, and of no other condition.
+    let explained = |bins: &[Sum], windows: &[&Window]| {
+        let constant = share(&[bins.iter().sum()], windows);
+        if axis.condition == Condition::Constant { constant } else { share(bins, windows) - constant }
     };
     let bins = axis.edges.windows(2).zip(own.iter().zip(&nominal)).filter_map(|(edge, (own, nominal))| {
         // A residual is what was foretold less what was measured.
@@ -76,7 +88,7 @@ fn shape(axis: &Axis, (quantity, unit): (usize, f64), (real, null): (&[&Window],
         quantity: STATES[quantity],
         condition: axis.condition,
         horizon_s: HORIZONS[LAID_OUT[TOLD]] as f64 * STEP_S,
-        share: share(&own, real) - without,
+        share: explained(&own, real) - explained(&nominal, null),
         bins: bins.collect(),
     }
 }

@@ -105,16 +105,13 @@ pub(crate) fn left(answer: &Answer) -> Vec<String> {
             Condition::Time => format!("at {:.0} to {:.0} % of it", 100.0 * bin.low, 100.0 * bin.high),
             _ => format!("at {} to {} {unit}", rounded(bin.low), rounded(bin.high)),
         };
-        let off = |bin: &LeftBin| format!("{} {} {}", rounded(bin.mean), shape.quantity.unit(), at(bin));
-        let told = format!(
-            "{}, by {name}: off by {}, by {} ({:.0} % of what is left, {} s ahead)",
-            words::state(shape.quantity),
-            off(least),
-            off(most),
-            100.0 * shape.share,
-            shape.horizon_s
-        );
-        Some(told)
+        let mean = |bin: &LeftBin| format!("{} {}", rounded(bin.mean), shape.quantity.unit());
+        let off = match shape.condition {
+            Condition::Constant => format!(": off by {} everywhere", mean(least)),
+            _ => format!(", by {name}: off by {} {}, by {} {}", mean(least), at(least), mean(most), at(most)),
+        };
+        let (quantity, percent) = (words::state(shape.quantity), 100.0 * shape.share);
+        Some(format!("{quantity}{off} ({percent:.0} % of what is left, {} s ahead)", shape.horizon_s))
     };
     let is_unknown = matches!(answer.verdict, Verdict::Unknown | Verdict::EffectsAndUnknown);
     if is_unknown && answer.left.is_empty() {
@@ -300,10 +297,12 @@ mod tests {
         assert_eq!(told[1], on_class);
         let mut sagging = examples::left();
         (sagging[0].condition, sagging[0].bins) = (Condition::Time, sagging[1].bins.clone());
+        sagging[1].condition = Condition::Constant;
         (sagging[0].bins[0].low, sagging[0].bins[0].high) = (0.0, 0.125);
         let told = left(&Answer { left: sagging, ..examples::answer() });
         assert!(told[0].starts_with("yaw rate, by share of each drive: off by "), "{}", told[0]);
         assert!(told[0].contains("by 0 rad/s at 0 to 12 % of it"), "{}", told[0]);
+        assert!(told[1].starts_with("forward speed: off by -0.300 m/s everywhere (12 %"), "{}", told[1]);
         assert!(left(&examples::answer()).is_empty());
         let shapeless = left(&Answer { verdict: Verdict::Unknown, ..examples::answer() });
         assert!(shapeless.len() == 1 && shapeless[0].starts_with("nothing that follows"), "{shapeless:?}");

@@ -40,7 +40,8 @@ fn what_nominal_drives_show_as_well_is_no_shape() {
 }
 
 /// A yaw rate that falls short by 3 standard deviations more at the end of every drive than at its beginning is told over the
-/// time, from the first eighth, 3 / 16 on average, to the last, 45 / 16; one that always falls short by as much is not.
+/// time, from the first eighth, 3 / 16 on average, to the last, 45 / 16, and everywhere, 1.5 on average; one that always falls
+/// short by as much is told everywhere alone.
 #[test]
 fn what_grows_along_the_drives_is_told_over_the_time() {
     let (null, yardstick) = (records(600, 1, |_| 0.0), Yardstick(vec![1.0; PER_START]));
@@ -55,9 +56,16 @@ fn what_grows_along_the_drives_is_told_over_the_time() {
         left_over((&drives, &real), &null, &yardstick)
     };
     let grown = left(3.0, 0.0);
-    assert_eq!((grown[0].quantity, grown[0].condition), (ResidualState::YawRate, Condition::Time));
-    let [first, last] = [&grown[0].bins[0], &grown[0].bins[7]].map(|bin| bin.mean);
+    let [everywhere, along] = &grown[..] else { panic!("expected two shapes, found {grown:?}") };
+    assert_eq!((everywhere.condition, along.condition), (Condition::Constant, Condition::Time));
+    assert!((everywhere.bins[0].mean + 1.5).abs() < 0.1, "{everywhere:?}");
+    let [first, last] = [&along.bins[0], &along.bins[7]].map(|bin| bin.mean);
     assert!((first + 3.0 / 16.0).abs() < 0.3 && (last + 45.0 / 16.0).abs() < 0.3, "{first} {last}");
-    assert_eq!(grown[0].bins[0].null_mean, None);
-    assert!(left(0.0, 3.0).iter().all(|shape| shape.condition != Condition::Time));
+    // The variance of 3 times a share is 0.75, of the square of it and of five quantities' noise, 3 + 5.
+    assert!((along.share - 0.75 / 8.0).abs() < 0.03 && along.bins[0].null_mean.is_none(), "{along:?}");
+    let always = left(0.0, 3.0);
+    let [constant] = &always[..] else { panic!("expected one shape, found {always:?}") };
+    assert_eq!((constant.condition, constant.bins.len()), (Condition::Constant, 1));
+    // 9 of 9 + 5.
+    assert!((constant.share - 9.0 / 14.0).abs() < 0.05, "{}", constant.share);
 }
