@@ -7,10 +7,6 @@ use crate::nuisance::{Information, Nuisance};
 use bicycle::Effect;
 use bicycle::effect::{CATALOGUE, Description, Role, add_in_order};
 
-/// A search between tried values narrows them so many times by the golden section, to a thirtieth: what is told of a
-/// parameter comes from a fit that begins there.
-const N_NARROWED: usize = 7;
-
 /// Effects added to the baseline, and how well the whole foretells the real drives.
 #[derive(Clone, Debug)]
 pub(crate) struct Explanation {
@@ -138,7 +134,7 @@ impl<'a> Trial<'a> {
         let mut best = Explanation::new(known.iter().copied().chain([cause]).collect(), explanation.loss);
         let inner = |low: f64, high: f64| [high - GOLDEN * (high - low), low + GOLDEN * (high - low)];
         let [mut left, mut right] = inner(low, high).map(|place| (place, with(place)));
-        for _ in 0..N_NARROWED {
+        for _ in 0..12 {
             for side in [&left, &right] {
                 if side.1.loss < best.loss {
                     best = side.1.clone();
