@@ -7,8 +7,7 @@ use bus::channel::{Bus, ChannelError, EMERGENCY_STOP, MISSION, ORDER};
 use bus::clock::{self, SECOND_NS};
 use bus::message::MissionRecord;
 
-/// How long an answer is waited for [ns]: a mission process looks every 5 ms, but where it shares two cores with a dozen
-/// processes of other runs it may not get its turn for 2 s.
+/// How long an answer is waited for [ns]: a mission process looks every 5 ms, where it gets its turn.
 const PATIENCE_NS: u64 = 5 * SECOND_NS;
 /// Time between two looks whether there is one [ns].
 const POLL_NS: u64 = SECOND_NS / 200;

@@ -237,8 +237,8 @@ impl Linearised {
         Some((change, least))
     }
 
-    /// Standard error of each parameter at the least of the loss, by leaving out one of `n` stretches after the other and taking the step that
-    /// the rest then asks for: sqrt((n - 1) / n sum of squares).
+    /// Standard error of each parameter at the least of the loss, by leaving out one of `n` stretches after the other and
+    /// taking the step that the rest then asks for: sqrt((n - 1) / n sum of squares).
     pub(crate) fn jackknife(&self, n: usize) -> Vec<f64> {
         let whole = self.normal(0..self.here.len());
         let length = self.here.len().div_ceil(n).max(1);

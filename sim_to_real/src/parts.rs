@@ -123,9 +123,10 @@ fn class(drive: &Drive, place: usize) -> f64 {
     f64::from(drive.class[drive.starts[place]])
 }
 
-/// What the parameters of announced effects would be in every part of the drives: one step of Gauss and Newton from where
-/// all drives put them, the calibration held, with the interval of a jackknife over the part's stretches. What the model and
-/// the effects' forms add to the intervals of the whole is the same in every part, and not in these.
+/// What the parameters of announced effects would be in every part of the drives: where its loss is least, the residuals
+/// linear around where all drives put them and the calibration held, with the interval of a jackknife over the part's
+/// stretches. What the model and the effects' forms add to the intervals of the whole is the same in every part, and not in
+/// these.
 pub(crate) fn by_part(trial: &Trial<'_>, causes: &[Effect]) -> Vec<PartEstimate> {
     if causes.is_empty() {
         return Vec::new();

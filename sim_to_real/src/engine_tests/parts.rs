@@ -28,8 +28,8 @@ fn of_division(parts: &[PartEstimate], division: Division) -> Vec<&PartEstimate>
     parts.iter().filter(|part| part.division == division).collect()
 }
 
-/// A ratio of 0.85 to the right and of 0.85 * 0.9 to the left, mixed by rollouts that see both: one step from what all
-/// drives ask for lands where a fit to the part alone ends, to half a hundredth.
+/// A ratio of 0.85 to the right and of 0.85 * 0.9 to the left, mixed by rollouts that see both: with residuals linear
+/// around what all drives ask for, a part's least is where a fit to it alone ends, to half a hundredth.
 #[test]
 fn a_part_asks_for_what_a_fit_to_it_alone_finds() {
     let yardstick = yardstick();
