@@ -90,7 +90,7 @@ pub(crate) fn left() -> Vec<LeftOver> {
     });
     let class = (0..3).map(|k| {
         let ends = [k, k + 1].map(|k| f64::from(k) - 0.5);
-        LeftBin { null_mean: None, ..bin(ends, -0.15 * f64::from(k) + 0.0) }
+        LeftBin { null_mean: None, ..bin(ends, -0.15 * f64::from(k)) }
     });
     let shape =
         |quantity, condition, share, bins| LeftOver { quantity, condition, horizon_s: 1.2, share, bins };

@@ -60,7 +60,8 @@ fn plain_name(name: &str) -> String {
 /// Three significant digits.
 pub(super) fn rounded(value: f64) -> String {
     if value == 0.0 || !value.is_finite() {
-        return format!("{value}");
+        // Without the sign of a negative zero.
+        return format!("{}", value + 0.0);
     }
     let decimals = (2 - value.abs().log10().floor() as i32).clamp(0, 6) as usize;
     format!("{value:.decimals$}")
@@ -115,9 +116,7 @@ pub(crate) fn left(answer: &Answer) -> Vec<String> {
     };
     let is_unknown = matches!(answer.verdict, Verdict::Unknown | Verdict::EffectsAndUnknown);
     if is_unknown && answer.left.is_empty() {
-        return vec![
-            "nothing that follows a condition: it comes and goes, or is faster than a second".to_owned(),
-        ];
+        return vec!["nothing that follows a condition or the time".to_owned()];
     }
     answer.left.iter().filter_map(told).collect()
 }
@@ -349,6 +348,7 @@ mod tests {
 
     #[test]
     fn three_digits_are_kept() {
-        assert_eq!([0.0, 12345.6, 0.012345, -2.5].map(rounded), ["0", "12346", "0.0123", "-2.50"]);
+        assert_eq!([0.0, -0.0, 12345.6, 0.012345].map(rounded), ["0", "0", "12346", "0.0123"]);
+        assert_eq!(rounded(-2.5), "-2.50");
     }
 }
