@@ -27,6 +27,7 @@ mod speed_ramp;
 mod steer_linkage;
 mod steer_servo;
 mod steer_swing;
+mod tyre_slip;
 mod wheel_slip;
 mod wind;
 mod yaw_gain;
@@ -208,6 +209,7 @@ catalogue! {
     rear_slip::RearSlip,
     rear_slip::RearSteer,
     friction::Friction,
+    tyre_slip::TyreSlip,
     sensors::PoseLatency,
     sensors::OdomScale,
     sensors::GyroBias,

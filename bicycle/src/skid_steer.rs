@@ -249,7 +249,7 @@ impl SkidSteerStepper {
         state.x = aside.mul_add(sine, state.x);
         state.y = state.y - aside * cosine;
         state.carry_on(advance, yaw_rate, self.turn);
-        Rates { speed, yaw_rate }
+        Rates { speed, side_speed: -(yaw_rate * speed.0.real(self.ahead_m)), yaw_rate }
     }
 }
 

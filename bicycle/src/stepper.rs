@@ -42,6 +42,8 @@ impl<L: Lanes> LaneState<L> {
 pub struct Rates<L: Lanes> {
     /// Speed asked of the ground, before it took its share [m/s].
     pub speed: Real<L>,
+    /// Speed to the left, before the ground took its share [m/s]; 0 of a model that does not tell it.
+    pub side_speed: Real<L>,
     /// Yaw rate [rad/s].
     pub yaw_rate: Real<L>,
 }
@@ -163,10 +165,11 @@ impl Stepper {
         self.effects.held(memory)
     }
 
-    /// Corrects what is held once a step was measured: what makes the vehicle faster than foretold is a force that the
-    /// integral has met and the model has not.
-    pub fn correct_held(&self, memory: &mut [f64], faster_mps: f64) {
-        self.effects.correct_held(memory, faster_mps);
+    /// Corrects what is held once a step was measured: what makes the vehicle faster than foretold [m/s] is a force that
+    /// the integral has met and the model has not.
+    #[inline(always)]
+    pub fn correct_held<L: Lanes>(&self, memory: &mut [L::Value], faster: Real<L>) {
+        self.effects.correct_held(memory, faster);
     }
 
     /// Fills the memory as a command leaves it that was in force for long.
@@ -208,7 +211,7 @@ impl Stepper {
         let curving = steering.tan() * ground.angular_traction;
         let yaw_rate = speed * Real::constant(lanes, self.per_wheelbase) * curving;
         state.carry_on(advance, yaw_rate, self.turn);
-        Rates { speed, yaw_rate }
+        Rates { speed, side_speed: lanes.real(0.0), yaw_rate }
     }
 
     /// One step of the whole model: effects on the command, limits of acceleration and steering rate, effects on
@@ -331,7 +334,7 @@ impl Stepper {
         state.y = forward_step.mul_add(sine, lateral_step.mul_add(cosine, state.y));
         let yaw_rate = yaw_rate * ground.angular_traction;
         state.turns = yaw_rate.mul_add(Real::constant(lanes, self.turn), state.turns).wrap_turns();
-        Rates { speed: forward, yaw_rate }
+        Rates { speed: forward, side_speed: lateral, yaw_rate }
     }
 
     #[inline(always)]

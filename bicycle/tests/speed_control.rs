@@ -1,6 +1,7 @@
 //! Speed controllers against closed forms.
 #![allow(clippy::unwrap_used, reason = "a test that cannot be set up has failed")]
 
+use bicycle::lanes::{Real, Scalar};
 use bicycle::{Command, Effect, GroundSample, Limits, Model, State, Stepper};
 
 const STEP_S: f64 = 0.02;
@@ -201,7 +202,7 @@ fn what_is_held_follows_what_was_measured() {
     controlled.held(&mut memory)[0] = 1.0;
     for step in 1..=50 {
         let foretold = controlled.step_state(&state, command, &GroundSample::FIRM, &mut memory, step);
-        controlled.correct_held(&mut memory, SPEED_MPS - foretold.speed_mps);
+        controlled.correct_held(&mut memory, Real(Scalar, SPEED_MPS - foretold.speed_mps));
         let expected_mps2 = (1.0 - 1.5_f64.sqrt() * STEP_S / 4.0).powi(step as i32);
         assert!((controlled.held(&mut memory)[0] - expected_mps2).abs() < 1e-9);
     }

@@ -219,6 +219,11 @@ fn a_simulator_that_fails_on_the_way_is_told_in_one_line() {
             "run 1: expected finite numbers, found NaN",
         ),
         (
+            "hello(); r = asked(); moved(r, len(r['slope_left']), side_speed_mps=[0.0] * 3); asked()",
+            &[],
+            "run 1: side_speed_mps: expected 1596 values, found 3",
+        ),
+        (
             "hello(); moved(asked() | {'id': 7}, 3); asked()",
             &[],
             "run 1: expected the motion of this run, found that of run 7",

@@ -162,7 +162,8 @@ def driven(vehicle: Message, run: Message) -> list[Row]:
     rows = STATES(start_of(run["start"], car), inputs, run["step_s"], nominal_kg, motor_s, car)
     x_m, y_m, _, v_mps, yaw_rad, turn, slip_rad, *_ = rows.T
     x_m, y_m = x_m - car["b"] * np.cos(yaw_rad), y_m - car["b"] * np.sin(yaw_rad)
-    table = np.column_stack([x_m, y_m, yaw_rad, v_mps * np.cos(slip_rad), turn])
+    left_mps = v_mps * np.sin(slip_rad) - car["b"] * turn
+    table = np.column_stack([x_m, y_m, yaw_rad, v_mps * np.cos(slip_rad), turn, left_mps])
     return [tuple(row) for row in table.tolist()]
 
 

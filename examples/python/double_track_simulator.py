@@ -73,10 +73,11 @@ class Car:
         self.acceleration_mps2 = [0.0, 0.0]
 
     def measured(self) -> Row:
-        """x, y [m], yaw [rad], speed [m/s], yaw rate [rad/s] at the middle of the rear axle."""
+        """x, y [m], yaw [rad], speed [m/s], yaw rate [rad/s], speed to the left [m/s] at the middle of the rear axle."""
         sine, cosine = math.sin(self.yaw_rad), math.cos(self.yaw_rad)
         x_m, y_m = self.x_m - self.rear_m * cosine, self.y_m - self.rear_m * sine
-        return x_m, y_m, self.yaw_rad, self.forward_mps, self.yaw_rate_radps
+        left_mps = self.left_mps - self.rear_m * self.yaw_rate_radps
+        return x_m, y_m, self.yaw_rad, self.forward_mps, self.yaw_rate_radps, left_mps
 
     def actuate(self, command_mps: float, command_rad: float, step_s: float) -> None:
         """Servo and motor follow their commands."""
@@ -138,7 +139,7 @@ class Car:
 
 
 def driven(vehicle: Message, run: Message) -> list[Row]:
-    """Every row of a run: x, y, yaw, speed, yaw rate; the first is the start."""
+    """Every row of a run, at the middle of the rear axle; the first is the start."""
     car = Car(vehicle, run["knobs"])
     car.begin(run["start"])
     n_parts = max(1, math.ceil(run["step_s"] / LONGEST_STEP_S - 1e-9))

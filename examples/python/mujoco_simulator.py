@@ -113,11 +113,12 @@ class Car:
         mujoco.mj_forward(self.model, self.data)
 
     def measured(self) -> Row:
-        """x, y [m], yaw [rad], speed [m/s], yaw rate [rad/s] at the middle of the rear axle."""
+        """x, y [m], yaw [rad], speed [m/s], yaw rate [rad/s], speed to the left [m/s] at the middle of the rear axle."""
         rotation = self.data.xmat[self.chassis].reshape(3, 3)
-        speed_mps = float(rotation[:, 0] @ self.data.qvel[:3])
+        speed_mps, left_mps, _ = (float(axis @ self.data.qvel[:3]) for axis in rotation.T)
         yaw_rad = math.atan2(rotation[1, 0], rotation[0, 0])
-        return float(self.data.qpos[0]), float(self.data.qpos[1]), yaw_rad, speed_mps, float(self.data.qvel[5])
+        x_m, y_m, yaw_rate_radps = (float(value) for value in (*self.data.qpos[:2], self.data.qvel[5]))
+        return x_m, y_m, yaw_rad, speed_mps, yaw_rate_radps, left_mps
 
     def lean(self, yaw_rad: float, slope_ahead: float, slope_left: float) -> None:
         """Gravity as it is on a slope, in the axes of the plane."""
@@ -138,7 +139,7 @@ class Car:
     def step(self, command: tuple[float, float], slopes: tuple[float, float], step_s: float) -> None:
         """Goes one row on."""
         speed_mps, steering_rad = command
-        _, _, yaw_rad, forward_mps, yaw_rate_radps = self.measured()
+        _, _, yaw_rad, forward_mps, yaw_rate_radps, _ = self.measured()
         self.lean(yaw_rad, *slopes)
         self.steer(steering_rad, forward_mps * yaw_rate_radps, step_s)
         self.data.ctrl[2:] = speed_mps / (WHEEL_RADIUS * self.wheelbase_m)

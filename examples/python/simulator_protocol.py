@@ -10,13 +10,13 @@ from collections.abc import Callable
 from typing import Any
 
 Message = dict[str, Any]
-# x, y [m], yaw [rad], speed [m/s], yaw rate [rad/s].
-Row = tuple[float, float, float, float, float]
+# x, y [m], yaw [rad], speed [m/s], yaw rate [rad/s], speed to the left [m/s].
+Row = tuple[float, float, float, float, float, float]
 # From the vehicle that hello describes and a run to every row of the run, the first being the start.
 Driven = Callable[[Message, Message], list[Row]]
 
 PROTOCOL = 1
-COLUMNS = ["x_m", "y_m", "yaw_rad", "speed_mps", "yaw_rate_radps"]
+COLUMNS = ["x_m", "y_m", "yaw_rad", "speed_mps", "yaw_rate_radps", "side_speed_mps"]
 
 
 def motion(rows: list[Row]) -> dict[str, list[float]]:

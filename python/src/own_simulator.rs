@@ -10,6 +10,9 @@ use sim_to_real::{Knob, Motion, RunMemory, SimulatorDescription, SimulatorRun};
 use crate::arrays::kind;
 use crate::failure::{refused_type, refused_value};
 
+/// What a motion may tell besides.
+const SIDE_SPEED: &str = "side_speed_mps";
+
 /// A callable that makes motions of runs, with what it says of itself.
 pub struct OwnSimulator<'py> {
     callable: Bound<'py, PyAny>,
@@ -79,6 +82,7 @@ impl<'py> OwnSimulator<'py> {
             yaw_rad: column("yaw_rad")?,
             speed_mps: column("speed_mps")?,
             yaw_rate_radps: column("yaw_rate_radps")?,
+            side_speed_mps: answer.contains(SIDE_SPEED)?.then(|| column(SIDE_SPEED)).transpose()?,
         };
         motion.checked(run.n_rows()).map_err(|told| refused_value(format!("simulator: motion: {told}")))
     }

@@ -1206,7 +1206,7 @@ def diagnose(sim: Sequence[_Drive], real: Sequence[_Drive], vehicle: Vehicle | _
 
     sim, real, heldout: lists of drives, each a data frame or a dict of arrays with the columns of a drive log (`t` [s] and a
     command, `cmd_speed` [m/s] and `cmd_steer` [rad] or `steer_meas`, or `cmd_wz` [rad/s] of a skid-steered machine; used
-    where they are there: x, y [m], yaw [rad], vx [m/s], wz [rad/s], roll, pitch, and `run`, in which `t` begins anew), a
+    where they are there: x, y [m], yaw [rad], vx, vy [m/s], wz [rad/s], roll, pitch, and `run`, in which `t` begins anew), a
     `Recording`, or the path of a CSV file or a recording. sim holds drives of the simulator, at least two of them, or none,
     and then a bare bicycle stands for it; heldout are used for nothing but to verify the answer. vehicle: a `Vehicle`, the
     name of one that ships, the path of a vehicle's file, or a dict or a dataclass of it ("name", "wheelbase" [m], and where known

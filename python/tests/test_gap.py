@@ -186,11 +186,13 @@ def test_vehicles_and_simulators_that_cannot_be(sim, real):
     simulator.knobs = "gain"
     assert "simulator.knobs: expected a list of dicts" in refusal(sim, real, simulator=simulator)
     assert "expected nominal drives" in refusal([], real, simulator=Simulator())
+    told_by_all = ["x_m", "y_m", "yaw_rad", "speed_mps", "yaw_rate_radps"]
     for answer, told in [
         ({}, "expected a dict with 'x_m'"),
         (None, "expected a dict with 'x_m'"),
-        (dict.fromkeys(["x_m", "y_m", "yaw_rad", "speed_mps", "yaw_rate_radps"], [0.0]), "values, found 1"),
-        (dict.fromkeys(["x_m", "y_m", "yaw_rad", "speed_mps", "yaw_rate_radps"], ["a"]), "expected numbers"),
+        (dict.fromkeys(told_by_all, [0.0]), "values, found 1"),
+        (dict.fromkeys(told_by_all, ["a"]), "expected numbers"),
+        ({**dict.fromkeys(told_by_all, [0.0]), "side_speed_mps": "a"}, "'side_speed_mps']: expected numbers"),
     ]:
         assert told in refusal(sim, real, simulator=lambda run, answer=answer: answer), told
 

@@ -3,12 +3,13 @@
 
 use crate::calibration::{calibrated, proportional, recalibrated};
 use crate::causes::Trial;
-use crate::comparison::{Comparison, Yardstick, root_mean_square};
+use crate::comparison::{Comparison, Yardstick, rollout_error};
 use crate::conditions::StartRecord;
 use crate::drive::{Drive, DriveError};
-use crate::explanation::{best_pair, judged_sizes, single_explanations};
+use crate::explanation::{Screened, judged_sizes};
 use crate::familiarity::Familiarity;
 use crate::findings::ResidualCell;
+use crate::least_squares::mean_loss;
 use crate::limits_shown::LimitsShown;
 use crate::machine::Machine;
 use crate::nuisance::Information;
@@ -218,14 +219,21 @@ struct LeftOut {
 
 impl LeftOut {
     fn new(trial: &Trial<'_>, tried: &[Effect], residuals: Vec<f32>) -> Self {
-        let before = trial.loss(&[]);
-        let singles = single_explanations(trial);
-        let pair = best_pair(trial, &singles);
+        let screened = Screened::of(trial);
+        let before = mean_loss(screened.nothing());
+        let singles = screened.singles();
+        let pair = screened.best_pair(&singles);
         let one = singles.first().map_or(before, |single| single.loss);
         let two = pair.map_or(one, |pair| pair.loss);
         let starts = StartRecord::of(&trial.comparison.drives().collect::<Vec<_>>(), &residuals);
         let scores = tried_scores(trial, tried);
-        Self { residuals, loss: before, gain_of_two: (one / two).ln(), scores, starts }
+        Self {
+            residuals,
+            loss: before,
+            gain_of_two: trial.comparison.numbers_ratio() * (one / two).ln(),
+            scores,
+            starts,
+        }
     }
 }
 
@@ -250,7 +258,7 @@ impl Null {
             0.5 * (values[(values.len() - 1) / 2] + values[values.len() / 2])
         };
         Self {
-            error: median(&|one| root_mean_square(&one.residuals)),
+            error: median(&|one| rollout_error(&one.residuals)),
             loss: median(&|one| one.loss),
             chance: Chance::of(&left_out.iter().map(|one| &one.scores).collect::<Vec<_>>()),
             limits_shown,

@@ -102,7 +102,13 @@ impl<'a> Trial<'a> {
         };
         let tried = tried(description).into_iter().map(with);
         let best = tried.min_by(|a, b| a.loss.total_cmp(&b.loss))?;
-        Some(if description.parameters.len() == 1 { self.searched(best) } else { self.refined(best) })
+        Some(self.sized(best))
+    }
+
+    /// The last cause at its best size, the others as they are where it has one parameter only.
+    pub(crate) fn sized(&self, tried: Explanation) -> Explanation {
+        let n_parameters = tried.causes.last().map_or(0, |cause| cause.description().parameters.len());
+        if n_parameters == 1 { self.searched(tried) } else { self.refined(tried) }
     }
 
     /// All parameters of all causes fitted together.

@@ -1,14 +1,15 @@
 //! Drives, what a model foretells on them, and the difference in standard deviations.
 
-use crate::drive::{Drive, HORIZONS};
+use crate::drive::{Drive, HORIZONS, N_QUANTITIES, VY};
 use crate::familiarity::Familiarity;
 use crate::least_squares::mean_loss;
-use crate::rollout::{N_QUANTITIES, PER_START, Simulator};
+use crate::rollout::{PER_START, Simulator};
 use crate::whitening::Whitening;
 use bicycle::Effect;
 use serde::{Deserialize, Serialize};
 
-/// Standard deviation of each quantity at each horizon on nominal drives, horizon by horizon; [m], [rad], [m/s], [rad/s].
+/// Standard deviation of each quantity at each horizon on nominal drives, horizon by horizon; [m], [rad], [m/s], [rad/s];
+/// 0 where nothing was measured, which is not compared then.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Yardstick(pub(crate) Vec<f64>);
 
@@ -17,7 +18,7 @@ pub(crate) struct Yardstick(pub(crate) Vec<f64>);
 pub(crate) struct Comparison<'a> {
     wheelbase_m: f64,
     drives: Vec<&'a Drive>,
-    measured: Vec<Vec<f32>>,
+    measured: Vec<f32>,
     per_sigma: Vec<f32>,
     judge: Option<Judge<'a>>,
 }
@@ -32,9 +33,8 @@ struct Judge<'a> {
 
 impl<'a> Comparison<'a> {
     pub(crate) fn new(wheelbase_m: f64, drives: Vec<&'a Drive>, yardstick: &Yardstick) -> Self {
-        let measured = drives.iter().map(|drive| outcomes(drive)).collect();
-        let per_sigma = yardstick.0.iter().map(|sigma| (1.0 / sigma) as f32).collect();
-        Self { wheelbase_m, drives, measured, per_sigma, judge: None }
+        let measured = drives.iter().flat_map(|drive| outcomes(drive)).collect();
+        Self { wheelbase_m, drives, measured, per_sigma: yardstick.per_sigma(), judge: None }
     }
 
     /// The same with residuals judged by what belongs together in them, and by how familiar the driving is.
@@ -48,25 +48,26 @@ impl<'a> Comparison<'a> {
     /// Foretold less measured, in standard deviations: drive by drive, start by start, [`PER_START`] numbers each;
     /// exactly 0 where nothing was measured.
     pub(crate) fn residuals(&self, effects: &[Effect]) -> Vec<f32> {
-        let simulator = Simulator::new(self.wheelbase_m, effects);
-        let mut residuals = Vec::with_capacity(self.measured.iter().map(Vec::len).sum());
-        for (drive, measured) in self.drives.iter().zip(&self.measured) {
-            let predicted = simulator.predict(drive);
-            let starts = predicted.chunks(PER_START).zip(measured.chunks(PER_START));
-            residuals.extend(starts.flat_map(|(predicted, measured)| {
-                let both = predicted.iter().zip(measured).zip(&self.per_sigma);
-                both.map(
-                    |((predicted, measured), per_sigma)| {
-                        if measured.is_nan() { 0.0 } else { (predicted - measured) * per_sigma }
-                    },
-                )
-            }));
-        }
-        residuals
+        let predicted = Simulator::new(self.wheelbase_m, effects).predict(&self.drives);
+        let both = predicted.iter().zip(&self.measured).zip(self.per_sigma.iter().cycle());
+        let residual = |((predicted, measured), per_sigma): ((&f32, &f32), &f32)| {
+            if measured.is_nan() { 0.0 } else { (predicted - measured) * per_sigma }
+        };
+        both.map(residual).collect()
     }
 
     pub(crate) fn drives(&self) -> impl Iterator<Item = &Drive> {
         self.drives.iter().copied()
+    }
+
+    /// How many numbers of a rollout are compared, over those without the speed to the left. An effect that this does not see
+    /// takes as much off the sum of the losses as without it, and that much less off their mean.
+    pub(crate) fn numbers_ratio(&self) -> f64 {
+        if !self.drives().any(|drive| drive.evidence.side_speed) {
+            return 1.0;
+        }
+        let n = |per_sigma: &[f32]| per_sigma.iter().filter(|own| **own > 0.0).count().max(1) as f64;
+        n(&self.per_sigma) / n(&of_the_error(&self.per_sigma))
     }
 
     pub(crate) fn n_starts(&self) -> usize {
@@ -114,6 +115,16 @@ pub(crate) fn root_mean_square(residuals: &[f32]) -> f64 {
     (sum / n_measured(residuals).max(1) as f64).sqrt()
 }
 
+/// The residuals that the error of a model is made of: of all quantities but the speed to the left, which few robots measure.
+pub(crate) fn of_the_error(residuals: &[f32]) -> Vec<f32> {
+    residuals.chunks(N_QUANTITIES).flat_map(|own| &own[..VY]).copied().collect()
+}
+
+/// Root mean square of what was measured of them: the error by which a shrunk gap is told.
+pub(crate) fn rollout_error(residuals: &[f32]) -> f64 {
+    root_mean_square(&of_the_error(residuals))
+}
+
 /// Number of residuals that something was measured for.
 pub(crate) fn n_measured(residuals: &[f32]) -> usize {
     residuals.iter().filter(|residual| **residual != 0.0).count()
@@ -128,17 +139,22 @@ fn outcomes(drive: &Drive) -> Vec<f32> {
 impl Yardstick {
     /// Before anything is known: a few per cent of what a vehicle of this size does.
     pub(crate) fn rough() -> Self {
-        Self([0.05, 0.05, 0.02, 0.1, 0.05].repeat(HORIZONS.len()))
+        Self([0.05, 0.05, 0.02, 0.1, 0.05, 0.05].repeat(HORIZONS.len()))
     }
 
     /// The spread of residuals that were measured in units of `unit`; outliers count with the loss's weight.
     pub(crate) fn of(residuals: &[f32], unit: &Self) -> Self {
         let spread = |place: usize| {
             let values: Vec<f32> = residuals.chunks(PER_START).map(|start| start[place]).collect();
-            let size = if n_measured(&values) == 0 { 1.0 } else { root_mean_square(&values).max(1e-6) };
+            let size = if n_measured(&values) == 0 { 0.0 } else { root_mean_square(&values).max(1e-6) };
             unit.0[place] * size
         };
         Self((0..PER_START).map(spread).collect())
+    }
+
+    /// What a difference is multiplied by to be in standard deviations.
+    pub(crate) fn per_sigma(&self) -> Vec<f32> {
+        self.0.iter().map(|sigma| if *sigma > 0.0 { (1.0 / sigma) as f32 } else { 0.0 }).collect()
     }
 }
 

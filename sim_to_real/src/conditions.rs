@@ -2,9 +2,9 @@
 
 use crate::answer::{Condition, Place};
 use crate::comparison::root_mean_square;
-use crate::drive::{Drive, HORIZONS, STEP_S, VX, WZ, X, Y, YAW};
+use crate::drive::{Drive, HORIZONS, N_QUANTITIES, STEP_S, VX, WZ, X, Y, YAW};
 use crate::findings::{ConditionBin, ConditionTable, GroundResidual};
-use crate::rollout::{N_QUANTITIES, PER_START};
+use crate::rollout::PER_START;
 use serde::{Deserialize, Serialize};
 
 /// Bins of a condition, each with as many rollouts as the next.

@@ -66,7 +66,8 @@ pub(crate) fn changing(
     });
     let (loss, (division, parts), causes) = tried.min_by(|a, b| a.0.total_cmp(&b.0))?;
     let fitted = |part: &Vec<Drive>| fitted(baseline, part, causes);
-    ((least / loss).ln() > NOT_THE_SAME)
+    let numbers_ratio = baseline.held_trial(&drives.iter().collect::<Vec<_>>()).comparison.numbers_ratio();
+    (numbers_ratio * (least / loss).ln() > NOT_THE_SAME)
         .then(|| Changing { causes: parts.each_ref().map(fitted), division: *division })
 }
 

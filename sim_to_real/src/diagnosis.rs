@@ -3,12 +3,12 @@
 use crate::answer::{Answer, NamedEffect, PartEstimate, Ranked, SCHEMA_VERSION, Shrink, Verdict};
 use crate::baseline::{Baseline, GapError, drives_of};
 use crate::causes::{Explanation, Trial};
-use crate::comparison::root_mean_square;
+use crate::comparison::rollout_error;
 use crate::conditions::{StartRecord, condition_tables, ground_residuals, places, with_announced};
 use crate::constancy::changing;
 use crate::cross_validation::{CrossValidation, Split, foretold};
 use crate::drive::Drive;
-use crate::explanation::{pairs, single_explanations};
+use crate::explanation::Screened;
 use crate::findings::{Findings, LeftOver};
 use crate::intervals::named_effects;
 use crate::judgement::{Single, Weighed};
@@ -96,7 +96,7 @@ pub fn diagnose(baseline: &Baseline, machine: &Machine, real: &[DriveLog]) -> Re
         by_part: by_part(&baseline.held_trial(&all), &causes),
         left,
         findings,
-        errors: [root_mean_square(&before), root_mean_square(&after)],
+        errors: [rollout_error(&before), rollout_error(&after)],
         predicted_closed: predicted_closed(baseline, &splits, &causes),
         effects: causes,
         steering: drives[0].evidence.steering(),
@@ -121,17 +121,19 @@ pub(crate) fn closed(floor: f64, before: f64, after: f64) -> Option<f64> {
 }
 
 fn weighed(baseline: &Baseline, trial: &Trial<'_>, splits: &[Split<'_>]) -> Weighed {
-    let before = trial.judged_residuals(&[]);
-    let none = Explanation::new(Vec::new(), mean_loss(&before));
+    let screened = Screened::of(trial);
+    let before = screened.nothing();
+    let none = Explanation::new(Vec::new(), mean_loss(before));
     let supported = |explanation: Explanation| {
-        let support = baseline.null.chance.support((trial, &before), &explanation, none.loss);
+        let support = baseline.null.chance.support((trial, before), &explanation, none.loss);
         Single { explanation, support }
     };
-    let singles = foretold(splits, single_explanations(trial)).into_iter().map(supported).collect();
-    let mut weighed = Weighed { none, pairs: Vec::new(), singles };
+    let singles = foretold(splits, screened.singles()).into_iter().map(supported).collect();
+    let numbers_ratio = trial.comparison.numbers_ratio();
+    let mut weighed = Weighed { none, pairs: Vec::new(), singles, numbers_ratio };
     if weighed.may_hold_pairs(&baseline.null) {
         weighed.pairs =
-            foretold(splits, pairs(trial, weighed.singles.iter().map(|single| &single.explanation)));
+            foretold(splits, screened.pairs(weighed.singles.iter().map(|single| &single.explanation)));
     }
     weighed
 }
@@ -152,7 +154,7 @@ fn predicted_closed(baseline: &Baseline, splits: &[Split<'_>], causes: &[Effect]
     let mut squares = [0.0_f64; 2];
     for split in splits {
         for (sum, causes) in squares.iter_mut().zip([Vec::new(), split.refitted(causes)]) {
-            *sum += root_mean_square(&split.own.residuals(&causes)).powi(2);
+            *sum += rollout_error(&split.own.residuals(&causes)).powi(2);
         }
     }
     let [before, after] = squares.map(|sum| (sum / splits.len() as f64).sqrt());

@@ -17,6 +17,8 @@ const SETTLING_S: f64 = 1.5;
 const SETTLING_SHARE: f64 = 0.2;
 /// Horizons at which a rollout is compared, in steps.
 pub(crate) const HORIZONS: [usize; 4] = [15, 30, 60, 100];
+/// Quantities measured: of a drive as in [`Drive::measured`], of a rollout as in [`Drive::outcome`].
+pub(crate) const N_QUANTITIES: usize = 6;
 /// Steps of a rollout.
 pub(crate) const N_STEPS: usize = HORIZONS[3];
 /// Runs with room for this many steps after the settling time are compared at all horizons from every start; rollouts
@@ -68,10 +70,11 @@ pub(crate) struct Drive {
     pub(crate) evidence: Evidence,
     /// Speed [m/s] or acceleration [m/s2], and angle [rad] or yaw rate [rad/s], as the evidence says.
     pub(crate) commands: Vec<Command>,
-    /// Measured: east, north [m], yaw without jumps [rad], forward speed [m/s], yaw rate [rad/s]; NaN where not.
-    pub(crate) measured: [Vec<f64>; 5],
+    /// Measured: east, north [m], yaw without jumps [rad], forward speed [m/s], yaw rate [rad/s], speed to the left [m/s];
+    /// NaN where not.
+    pub(crate) measured: [Vec<f64>; N_QUANTITIES],
     /// The same, smoothed and never missing, to start from.
-    pub(crate) smooth: [Vec<f64>; 5],
+    pub(crate) smooth: [Vec<f64>; N_QUANTITIES],
     /// Rise per metre east and north.
     pub(crate) gradient: [Vec<f32>; 2],
     pub(crate) class: Vec<f32>,
@@ -87,6 +90,7 @@ pub(crate) const Y: usize = 1;
 pub(crate) const YAW: usize = 2;
 pub(crate) const VX: usize = 3;
 pub(crate) const WZ: usize = 4;
+pub(crate) const VY: usize = 5;
 
 impl Drive {
     pub(crate) fn of(run: &Run<'_>, machine: &Machine) -> Result<Self, DriveError> {
@@ -167,20 +171,24 @@ impl Drive {
         self.measured.iter().any(|values| !values[row].is_nan())
     }
 
-    /// Displacement along and across the heading at `start`, turn, speed and yaw rate, measured `steps` later; NaN what
-    /// was not measured.
-    pub(crate) fn outcome(&self, start: usize, steps: usize) -> [f64; 5] {
+    /// Displacement along and across the heading at `start`, turn, speed, yaw rate and speed to the left, measured `steps`
+    /// later; NaN what was not measured.
+    pub(crate) fn outcome(&self, start: usize, steps: usize) -> [f64; N_QUANTITIES] {
         let [x, y, yaw, ..] = self.smooth.each_ref().map(|values| values[start]);
         seen_from([x, y, yaw], self.measured.each_ref().map(|values| values[start + steps]))
     }
 }
 
-/// A state (east, north [m], yaw [rad], speed [m/s], yaw rate [rad/s]) from a pose: displacement along and across its
-/// heading, turn, speed and yaw rate.
-pub(crate) fn seen_from([x0, y0, yaw0]: [f64; 3], [x, y, yaw, vx, wz]: [f64; 5]) -> [f64; 5] {
+/// A state (east, north [m], yaw [rad], and rates) from a pose: displacement along and across its heading, turn, and the
+/// same rates.
+pub(crate) fn seen_from(
+    [x0, y0, yaw0]: [f64; 3],
+    [x, y, yaw, rates @ ..]: [f64; N_QUANTITIES],
+) -> [f64; N_QUANTITIES] {
     let (sine, cosine) = yaw0.sin_cos();
     let (dx, dy) = (x - x0, y - y0);
-    [dx * cosine + dy * sine, dy * cosine - dx * sine, yaw - yaw0, vx, wz]
+    let [vx, wz, vy] = rates;
+    [dx * cosine + dy * sine, dy * cosine - dx * sine, yaw - yaw0, vx, wz, vy]
 }
 
 /// The rows of a run from which rollouts may start.
@@ -210,7 +218,7 @@ impl Span {
     }
 
     /// Every [`STRIDE`] rows, where what a rollout starts from was measured and no input is missing around it.
-    fn whole_starts(&self, inputs: &[Vec<f64>; 2], measured: &[Vec<f64>; 5]) -> Vec<usize> {
+    fn whole_starts(&self, inputs: &[Vec<f64>; 2], measured: &[Vec<f64>; N_QUANTITIES]) -> Vec<usize> {
         let mut missing_before = vec![0_u32; self.n_rows + 1];
         for row in 0..self.n_rows {
             let is_missing = inputs.iter().any(|input| input[row].is_nan());

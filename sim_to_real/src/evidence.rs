@@ -50,6 +50,7 @@ pub(crate) struct Evidence {
     pub(crate) pose: bool,
     pub(crate) yaw: bool,
     pub(crate) yaw_rate: bool,
+    pub(crate) side_speed: bool,
     /// Slopes of the ground, from a map or the attitude.
     pub(crate) slopes: bool,
     /// Classes of the ground.
@@ -89,6 +90,7 @@ impl Evidence {
             pose,
             yaw,
             yaw_rate: has(Column::Wz),
+            side_speed: run.column(Column::Vy).is_some_and(changes),
             slopes: machine.ground.is_some() || (has(Column::Roll) && has(Column::Pitch)),
             classes: machine.ground.is_some(),
         })
@@ -127,7 +129,9 @@ impl Evidence {
             "cross_slope" => self.slopes,
             "steer_rate" | "backlash" => is_commanded,
             "friction" => by_angle,
-            "rear_slip" | "rear_steer" | "yaw_misalign" => self.pose,
+            "tyre_slip" => by_angle && (self.pose || self.side_speed),
+            "rear_slip" | "rear_steer" => self.pose || self.side_speed,
+            "yaw_misalign" => self.pose,
             "pose_latency" => self.pose && (self.measures_speed() || self.yaw_rate),
             "odom_scale" => self.pose && self.measures_speed(),
             "gyro_bias" => self.yaw_rate,
@@ -185,6 +189,12 @@ impl Evidence {
         );
         [speed, source, turn, pose, yaw_rate, slopes].into_iter().flatten().collect()
     }
+}
+
+/// Whether a column tells anything: one value throughout is what a log holds that had nothing to put there.
+fn changes(values: &[f64]) -> bool {
+    let mut told = values.iter().filter(|value| !value.is_nan());
+    told.next().is_some_and(|first| told.any(|value| value != first))
 }
 
 /// The first that there is.

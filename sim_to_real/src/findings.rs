@@ -93,6 +93,8 @@ pub enum ResidualState {
     ForwardSpeed,
     /// Yaw rate [rad/s].
     YawRate,
+    /// Speed to the left [m/s].
+    SideSpeed,
 }
 
 /// Size of the residual of one quantity at one horizon, each divided by its standard deviation on the nominal drives.
@@ -133,7 +135,7 @@ impl ResidualState {
         match self {
             Self::Along | Self::Across => "m",
             Self::Yaw => "rad",
-            Self::ForwardSpeed => "m/s",
+            Self::ForwardSpeed | Self::SideSpeed => "m/s",
             Self::YawRate => "rad/s",
         }
     }

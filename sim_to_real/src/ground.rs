@@ -1,6 +1,6 @@
 //! The ground on the way of a drive: slopes and classes, from the map or from the measured attitude.
 
-use crate::drive::{X, Y, YAW};
+use crate::drive::{N_QUANTITIES, X, Y, YAW};
 use crate::machine::{GroundMap, Machine};
 use crate::smoothing::smoothed;
 
@@ -9,7 +9,7 @@ pub(crate) type GroundOnTheWay = ([Vec<f32>; 2], Vec<f32>);
 
 /// From the map under the measured positions; without a map from the measured attitude; without both, level.
 pub(crate) fn ground_on_the_way(
-    smooth: &[Vec<f64>; 5],
+    smooth: &[Vec<f64>; N_QUANTITIES],
     attitude: [Option<Vec<f64>>; 2],
     machine: &Machine,
 ) -> GroundOnTheWay {

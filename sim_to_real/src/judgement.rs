@@ -56,6 +56,8 @@ pub(crate) struct Weighed {
     pub(crate) none: Explanation,
     pub(crate) singles: Vec<Single>,
     pub(crate) pairs: Vec<Explanation>,
+    /// Of the drives: [`crate::comparison::Comparison::numbers_ratio`].
+    pub(crate) numbers_ratio: f64,
 }
 
 /// The verdict with what led to it.
@@ -86,7 +88,8 @@ impl Weighed {
         let least = PAIRS_ABOVE_NULLS * null.loss;
         self.singles.first().is_some_and(|single| {
             let loss = single.explanation.loss;
-            (loss / least).ln() > PRICE_OF_TWO && loss > SHARE_OF_A_SECOND * self.none.loss
+            self.numbers_ratio * (loss / least).ln() > PRICE_OF_TWO
+                && loss > SHARE_OF_A_SECOND * self.none.loss
         })
     }
 
@@ -114,7 +117,8 @@ impl Weighed {
         if let Some(first) = self.singles.first() {
             let of_one = all.iter().map(|(logit, _)| *logit).fold(f64::NEG_INFINITY, f64::max);
             let of_two = |pair: &Explanation| {
-                of_one + (first.explanation.energy() - pair.energy() - price(pair, null)) / TEMPERATURE
+                let gain = self.numbers_ratio * (first.explanation.energy() - pair.energy());
+                of_one + (gain - price(pair, null)) / TEMPERATURE
             };
             let pairs = self.pairs.iter().filter(|pair| self.takes_its_share(pair));
             all.extend(pairs.map(|pair| (of_two(pair), pair)));
@@ -133,7 +137,8 @@ impl Weighed {
     fn verdict(&self, best: &Explanation, null: &Null) -> (Verdict, Vec<Effect>) {
         let over = |loss: f64| (loss - null.loss).max(0.0);
         let left = over(best.loss) / over(self.none.loss).max(1e-9);
-        let unknown = best.loss / null.loss > UNKNOWN_IN_NULLS && left > UNKNOWN_SHARE;
+        let nulls = (best.loss / null.loss).powf(self.numbers_ratio);
+        let unknown = nulls > UNKNOWN_IN_NULLS && left > UNKNOWN_SHARE;
         match (best.causes.is_empty(), unknown) {
             (true, false) => (Verdict::None, Vec::new()),
             (true, true) => (Verdict::Unknown, Vec::new()),

@@ -12,7 +12,7 @@ mod network;
 
 use crate::baseline::{Baseline, GapError, drives_of};
 use crate::causes::composed;
-use crate::comparison::root_mean_square;
+use crate::comparison::rollout_error;
 use crate::diagnosis::Diagnosis;
 use crate::drive::Drive;
 use crate::machine::Machine;
@@ -79,8 +79,8 @@ pub fn learned_bound(
             Trained { network: &network, scaling: &scaling }.corrected(&held)?
         }
     };
-    let before = root_mean_square(&nominal_residuals(baseline, &heldout));
-    let error = root_mean_square(&after);
+    let before = rollout_error(&nominal_residuals(baseline, &heldout));
+    let error = rollout_error(&after);
     let n_passes = chosen.map_or(0, |(_, n_passes)| n_passes);
     Ok(LearnedBound { error, closed: baseline.closed(before, error), n_passes })
 }

@@ -3,10 +3,9 @@
 use crate::answer::Condition;
 use crate::comparison::Yardstick;
 use crate::conditions::{LAID_OUT, MEASURED, N_BINS, StartRecord, Window, bin_of, edges, quantiles};
-use crate::drive::{Drive, HORIZONS, STEP_S};
+use crate::drive::{Drive, HORIZONS, N_QUANTITIES, STEP_S};
 use crate::findings::{LeftBin, LeftOver};
 use crate::residual_table::STATES;
-use crate::rollout::N_QUANTITIES;
 
 /// Place of the horizon that is told among those that are laid out: long enough for what is wrong to add up.
 const TOLD: usize = LAID_OUT.len() - 1;

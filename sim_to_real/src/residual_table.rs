@@ -1,9 +1,9 @@
 //! Residuals by quantity and horizon.
 
 use crate::comparison::{Yardstick, n_measured, root_mean_square};
-use crate::drive::{HORIZONS, STEP_S};
+use crate::drive::{HORIZONS, N_QUANTITIES, STEP_S};
 use crate::findings::{QuantityError, ResidualCell, ResidualState};
-use crate::rollout::{N_QUANTITIES, PER_START};
+use crate::rollout::PER_START;
 
 /// The quantities in the order of a rollout's residuals.
 pub(crate) const STATES: [ResidualState; N_QUANTITIES] = [
@@ -12,6 +12,7 @@ pub(crate) const STATES: [ResidualState; N_QUANTITIES] = [
     ResidualState::Yaw,
     ResidualState::ForwardSpeed,
     ResidualState::YawRate,
+    ResidualState::SideSpeed,
 ];
 
 /// The cells in units of their quantities, of which the yardstick holds the standard deviations.

@@ -1,18 +1,22 @@
-//! Rollouts of a model from the measured states of a drive, sixteen or eight at a time, against what was measured.
+//! Rollouts of a model from the measured states of drives, sixteen or eight at a time, against what was measured.
 
-use crate::drive::{Drive, HORIZONS, N_STEPS, STEP_S, VX, YAW};
+mod pack;
+mod rows;
+#[cfg(test)]
+mod tests;
+
+use crate::drive::{Drive, HORIZONS, N_QUANTITIES, N_STEPS, STEP_S, VX, YAW};
 use crate::evidence::{Evidence, SpeedInput, SpeedSource};
 use bicycle::effect::Effect;
-use bicycle::lanes::{Instructions, Lanes, Portable, Real, Scalar};
+use bicycle::lanes::{Instructions, Lanes, Portable, Real};
 use bicycle::{Asked, GroundSample, LaneState, Limits, Model, Rates, SensorModel, Stepper};
+use pack::{Pack, packed};
 use pulp::NullaryFnOnce;
-#[cfg(target_arch = "x86_64")]
-use pulp::{f32x8, f32x16};
+use rows::Rows;
 use std::f64::consts::TAU;
 
-/// Quantities compared: along, across [m], turn [rad], speed [m/s], yaw rate [rad/s].
-pub(crate) const N_QUANTITIES: usize = 5;
-/// Numbers per start: every quantity at every horizon.
+/// Numbers per start: every quantity at every horizon, along, across [m], turn [rad], speed [m/s], yaw rate [rad/s] and
+/// speed to the left [m/s].
 pub(crate) const PER_START: usize = HORIZONS.len() * N_QUANTITIES;
 /// Most lanes of any instruction set.
 const WIDEST: usize = 16;
@@ -32,10 +36,9 @@ impl Simulator {
         }
     }
 
-    /// Predicted measurements of every start of a drive, [`PER_START`] numbers each, horizon by horizon.
-    pub(crate) fn predict(&self, drive: &Drive) -> Vec<f32> {
-        let rows = self.rows(drive);
-        let roll_out = RollOut { simulator: self, drive, given: &rows };
+    /// Predicted measurements of every start of every drive, [`PER_START`] numbers each, horizon by horizon.
+    pub(crate) fn predict(&self, drives: &[&Drive]) -> Vec<f32> {
+        let roll_out = RollOuts { simulator: self, drives };
         match Instructions::widest() {
             #[cfg(target_arch = "x86_64")]
             Instructions::Avx512(lanes) => lanes.vectorize(On(lanes, roll_out)),
@@ -45,55 +48,6 @@ impl Simulator {
             Instructions::Neon(lanes) => lanes.vectorize(On(lanes, roll_out)),
             Instructions::Portable => On(Portable, roll_out).call(),
         }
-    }
-
-    /// What every row of a drive gives to a rollout that starts there.
-    fn rows(&self, drive: &Drive) -> Rows {
-        let mut memory = vec![0.0; self.stepper.n_slots()];
-        self.stepper.fill_steady_state(drive.commands[0], &mut memory);
-        let mut rows = Rows { asked: Default::default(), held: vec![Vec::new(); self.stepper.n_held()] };
-        for (row, command) in drive.commands.iter().enumerate() {
-            let asked = self.asked(drive, (row, command), &mut memory);
-            let asked_of = [asked.speed, asked.steering, asked.acceleration];
-            rows.asked.iter_mut().zip(asked_of).for_each(|(all, value)| all.push(value.1 as f32));
-            for (all, held) in rows.held.iter_mut().zip(self.stepper.held(&mut memory)) {
-                all.push(*held as f32);
-            }
-            if self.stepper.n_held() > 0 && row + 1 < drive.commands.len() {
-                self.observe(drive, row, asked, &mut memory);
-            }
-        }
-        rows
-    }
-
-    fn asked(
-        &self,
-        drive: &Drive,
-        (row, command): (usize, &bicycle::Command),
-        memory: &mut [f64],
-    ) -> Asked<Scalar> {
-        // A speed that was measured is what the sensor made of it.
-        let per_reading = match drive.evidence.speed_input {
-            SpeedInput::Measured => 1.0 / self.sensors.velocity_ratio,
-            SpeedInput::Commanded | SpeedInput::CommandedAcceleration => 1.0,
-        };
-        let speed_mps = f64::from(command.speed_mps) * per_reading;
-        let command = [speed_mps, f64::from(command.steering_rad)].map(|value| Real(Scalar, value));
-        self.stepper.asked(command, Real(Scalar, drive.smooth[VX][row]), memory, row)
-    }
-
-    /// Goes the step that was driven, so that what is held follows it.
-    fn observe(&self, drive: &Drive, row: usize, asked: Asked<Scalar>, memory: &mut [f64]) {
-        let real = |value: f64| Real(Scalar, value);
-        let zero = real(0.0);
-        let speed_mps = |row: usize| drive.smooth[VX][row] / self.sensors.velocity_ratio;
-        let turns = real((drive.smooth[YAW][row] - self.sensors.yaw_offset_rad) / TAU).wrap_turns();
-        let mut state = LaneState { x: zero, y: zero, turns, speed: real(speed_mps(row)), steering: zero };
-        let [east, north, class] =
-            [&drive.gradient[0], &drive.gradient[1], &drive.class].map(|told| real(f64::from(told[row])));
-        let ground = ground(Scalar, [east, north], class);
-        self.follow(drive.evidence, &mut state, asked, &ground, memory);
-        self.stepper.correct_held(memory, speed_mps(row + 1) - state.speed.1);
     }
 
     #[inline(always)]
@@ -123,14 +77,6 @@ fn ground<L: Lanes>(lanes: L, gradient: [Real<L>; 2], class: Real<L>) -> GroundS
     GroundSample { linear_traction: firm, angular_traction: firm, gradient, class }
 }
 
-/// What the commands ask of the actuators at every row of a drive, and what the effects then hold.
-struct Rows {
-    /// Speed and steering angle, or what stands for them, and acceleration, row by row.
-    asked: [Vec<f32>; 3],
-    /// Row by row for each that is held [m/s2].
-    held: Vec<Vec<f32>>,
-}
-
 pub(crate) const UNLIMITED: Limits = Limits {
     speed_max_mps: f64::MAX,
     reverse_speed_max_mps: f64::MAX,
@@ -142,111 +88,55 @@ pub(crate) const UNLIMITED: Limits = Limits {
     pitch_max_rad: f64::MAX,
 };
 
-/// Packs that can be filled from numbers and read.
-trait Pack: Lanes {
-    fn pack(values: &[f32; WIDEST]) -> Self::Value;
-    fn unpack(value: Self::Value) -> [f32; WIDEST];
-}
-
-#[inline(always)]
-fn first_eight(values: &[f32; WIDEST]) -> [f32; 8] {
-    let mut eight = [0.0; 8];
-    eight.copy_from_slice(&values[..8]);
-    eight
-}
-
-#[inline(always)]
-fn widened(values: [f32; 8]) -> [f32; WIDEST] {
-    let mut wide = [0.0; WIDEST];
-    wide[..8].copy_from_slice(&values);
-    wide
-}
-
-/// What is told `step` rows after each lane's own: in a loop, which is compiled in place, as `array::map` is not always.
-#[inline(always)]
-fn packed<L: Pack>(lanes: L, (rows, step): (&[usize; WIDEST], usize), told: &[f32]) -> Real<L> {
-    let told = &told[step..];
-    let mut values = [0.0; WIDEST];
-    for (value, row) in values.iter_mut().zip(rows).take(L::WIDTH) {
-        *value = told[*row];
-    }
-    Real(lanes, L::pack(&values))
-}
-
-impl Pack for Portable {
-    #[inline(always)]
-    fn pack(values: &[f32; WIDEST]) -> [f32; 8] {
-        first_eight(values)
-    }
-    #[inline(always)]
-    fn unpack(value: [f32; 8]) -> [f32; WIDEST] {
-        widened(value)
-    }
-}
-
-#[cfg(target_arch = "x86_64")]
-impl Pack for pulp::x86::V3 {
-    #[inline(always)]
-    fn pack(values: &[f32; WIDEST]) -> f32x8 {
-        pulp::cast(first_eight(values))
-    }
-    #[inline(always)]
-    fn unpack(value: f32x8) -> [f32; WIDEST] {
-        widened(pulp::cast(value))
-    }
-}
-
-#[cfg(target_arch = "aarch64")]
-impl Pack for pulp::aarch64::Neon {
-    #[inline(always)]
-    fn pack(values: &[f32; WIDEST]) -> [pulp::f32x4; 2] {
-        pulp::cast(first_eight(values))
-    }
-    #[inline(always)]
-    fn unpack(value: [pulp::f32x4; 2]) -> [f32; WIDEST] {
-        widened(pulp::cast(value))
-    }
-}
-
-#[cfg(target_arch = "x86_64")]
-impl Pack for pulp::x86::V4 {
-    #[inline(always)]
-    fn pack(values: &[f32; WIDEST]) -> f32x16 {
-        pulp::cast(*values)
-    }
-    #[inline(always)]
-    fn unpack(value: f32x16) -> [f32; WIDEST] {
-        pulp::cast(value)
-    }
-}
-
 /// Work on one instruction set.
 struct On<L, W>(L, W);
 
-struct RollOut<'a> {
+/// The rollouts of some drives.
+struct RollOuts<'a> {
     simulator: &'a Simulator,
-    drive: &'a Drive,
-    given: &'a Rows,
+    drives: &'a [&'a Drive],
 }
 
-impl<L: Pack> NullaryFnOnce for On<L, RollOut<'_>> {
+impl<L: Pack> NullaryFnOnce for On<L, RollOuts<'_>> {
     type Output = Vec<f32>;
     #[inline(always)]
     fn call(self) -> Vec<f32> {
-        let Self(lanes, work) = self;
-        let mut predicted = vec![0.0; work.drive.starts.len() * PER_START];
-        let packs = work.drive.starts.chunks(L::WIDTH);
-        for (starts, outcomes) in packs.zip(predicted.chunks_mut(L::WIDTH * PER_START)) {
-            work.roll(lanes, starts, outcomes);
+        let Self(lanes, RollOuts { simulator, drives }) = self;
+        let n_starts: usize = drives.iter().map(|drive| drive.starts.len()).sum();
+        let mut predicted = vec![0.0; n_starts * PER_START];
+        let mut rest = &mut predicted[..];
+        for alike in drives.chunk_by(|a, b| a.evidence == b.evidence) {
+            for together in alike.chunks(L::WIDTH) {
+                for (drive, given) in together.iter().zip(simulator.rows(lanes, together)) {
+                    let (own, others) = rest.split_at_mut(drive.starts.len() * PER_START);
+                    RollOut { simulator, drive, given }.roll_all(lanes, own);
+                    rest = others;
+                }
+            }
         }
         predicted
     }
+}
+
+/// The rollouts of a drive.
+struct RollOut<'a> {
+    simulator: &'a Simulator,
+    drive: &'a Drive,
+    given: Rows,
 }
 
 /// Poses of a pack after every step, from the first: east, north [m] and turn [rad] from the start.
 type Way = [[[f32; WIDEST]; 3]; N_STEPS + 1];
 
 impl RollOut<'_> {
+    #[inline(always)]
+    fn roll_all<L: Pack>(&self, lanes: L, outcomes: &mut [f32]) {
+        let packs = self.drive.starts.chunks(L::WIDTH).zip(outcomes.chunks_mut(L::WIDTH * PER_START));
+        for (starts, outcomes) in packs {
+            self.roll(lanes, starts, outcomes);
+        }
+    }
+
     #[inline(always)]
     fn roll<L: Pack>(&self, lanes: L, starts: &[usize], outcomes: &mut [f32]) {
         // The last pack may be short: its spare lanes repeat the last start.
@@ -264,7 +154,7 @@ impl RollOut<'_> {
         let simulator = self.simulator;
         let mut memory = vec![zero.1; simulator.stepper.n_slots()];
         for (held, given) in simulator.stepper.held(&mut memory).iter_mut().zip(&self.given.held) {
-            *held = packed(lanes, (&rows, 0), given).1;
+            *held = packed(lanes, |lane| given[rows[lane]]).1;
         }
         let mut turned = zero;
         let mut way: Way = [[[0.0; WIDEST]; 3]; N_STEPS + 1];
@@ -272,14 +162,17 @@ impl RollOut<'_> {
         for step in 0..N_STEPS {
             let [speed, steering, acceleration] = &self.given.asked;
             let asked = Asked {
-                speed: packed(lanes, (&rows, step), speed),
-                steering: packed(lanes, (&rows, step), steering),
-                acceleration: packed(lanes, (&rows, step), acceleration),
+                speed: packed(lanes, |lane| speed[rows[lane] + step]),
+                steering: packed(lanes, |lane| steering[rows[lane] + step]),
+                acceleration: packed(lanes, |lane| acceleration[rows[lane] + step]),
             };
             let ground = if simulator.stepper.uses_ground() {
                 let [east, north] = &self.drive.gradient;
-                let gradient = [packed(lanes, (&rows, step), east), packed(lanes, (&rows, step), north)];
-                ground(lanes, gradient, packed(lanes, (&rows, step), &self.drive.class))
+                let gradient = [
+                    packed(lanes, |lane| east[rows[lane] + step]),
+                    packed(lanes, |lane| north[rows[lane] + step]),
+                ];
+                ground(lanes, gradient, packed(lanes, |lane| self.drive.class[rows[lane] + step]))
             } else {
                 ground(lanes, [zero; 2], zero)
             };
@@ -287,7 +180,7 @@ impl RollOut<'_> {
             turned = rates.yaw_rate.mul_add(lanes.real(STEP_S), turned);
             way[step + 1] = [L::unpack(state.x.1), L::unpack(state.y.1), L::unpack(turned.1)];
             if step + 1 == HORIZONS[next_horizon] {
-                let rates = [L::unpack(rates.speed.1), L::unpack(rates.yaw_rate.1)];
+                let rates = [rates.speed, rates.yaw_rate, rates.side_speed].map(|rate| L::unpack(rate.1));
                 self.sense(&way, next_horizon, (&origin, rates), outcomes);
                 next_horizon += 1;
             }
@@ -322,7 +215,7 @@ impl RollOut<'_> {
         &self,
         way: &Way,
         horizon: usize,
-        (origin, rates): (&[Origin; WIDEST], [[f32; WIDEST]; 2]),
+        (origin, rates): (&[Origin; WIDEST], [[f32; WIDEST]; 3]),
         outcomes: &mut [f32],
     ) {
         let sensors = &self.simulator.sensors;
@@ -338,6 +231,7 @@ impl RollOut<'_> {
                 at(2) + start.turn_rad,
                 f64::from(rates[0][lane]) * sensors.velocity_ratio,
                 f64::from(rates[1][lane]) + sensors.yaw_rate_bias_radps,
+                f64::from(rates[2][lane]),
             ];
             outcomes[horizon * N_QUANTITIES..][..N_QUANTITIES]
                 .copy_from_slice(&seen.map(|value| value as f32));

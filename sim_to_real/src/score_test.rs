@@ -168,7 +168,7 @@ impl Chance {
         let dispersion = sum / (USUAL_STRETCHES + told[1] + n);
         let strength = |scores: &Vec<Score>| scores.iter().sum::<Score>().strength(dispersion);
         Support {
-            gain: (none.ln() - own.energy()).max(RAN_AWAY),
+            gain: (trial.comparison.numbers_ratio() * (none.ln() - own.energy())).max(RAN_AWAY),
             strength: whole.strength(dispersion),
             least_strength: by_drive.iter().map(strength).fold(f64::INFINITY, f64::min),
             nominal: nominal.map_or(0.0, |nominal| nominal.amplitude),

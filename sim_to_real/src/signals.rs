@@ -1,6 +1,6 @@
 //! Columns of a run on an even time axis, and what stands in for those that are missing.
 
-use crate::drive::{STEP_S, VX, WZ, X, Y, YAW};
+use crate::drive::{N_QUANTITIES, STEP_S, VX, WZ, X, Y, YAW};
 use crate::evidence::{Evidence, SpeedInput, SpeedSource, TurnInput};
 use crate::smoothing::smoothed;
 use bicycle::{Column, Run};
@@ -40,8 +40,8 @@ impl<'a> Signals<'a> {
         [speed, turn]
     }
 
-    /// East, north, yaw, speed and yaw rate as they were measured; NaN where they were not.
-    pub(crate) fn measured(&self, evidence: Evidence) -> [Vec<f64>; 5] {
+    /// East, north, yaw, speed, yaw rate and speed to the left as they were measured; NaN where they were not.
+    pub(crate) fn measured(&self, evidence: Evidence) -> [Vec<f64>; N_QUANTITIES] {
         let nothing = || vec![f64::NAN; self.n];
         let if_there = |is_there: bool, column| if is_there { self.interpolated(column) } else { nothing() };
         let speed = match evidence.speed_source {
@@ -55,11 +55,16 @@ impl<'a> Signals<'a> {
             if_there(evidence.yaw, Column::Yaw),
             speed,
             if_there(evidence.yaw_rate, Column::Wz),
+            if_there(evidence.side_speed, Column::Vy),
         ]
     }
 
     /// The same to start rollouts from: without noise and holes, derived from one another where not measured.
-    pub(crate) fn smooth(&self, evidence: Evidence, measured: &[Vec<f64>; 5]) -> [Vec<f64>; 5] {
+    pub(crate) fn smooth(
+        &self,
+        evidence: Evidence,
+        measured: &[Vec<f64>; N_QUANTITIES],
+    ) -> [Vec<f64>; N_QUANTITIES] {
         let mut smooth = measured.each_ref().map(|values| smoothed(&filled(values)));
         if !evidence.yaw {
             smooth[YAW] = summed(&smooth[WZ]);
@@ -186,7 +191,7 @@ fn rates(values: &[f64]) -> Vec<f64> {
 }
 
 /// Speed along the heading of a path.
-fn path_speeds(smooth: &[Vec<f64>; 5]) -> Vec<f64> {
+fn path_speeds(smooth: &[Vec<f64>; N_QUANTITIES]) -> Vec<f64> {
     let (east, north) = (rates(&smooth[X]), rates(&smooth[Y]));
     let along = |(yaw, (east, north)): (&f64, (&f64, &f64))| east * yaw.cos() + north * yaw.sin();
     smooth[YAW].iter().zip(east.iter().zip(&north)).map(along).collect()
@@ -283,7 +288,7 @@ mod tests {
         }
     }
 
-    fn states(log: &bicycle::DriveLog) -> [[Vec<f64>; 5]; 2] {
+    fn states(log: &bicycle::DriveLog) -> [[Vec<f64>; N_QUANTITIES]; 2] {
         let run = log.runs().next().unwrap();
         let evidence = Evidence::of(&run, &machine()).unwrap();
         let time_s = run.time_s();

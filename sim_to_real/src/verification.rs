@@ -3,13 +3,13 @@
 use crate::answer::{Answer, BeforeAfter};
 use crate::baseline::{Baseline, GapError, drives_of};
 use crate::causes::composed;
-use crate::comparison::{Yardstick, n_measured, root_mean_square};
+use crate::comparison::{Yardstick, n_measured, of_the_error, rollout_error};
 use crate::diagnosis::{Diagnosis, closed};
-use crate::drive::{Drive, HORIZONS, STEP_S, X, Y, YAW};
+use crate::drive::{Drive, HORIZONS, N_QUANTITIES, STEP_S, X, Y, YAW};
 use crate::findings::{Prediction, PredictionModel, QuantityError, ResidualCell};
 use crate::machine::Machine;
 use crate::residual_table::{in_units, residual_cells};
-use crate::rollout::{N_QUANTITIES, PER_START, Simulator};
+use crate::rollout::{PER_START, Simulator};
 use bicycle::{DriveLog, Effect};
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -52,7 +52,7 @@ pub fn verify(
     let all: Vec<&Drive> = drives.iter().collect();
     let trial = baseline.trial(&all);
     let (before, after) = (trial.residuals(&[]), trial.residuals(diagnosis.effects()));
-    let errors = [root_mean_square(&before), root_mean_square(&after)];
+    let errors = [rollout_error(&before), rollout_error(&after)];
     let closed = baseline.closed(errors[0], errors[1]).map(|closed| {
         let [low, high] = closed_interval(baseline.null.error, &before, &after);
         [closed, low.min(closed), high.max(closed)]
@@ -84,11 +84,10 @@ pub(crate) fn position_error(yardstick: &Yardstick, residuals: &[f32]) -> Option
 
 /// Ends of the 90 % interval of the closed part, over stretches of the drives drawn with replacement.
 pub(crate) fn closed_interval(floor: f64, before: &[f32], after: &[f32]) -> [f64; 2] {
-    let stretches: Vec<_> =
-        before.chunks(STRETCH * PER_START).zip(after.chunks(STRETCH * PER_START)).collect();
-    let sums = stretches.iter().map(|(before, after)| {
-        let square = |values: &[f32]| values.iter().map(|value| f64::from(*value).powi(2)).sum::<f64>();
-        [square(before), square(after), n_measured(before) as f64]
+    let stretches = before.chunks(STRETCH * PER_START).zip(after.chunks(STRETCH * PER_START));
+    let sums = stretches.map(|(before, after)| {
+        let n = n_measured(&of_the_error(before)) as f64;
+        [n * rollout_error(before).powi(2), n * rollout_error(after).powi(2), n]
     });
     let sums: Vec<[f64; 3]> = sums.collect();
     let mut random = Xoshiro256PlusPlus::seed_from_u64(0);
@@ -113,7 +112,7 @@ fn predictions(baseline: &Baseline, drives: &[Drive], causes: &[Effect]) -> Vec<
     for (model, causes) in models {
         let simulator = Simulator::new(baseline.wheelbase_m, &composed(&baseline.effects, causes));
         for (log, drive) in drives.iter().enumerate() {
-            let predicted = simulator.predict(drive);
+            let predicted = simulator.predict(&[drive]);
             for (&start, outcomes) in drive.starts.iter().zip(predicted.chunks(PER_START)) {
                 let ends_within = |(_, steps): &(&[f32], usize)| drive.measures(start + steps);
                 let of = |(outcome, steps)| prediction(drive, (log, start), steps, (model, outcome));

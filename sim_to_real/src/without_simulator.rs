@@ -11,7 +11,7 @@ mod selection;
 use crate::answer::Verdict;
 use crate::baseline::{Baseline, Experience, GapError, Null, drives_of};
 use crate::causes::Trial;
-use crate::comparison::{Comparison, Yardstick, root_mean_square};
+use crate::comparison::{Comparison, Yardstick, rollout_error};
 use crate::conditions::{StartRecord, condition_tables, ground_residuals};
 use crate::diagnosis::Diagnosis;
 use crate::drive::Drive;
@@ -81,7 +81,7 @@ pub fn diagnose_without_simulator(
 fn bare_baseline(machine: &Machine, drives: &[&Drive], yardstick: Yardstick) -> Baseline {
     let noise = Comparison::new(machine.wheelbase_m, drives.to_vec(), &yardstick).noise();
     let null = Null {
-        error: root_mean_square(&noise),
+        error: rollout_error(&noise),
         loss: mean_loss(&noise),
         chance: Chance::default(),
         limits_shown: LimitsShown::default(),
@@ -105,7 +105,7 @@ fn diagnosis(baseline: &Baseline, all: &[&Drive], folds: &Folds<'_>, selection: 
     let causes = selection.explanation.causes.clone();
     let (before, after) = (trial.residuals(&[]), trial.residuals(&causes));
     let [own, repaired] = [&before, &after].map(|residuals| StartRecord::of(all, residuals));
-    let errors = [root_mean_square(&before), root_mean_square(&after)];
+    let errors = [rollout_error(&before), rollout_error(&after)];
     let [left_out_before, left_out_after] = selection.left_out_errors(folds, baseline);
     let mut credible_set: Vec<String> = Vec::new();
     let rivals = selection.alternatives.iter().flat_map(|(_, ids)| ids.iter().copied());

@@ -26,6 +26,7 @@ fn simulate(run: &SimulatorRun) -> Motion {
         yaw_rad: Vec::new(),
         speed_mps: Vec::new(),
         yaw_rate_radps: Vec::new(),
+        side_speed_mps: None,
     };
     for row in 0..run.n_rows() {
         let rate = speed * run.command_steering_rad[row].tan() / WHEELBASE_M;

@@ -93,10 +93,12 @@ impl PreparedEffects {
     }
 
     /// Lets what is held follow a speed that was measured and not foretold.
-    pub(crate) fn correct_held(&self, memory: &mut [f64], faster_mps: f64) {
+    #[inline(always)]
+    pub(crate) fn correct_held<L: Lanes>(&self, memory: &mut [L::Value], faster: Real<L>) {
+        let lanes = faster.0;
         for prepared in &self.on_drive {
             if let (Some(slot), Some(per_s)) = (prepared.held, prepared.effect.held_follows_per_s()) {
-                memory[slot] += per_s * faster_mps;
+                memory[slot] = faster.mul_add(lanes.real(per_s), Real(lanes, memory[slot])).1;
             }
         }
     }

@@ -1,7 +1,7 @@
 //! The bicycle's steps as what every motion model offers.
 
 use super::Stepper;
-use crate::lanes::{Lanes, Real};
+use crate::lanes::{Lanes, Real, Scalar};
 use crate::{Command, Extent, GroundSample, LaneState, MotionStepper, Rates};
 
 impl MotionStepper for Stepper {
@@ -74,6 +74,6 @@ impl MotionStepper for Stepper {
     }
 
     fn correct_held(&self, memory: &mut [f64], faster_mps: f64) {
-        Self::correct_held(self, memory, faster_mps);
+        Self::correct_held(self, memory, Real(Scalar, faster_mps));
     }
 }

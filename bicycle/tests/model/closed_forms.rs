@@ -80,6 +80,34 @@ fn a_linkage_multiplies_what_the_servo_does() {
     }
 }
 
+/// At v = 2 m/s tyres of C = 0.1 s2/m answer the steering with a time constant of 0.2 s, in implicit steps of dt:
+/// 1 - (1 + dt / (C v))^-n of the yaw rate v tan(steering) / L after n of them. In the end they slip by C v yaw_rate to the
+/// outside of the curve.
+#[test]
+fn tyres_that_slip_answer_late_and_give_way() {
+    let (speed_mps, compliance_s2_per_m) = (2.0, 0.1);
+    let command = command(2.0, 0.01);
+    let state = State { speed_mps, ..State::default() };
+    let effects = vec![effect("tyre_slip", compliance_s2_per_m)];
+    let states = run(effects, state, command, 60);
+    let yaw_rate = |t: usize| (states[t + 1].yaw_rad - states[t].yaw_rad) / STEP_S;
+    let whole_radps = speed_mps * f64::from(command.steering_rad).tan() / WHEELBASE_M;
+    let per_step = 1.0 + STEP_S / (compliance_s2_per_m * speed_mps);
+    for n in [1, 3, 6] {
+        let expected_radps = whole_radps * (1.0 - per_step.powi(-n));
+        assert!(
+            (yaw_rate(n as usize - 1) / expected_radps - 1.0).abs() < 1e-3,
+            "{n}: {}",
+            yaw_rate(n as usize - 1)
+        );
+    }
+    let [before, after] = [&states[58], &states[59]];
+    let (sine, cosine) = before.yaw_rad.sin_cos();
+    let sideways_m = (after.y_m - before.y_m) * cosine - (after.x_m - before.x_m) * sine;
+    let expected_mps = -compliance_s2_per_m * speed_mps * speed_mps * whole_radps;
+    assert!((sideways_m / STEP_S / expected_mps - 1.0).abs() < 1e-3, "{}", sideways_m / STEP_S);
+}
+
 /// Standing still before, a delay D shortens the way at constant speed by v D, whole number of steps or not.
 #[test]
 fn a_delay_shortens_the_way_by_its_length() {

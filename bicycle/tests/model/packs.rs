@@ -39,7 +39,7 @@ fn sets_of_effects() -> [Vec<Effect>; 2] {
         ("rear_slip", &[0.01]),
         ("rear_steer", &[0.2]),
     ];
-    let second: [(&str, &[f64]); 13] = [
+    let second: [(&str, &[f64]); 14] = [
         ("steer_rate", &[0.8]),
         ("accel_limit", &[1.5]),
         ("speed_ramp", &[1.1, 0.7]),
@@ -53,6 +53,7 @@ fn sets_of_effects() -> [Vec<Effect>; 2] {
         ("wind", &[0.3, -0.2]),
         ("steer_yield", &[0.1]),
         ("friction", &[0.08, 0.8, 0.5]),
+        ("tyre_slip", &[0.02]),
     ];
     let made = |given: &[(&str, &[f64])]| given.iter().map(|&(id, values)| effect_of(id, values)).collect();
     [made(&first), made(&second)]

@@ -259,7 +259,7 @@ Vehicle file:
 Drives:
   needed columns   t, and a command: cmd_speed, cmd_steer or steer_meas
                    (cmd_wz for a skid-steered machine)
-  used if there    x, y, yaw, vx, wz, roll, pitch; run (t restarts per run)
+  used if there    x, y, yaw, vx, vy, wz, roll, pitch; run (t restarts per run)
   A drive may lie in several files with + between them (pose.csv+can.csv), of one
   clock and each with columns and a rate of its own; those after the first are
   looked for beside it. Columns of a slower sensor are filled in between, unless

@@ -21,7 +21,7 @@ STEP_S = 0.02
 DURATION_S = 34.0
 # What is cut off, so that actuators have a past.
 BEFORE_S = 2.0
-NOISE = {"x": 0.02, "y": 0.02, "yaw": 0.002, "vx": 0.03, "wz": 0.004}
+NOISE = {"x": 0.02, "y": 0.02, "yaw": 0.002, "vx": 0.03, "vy": 0.03, "wz": 0.004}
 
 
 def commands(draw):
@@ -98,12 +98,13 @@ def wrapped(speeds, angles, effects):
 def sensed(rows, effects, draw):
     """What is measured of the motion."""
     aged = late(rows, effects.get("pose_latency", 0.0))
-    for (x, y, yaw, *_), (_, _, _, vx, wz) in zip(aged, rows):
+    for (x, y, yaw, *_), (_, _, _, vx, wz, vy) in zip(aged, rows):
         true = {
             "x": x,
             "y": y,
             "yaw": yaw + effects.get("yaw_misalign", 0.0),
             "vx": vx * effects.get("odom_scale", 1.0),
+            "vy": vy,
             "wz": wz + effects.get("gyro_bias", 0.0),
         }
         yield {name: value + draw.gauss(0.0, NOISE[name]) for name, value in true.items()}
@@ -126,7 +127,7 @@ def record(path, knobs, effects, seed):
     measured = list(sensed(driven(VEHICLE, run), effects, draw))
     first = round(BEFORE_S / STEP_S)
     with open(path, "w", newline="") as file:
-        writer = csv.DictWriter(file, ["t", "x", "y", "yaw", "vx", "wz", "cmd_speed", "cmd_steer"])
+        writer = csv.DictWriter(file, ["t", "x", "y", "yaw", "vx", "vy", "wz", "cmd_speed", "cmd_steer"])
         writer.writeheader()
         for row in range(first, len(speeds)):
             at = {"t": f"{(row - first) * STEP_S:.3f}", "cmd_speed": speeds[row], "cmd_steer": angles[row]}

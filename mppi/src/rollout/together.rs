@@ -126,7 +126,11 @@ fn land<K: Kernel>(flight: &mut Flight<K>, outcomes: &[StepOutcome], frame: &Fra
         speed: pack(&|outcome| outcome.state.speed_mps),
         steering: pack(&|outcome| outcome.state.turn),
     };
-    Rates { speed: flight.state.speed, yaw_rate: pack(&|outcome| outcome.yaw_rate_radps) }
+    Rates {
+        speed: flight.state.speed,
+        side_speed: kernel.real(0.0),
+        yaw_rate: pack(&|outcome| outcome.yaw_rate_radps),
+    }
 }
 
 /// The numbers of a pack.

@@ -181,7 +181,11 @@ impl MotionStepper for PythonStepper {
         [state.x, state.y, state.turns, state.speed, state.steering] =
             [0, 1, 2, 3, 4].map(|place| pack(&|outcome| row(&outcome.state)[place]) / units[place]);
         state.turns = state.turns.wrap_turns();
-        Rates { speed: state.speed, yaw_rate: pack(&|outcome| outcome.yaw_rate_radps) }
+        Rates {
+            speed: state.speed,
+            side_speed: lanes.real(0.0),
+            yaw_rate: pack(&|outcome| outcome.yaw_rate_radps),
+        }
     }
 
     /// Without the way through single precision.

@@ -136,6 +136,7 @@ pub(crate) fn cells() -> Vec<ResidualCell> {
         ResidualState::Yaw,
         ResidualState::ForwardSpeed,
         ResidualState::YawRate,
+        ResidualState::SideSpeed,
     ];
     let of_state = |(place, state): (usize, ResidualState)| {
         [0.3, 0.6, 1.2, 2.0].map(|horizon_s| ResidualCell {

@@ -89,7 +89,7 @@ fn effects(answer: &Answer) -> String {
         format!(
             "<tr><td><code>{}</code></td><td>{}</td><td>{}</td><td>{}</td></tr>\n",
             escaped(&effect.id),
-            escaped(text::meaning(&effect.id)),
+            escaped(text::meaning(effect)),
             escaped(&text::parameters(effect)),
             escaped(&text::asked_for(answer, &effect.id).unwrap_or_default())
         )

@@ -8,18 +8,19 @@ use crate::canvas::MARGIN;
 use crate::canvas::{Anchor, Canvas, Rect, Stroke, TextStyle};
 use crate::colour::Rgb;
 
-const STATES: [ResidualState; 5] = [
+const STATES: [ResidualState; 6] = [
     ResidualState::Along,
     ResidualState::Across,
     ResidualState::Yaw,
     ResidualState::ForwardSpeed,
     ResidualState::YawRate,
+    ResidualState::SideSpeed,
 ];
 const LEFT: f64 = 100.0;
 const TOP: f64 = 210.0;
-const WIDTH: f64 = 270.0;
+const WIDTH: f64 = 222.0;
 const HEIGHT: f64 = 300.0;
-const STEP: [f64; 2] = [300.0, 450.0];
+const STEP: [f64; 2] = [250.0, 450.0];
 
 /// One of the sizes of a residual.
 type Size = fn(&ResidualCell) -> f64;

@@ -29,14 +29,20 @@ pub(super) fn listed(names: &[&str]) -> String {
     }
 }
 
+/// The catalogue's effect that was found: the cause itself, or another form of it.
+pub(super) fn found(effect: &NamedEffect) -> &str {
+    effect.form.as_deref().unwrap_or(&effect.id)
+}
+
 /// What an effect is, from the catalogue.
-pub(crate) fn meaning(id: &str) -> &'static str {
-    CATALOGUE.iter().find(|description| description.id == id).map_or("", |description| description.meaning)
+pub(crate) fn meaning(effect: &NamedEffect) -> &'static str {
+    let description = CATALOGUE.iter().find(|description| description.id == found(effect));
+    description.map_or("", |description| description.meaning)
 }
 
 /// Parameters with values and intervals: `time_constant 0.210 s (0.180 to 0.240)`.
 pub(crate) fn parameters(effect: &NamedEffect) -> String {
-    let told = |(name, estimate): (&String, &Estimate)| parameter(&effect.id, name, estimate);
+    let told = |(name, estimate): (&String, &Estimate)| parameter(found(effect), name, estimate);
     effect.parameters.iter().map(told).collect::<Vec<_>>().join(", ")
 }
 
@@ -52,7 +58,7 @@ pub(crate) fn parameter(id: &str, name: &str, estimate: &Estimate) -> String {
 
 /// `time_constant_s` without its unit and underscores.
 fn plain_name(name: &str) -> String {
-    let units = ["_s", "_rad", "_mps", "_mps2", "_radps", "_per_m", "_m", "_s2_per_m2"];
+    let units = ["_s", "_rad", "_mps", "_mps2", "_radps", "_per_m", "_m", "_s2_per_m", "_s2_per_m2"];
     let longest = units.iter().filter_map(|unit| name.strip_suffix(unit)).min_by_key(|rest| rest.len());
     longest.unwrap_or(name).replace('_', " ")
 }
@@ -194,7 +200,7 @@ pub fn text(answer: &Answer, drives: &str) -> String {
     lines.push(format!("  {}", verdict(answer)));
     for effect in &answer.effects {
         lines.push(format!("    {}  {}", effect.id, parameters(effect)));
-        lines.push(format!("      {}", meaning(&effect.id)));
+        lines.push(format!("      {}", meaning(effect)));
         lines.extend(asked_for(answer, &effect.id).map(|told| format!("      {told}")));
     }
     if matches!(answer.verdict, Verdict::Effects | Verdict::EffectsAndUnknown) {
@@ -285,6 +291,21 @@ mod tests {
             "  next     drive steps of the steering & sines",
         ];
         assert_eq!(lines[7..], rest);
+    }
+
+    #[test]
+    fn a_cause_is_told_by_the_form_that_was_found() {
+        let estimate = Estimate { value: 0.0053, low: 0.003, high: 0.008 };
+        let friction = |form: Option<&str>, name: &str| NamedEffect {
+            id: "friction".to_owned(),
+            form: form.map(str::to_owned),
+            parameters: [(name.to_owned(), estimate)].into(),
+        };
+        let slip = friction(Some("tyre_slip"), "compliance_s2_per_m");
+        assert!(meaning(&slip).starts_with("tyres that slip more: "), "{}", meaning(&slip));
+        assert_eq!(parameters(&slip), "compliance 0.00530 s2/m (0.00300 to 0.00800)");
+        let grip = friction(None, "mu");
+        assert!(meaning(&grip).starts_with("friction: "), "{}", meaning(&grip));
     }
 
     #[test]

@@ -40,7 +40,7 @@ pub(super) fn page(answer: &Answer) -> Option<Canvas> {
     draw_legend(&entries, (MARGIN, 130.0), &mut canvas);
     for (row, (effect, parameter, whole, parts)) in told.iter().enumerate() {
         let top = TOP + STEP[1] * row as f64;
-        let title = format!("{}: {}", effect.id, text::parameter(&effect.id, parameter, whole));
+        let title = format!("{}: {}", effect.id, text::parameter(text::found(effect), parameter, whole));
         canvas.text((MARGIN, top - 34.0), &title, TextStyle::new(20, Anchor::Start).bold());
         draw_row(parts, *whole, top, &mut canvas);
     }

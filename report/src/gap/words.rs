@@ -94,5 +94,6 @@ pub(super) fn state(state: ResidualState) -> &'static str {
         ResidualState::Yaw => "yaw",
         ResidualState::ForwardSpeed => "forward speed",
         ResidualState::YawRate => "yaw rate",
+        ResidualState::SideSpeed => "sideways speed",
     }
 }

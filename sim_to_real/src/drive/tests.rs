@@ -4,9 +4,9 @@
 
 use super::testing::{log, machine};
 use super::*;
-use crate::comparison::{Comparison, Yardstick, root_mean_square};
-use crate::rollout::{N_QUANTITIES, PER_START, Simulator};
-use bicycle::effect::{SpeedDelay, SteerGain};
+use crate::comparison::{Comparison, Yardstick, rollout_error, root_mean_square};
+use crate::rollout::{PER_START, Simulator};
+use bicycle::effect::{RearSlip, SpeedDelay, SteerGain};
 use bicycle::{Column, DriveLog, Effect};
 use std::f64::consts::TAU;
 
@@ -15,7 +15,7 @@ fn drive(log: &DriveLog) -> Result<Drive, DriveError> {
 }
 
 fn predicted(drive: &Drive, effects: &[Effect]) -> Vec<Vec<f32>> {
-    Simulator::new(1.0, effects).predict(drive).chunks(N_QUANTITIES).map(<[f32]>::to_vec).collect()
+    Simulator::new(1.0, effects).predict(&[drive]).chunks(N_QUANTITIES).map(<[f32]>::to_vec).collect()
 }
 
 /// A circle of radius 4 m at 2 m/s.
@@ -39,7 +39,7 @@ fn a_long_run_is_compared_at_all_horizons_from_every_start() {
     let drive = drive(&log(&columns, 501, 0.02, on_circle)).unwrap();
     assert_eq!((drive.starts[0], drive.starts[1], drive.commands.len()), (75, 85, 501));
     assert_eq!(drive.starts.len(), (401_usize - 75).div_ceil(10));
-    assert!(drive.measured.iter().flatten().all(|value| value.is_finite()));
+    assert!(drive.measured[..VY].iter().flatten().all(|value| value.is_finite()));
 }
 
 #[test]
@@ -75,6 +75,46 @@ fn every_set_of_columns_drives_the_same_circle() {
         let residuals = Comparison::new(1.0, vec![&drive], &Yardstick::rough()).residuals(&[wrong]);
         assert!(root_mean_square(&residuals) > 1.0, "{columns:?}");
     }
+}
+
+/// The circle with sideways speeds.
+fn slipping(side_speed_mps: impl Fn(f64) -> f64) -> Drive {
+    let columns = [Column::Vx, Column::Vy, Column::Wz, Column::CmdSpeed, Column::CmdSteer];
+    let value = |column: Column, t: f64| match column {
+        Column::Vy => side_speed_mps(t),
+        _ => on_circle(column, t),
+    };
+    drive(&log(&columns, 501, 0.02, value)).unwrap()
+}
+
+/// Rear tyres that give way by 0.01 s2/m: on the circle by 0.01 * 2 * (2 * 0.5) = 0.02 m/s to the outside, which the error of
+/// a model is not made of. A column of zeros is none.
+#[test]
+fn a_sideways_speed_counts_where_one_was_measured() {
+    let slipping_drive = slipping(|t| -0.02 + 1e-4 * t.sin());
+    let slip = Effect::RearSlip(RearSlip { compliance_s2_per_m: 0.01 });
+    assert!(predicted(&slipping_drive, &[slip]).iter().all(|row| (row[VY] + 0.02).abs() < 1e-6));
+    let rough = Yardstick::rough();
+    let residuals = |drive: &Drive, effects: &[Effect], yardstick: &Yardstick| {
+        Comparison::new(1.0, vec![drive], yardstick).residuals(effects)
+    };
+    let of_side =
+        |residuals: &[f32]| -> Vec<f32> { residuals.chunks(N_QUANTITIES).map(|own| own[VY]).collect() };
+    let without = residuals(&slipping_drive, &[], &rough);
+    // 0.02 m/s in units of 0.05.
+    assert!(of_side(&without).iter().all(|side| (side - 0.4).abs() < 0.01), "{without:?}");
+    assert!(of_side(&residuals(&slipping_drive, &[slip], &rough)).iter().all(|side| side.abs() < 0.01));
+    assert!(rollout_error(&without) < 0.01 && root_mean_square(&without) > 0.1);
+    let unmeasured = slipping(|_| 0.0);
+    assert!(of_side(&residuals(&unmeasured, &[slip], &rough)).iter().all(|side| *side == 0.0));
+    // Of three quantities that are measured one is the speed to the left; of two none.
+    let of = |drive: &Drive| Yardstick::of(&residuals(drive, &[], &rough), &rough);
+    let ratio =
+        |drive: &Drive, yardstick: &Yardstick| Comparison::new(1.0, vec![drive], yardstick).numbers_ratio();
+    assert!((ratio(&slipping_drive, &of(&slipping_drive)) - 1.5).abs() < 1e-12);
+    assert!((ratio(&unmeasured, &of(&unmeasured)) - 1.0).abs() < 1e-12);
+    // Nominal drives that do not tell it are no measure of it.
+    assert!(of_side(&residuals(&slipping_drive, &[], &of(&unmeasured))).iter().all(|side| *side == 0.0));
 }
 
 /// From rest at 1 m/s2 from t = 1 s on, 0.4 s late: what a commanded acceleration leads to.

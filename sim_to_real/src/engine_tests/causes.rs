@@ -3,7 +3,7 @@
 use super::{Made, arcs, effect};
 use crate::causes::{Trial, composed};
 use crate::comparison::{Comparison, Yardstick};
-use crate::explanation::{best_pair, single_explanations};
+use crate::explanation::Screened;
 use std::collections::BTreeSet;
 
 fn on<T>(made: Made, told: impl Fn(&Trial<'_>) -> T) -> T {
@@ -20,7 +20,7 @@ fn on<T>(made: Made, told: impl Fn(&Trial<'_>) -> T) -> T {
 #[test]
 fn the_effect_that_was_put_in_is_the_best_alone_with_its_size() {
     on(Made { curvature_ratio: 0.85, ..Made::RIGHT }, |trial| {
-        let singles = single_explanations(trial);
+        let singles = Screened::of(trial).singles();
         let best = &singles[0];
         assert_eq!(best.ids(), ["steer_gain"], "{:?}", best.causes);
         assert!((best.causes[0].values()[0] - 0.85).abs() < 0.01, "{:?}", best.causes);
@@ -32,7 +32,7 @@ fn the_effect_that_was_put_in_is_the_best_alone_with_its_size() {
 #[test]
 fn every_cause_stands_once_however_many_forms_it_has() {
     on(Made::RIGHT, |trial| {
-        let ids: Vec<&str> = single_explanations(trial).iter().map(|single| single.ids()[0]).collect();
+        let ids: Vec<&str> = Screened::of(trial).singles().iter().map(|single| single.ids()[0]).collect();
         let unique: BTreeSet<&str> = ids.iter().copied().collect();
         assert_eq!(unique.len(), ids.len(), "{ids:?}");
     });
@@ -41,7 +41,7 @@ fn every_cause_stands_once_however_many_forms_it_has() {
 #[test]
 fn on_drives_of_the_model_itself_nothing_explains_anything() {
     on(Made::RIGHT, |trial| {
-        let (none, singles) = (trial.loss(&[]), single_explanations(trial));
+        let (none, singles) = (trial.loss(&[]), Screened::of(trial).singles());
         assert!(singles.iter().all(|single| (none / single.loss).ln() < 0.03), "{none} {:?}", singles[0]);
         assert!(singles.windows(2).all(|pair| pair[0].loss <= pair[1].loss));
     });
@@ -50,8 +50,8 @@ fn on_drives_of_the_model_itself_nothing_explains_anything() {
 #[test]
 fn two_effects_that_were_put_in_are_the_best_pair() {
     on(Made { curvature_ratio: 0.85, speed_ratio: 0.9, ..Made::RIGHT }, |trial| {
-        let singles = single_explanations(trial);
-        let pair = best_pair(trial, &singles).unwrap();
+        let singles = Screened::of(trial).singles();
+        let pair = Screened::of(trial).best_pair(&singles).unwrap();
         let mut ids = pair.ids();
         ids.sort_unstable();
         assert_eq!(ids, ["speed_scale", "steer_gain"], "{:?}", pair.causes);

@@ -3,8 +3,8 @@
 use super::normal;
 use crate::answer::Condition;
 use crate::conditions::{MEASURED, StartRecord, Window, condition_tables, places, with_announced};
+use crate::drive::N_QUANTITIES;
 use crate::findings::ConditionTable;
-use crate::rollout::N_QUANTITIES;
 
 /// Records whose residuals are noise and, in their first quantity, a function of the conditions' values.
 pub(super) fn records(

@@ -5,7 +5,7 @@ use crate::answer::Division;
 use crate::baseline::{Baseline, Experience, Null};
 use crate::comparison::{Comparison, Yardstick};
 use crate::constancy::{Changing, changing};
-use crate::explanation::single_explanations;
+use crate::explanation::Screened;
 use crate::limits_shown::LimitsShown;
 use crate::score_test::Chance;
 use crate::whitening::Whitening;
@@ -40,7 +40,7 @@ fn bicycle() -> Baseline {
 fn found(made: Made) -> (Vec<Vec<Effect>>, Option<Changing>) {
     let baseline = bicycle();
     let drives = [1, 2].map(|seed| arcs(Made { curvature_ratio: 0.85, ..made }, seed));
-    let singles = single_explanations(&baseline.trial(&drives.each_ref()));
+    let singles = Screened::of(&baseline.trial(&drives.each_ref())).singles();
     let best: Vec<Vec<Effect>> = singles.into_iter().take(3).map(|single| single.causes).collect();
     let changing = changing(&baseline, &drives, &best);
     (best, changing)

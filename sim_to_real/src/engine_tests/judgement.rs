@@ -45,7 +45,12 @@ fn weighed(none: f64, losses: &[f64], pair: Option<f64>) -> Weighed {
     singles.sort_by(|a, b| a.explanation.loss.total_cmp(&b.explanation.loss));
     let both = [SINGLES[0], SINGLES[3]].map(|(id, value)| effect(id, value));
     let pairs = pair.map(|loss| Explanation::new(both.to_vec(), loss)).into_iter().collect();
-    Weighed { none: Explanation::new(Vec::new(), none), singles, pairs }
+    of(none, singles, pairs)
+}
+
+/// Of numbers that all robots have.
+fn of(none: f64, singles: Vec<Single>, pairs: Vec<Explanation>) -> Weighed {
+    Weighed { none: Explanation::new(Vec::new(), none), singles, pairs, numbers_ratio: 1.0 }
 }
 
 fn judged(none: f64, losses: &[f64], pair: Option<f64>) -> Judgement {
@@ -127,8 +132,7 @@ fn a_second_effect_in_the_same_answer_is_dearer() {
     let with = |second: (&str, f64)| {
         let pair = Explanation::new(vec![effect("steer_lag", 0.2), effect(second.0, second.1)], 2.0);
         let singles = vec![single(SINGLES[0], 6.0, 2.0 * 0.25_f64.exp())];
-        let weighed = Weighed { none: Explanation::new(Vec::new(), 6.0), singles, pairs: vec![pair] };
-        weighed.judge(&null()).announced.len()
+        of(6.0, singles, vec![pair]).judge(&null()).announced.len()
     };
     assert_eq!([SINGLES[1], ("understeer", 0.01), SINGLES[2]].map(with), [1, 1, 2]);
 }
@@ -160,7 +164,7 @@ fn a_limit_that_nominal_drives_would_not_have_shown_is_no_sign() {
     let at = |value: f64| {
         let singles = vec![single(("accel_limit", value), 2.0, 1.0), single(SINGLES[0], 2.0, 1.1)];
         let null = Null { limits_shown: LimitsShown::from_iter([("accel_limit", 2.0)]), ..null() };
-        Weighed { none: Explanation::new(Vec::new(), 2.0), singles, pairs: Vec::new() }.judge(&null)
+        of(2.0, singles, Vec::new()).judge(&null)
     };
     assert_eq!(announced(&at(1.9)), ["accel_limit"]);
     assert!(announced(&at(2.1)).is_empty());
@@ -174,7 +178,7 @@ fn a_limit_that_would_not_have_shown_takes_no_other_name_with_it() {
         let pair = Explanation::new(vec![effect("steer_lag", 0.2), limit], 1.0);
         let singles = vec![single(SINGLES[0], 3.0, 1.6), single(("accel_limit", value), 3.0, 2.9)];
         let null = Null { limits_shown: LimitsShown::from_iter([("accel_limit", 2.0)]), ..null() };
-        Weighed { none: Explanation::new(Vec::new(), 3.0), singles, pairs: vec![pair] }.judge(&null)
+        of(3.0, singles, vec![pair]).judge(&null)
     };
     assert_eq!(announced(&at(1.9)), ["steer_lag", "accel_limit"]);
     assert_eq!(announced(&at(2.1)), ["steer_lag"]);
@@ -237,5 +241,22 @@ proptest! {
         let after = judged(3.0, &changed, None);
         let holds = |judgement: &Judgement| judgement.credible_set.iter().any(|id| id == SINGLES[rival].0);
         prop_assert!(holds(&before) || !holds(&after));
+    }
+}
+
+/// Numbers that no effect changes make the logarithms of all losses less, here 1.2 times; what is found is the same.
+#[test]
+fn numbers_that_no_effect_changes_hide_none() {
+    let (none, losses, pair) = (3.0, [1.9, 2.2, 2.5, 2.4, 2.9], 1.1);
+    let without = weighed(none, &losses, Some(pair));
+    let less = |loss: f64| loss.powf(1.0 / 1.2);
+    let mut with = Weighed { numbers_ratio: 1.2, ..weighed(less(none), &losses.map(less), Some(less(pair))) };
+    let supports = without.singles.iter().map(|single| single.support);
+    with.singles.iter_mut().zip(supports).for_each(|(single, support)| single.support = support);
+    let [without, with] = [without, with].map(|weighed| weighed.judge(&null()));
+    assert_eq!(announced(&with), ["steer_lag", "speed_scale"]);
+    assert_eq!(announced(&without), announced(&with));
+    for (id, _) in SINGLES {
+        assert!((score(&without, id) - score(&with, id)).abs() < 1e-9, "{id}");
     }
 }

@@ -65,6 +65,7 @@ mod tests {
             yaw_rad: values.clone(),
             speed_mps: values.clone(),
             yaw_rate_radps: values,
+            side_speed_mps: None,
         }
     }
 

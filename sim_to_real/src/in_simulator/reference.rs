@@ -2,7 +2,7 @@
 
 use super::replay::replayed;
 use super::types::{RunSimulator, SimulatorDescription};
-use crate::comparison::{Comparison, Yardstick, root_mean_square};
+use crate::comparison::{Comparison, Yardstick, rollout_error};
 use crate::drive::Drive;
 use crate::least_squares::mean_loss;
 use crate::whitening::Whitening;
@@ -38,12 +38,12 @@ impl Reference {
         let yardstick = Yardstick(own_sigmas.iter().copied().zip(real_sigmas).map(larger).collect());
         let own_in_noise = in_units_of(&own, &rough, &Yardstick(nominal_sigmas));
         let [own, of_real] = [own, of_real].map(|residuals| in_units_of(&residuals, &rough, &yardstick));
-        let left = if root_mean_square(&own) > root_mean_square(&of_real) { own } else { of_real };
+        let left = if rollout_error(&own) > rollout_error(&of_real) { own } else { of_real };
         let whitening = Whitening::of(&left);
         Ok(Self {
             loss: mean_loss(&whitening.applied(&left)),
-            error: root_mean_square(&left),
-            own_drives_error: root_mean_square(&own_in_noise),
+            error: rollout_error(&left),
+            own_drives_error: rollout_error(&own_in_noise),
             yardstick,
             whitening,
         })
@@ -56,6 +56,6 @@ fn noise(drives: &[Drive], unit: &Yardstick) -> Vec<f32> {
 }
 
 fn in_units_of(residuals: &[f32], from: &Yardstick, to: &Yardstick) -> Vec<f32> {
-    let ratios = from.0.iter().zip(&to.0).map(|(from, to)| (from / to) as f32);
+    let ratios = from.0.iter().zip(to.per_sigma()).map(|(from, per_sigma)| *from as f32 * per_sigma);
     residuals.iter().zip(ratios.collect::<Vec<_>>().iter().cycle()).map(|(r, ratio)| r * ratio).collect()
 }

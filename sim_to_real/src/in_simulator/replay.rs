@@ -5,7 +5,7 @@ use super::lever::Lever;
 use super::types::{Motion, RunSimulator, SimulatorDescription, SimulatorRun, StartState};
 use crate::causes::composed;
 use crate::comparison::Yardstick;
-use crate::drive::{Drive, HORIZONS, N_STEPS, STEP_S, VX, WZ, X, Y, YAW, seen_from};
+use crate::drive::{Drive, HORIZONS, N_QUANTITIES, N_STEPS, STEP_S, VX, VY, WZ, X, Y, YAW, seen_from};
 use crate::rollout::UNLIMITED;
 use crate::signals::unwrapped;
 use bicycle::lanes::{Real, Scalar};
@@ -90,7 +90,7 @@ fn run_of(drive: &Drive, effects: &[Effect], knobs: BTreeMap<String, f64>) -> Si
     let n_rows = drive.starts.last().map_or(0, |last| last + N_STEPS + 1).min(drive.commands.len());
     let [command_speed_mps, command_steering_rad] = wrapped_commands(drive, effects, n_rows);
     let [slope_ahead, slope_left] = slopes(drive, n_rows);
-    let [x_m, y_m, yaw_rad, speed_mps, yaw_rate_radps] = drive.smooth.each_ref().map(|values| values[0]);
+    let [x_m, y_m, yaw_rad, speed_mps, yaw_rate_radps, _] = drive.smooth.each_ref().map(|values| values[0]);
     SimulatorRun {
         start: StartState { x_m, y_m, yaw_rad, speed_mps, yaw_rate_radps },
         step_s: STEP_S,
@@ -131,25 +131,27 @@ fn slopes(drive: &Drive, n_rows: usize) -> [Vec<f64>; 2] {
     [ahead, left]
 }
 
-/// Simulated less measured at every horizon of every start; exactly 0 where nothing was measured.
+/// Simulated less measured at every horizon of every start; exactly 0 where nothing was measured, or simulated.
 fn residuals(drive: &Drive, motion: &Motion, sensors: &SensorModel, yardstick: &Yardstick) -> Vec<f32> {
     let seen = seen(motion, sensors);
-    let mut residuals = Vec::with_capacity(drive.starts.len() * yardstick.0.len());
+    let per_sigma = yardstick.per_sigma();
+    let mut residuals = Vec::with_capacity(drive.starts.len() * per_sigma.len());
     for &start in &drive.starts {
         let origin = [X, Y, YAW].map(|quantity| seen[quantity][start]);
         let pairs = HORIZONS.iter().flat_map(|&steps| {
             let simulated = seen_from(origin, seen.each_ref().map(|values| values[start + steps]));
             simulated.into_iter().zip(drive.outcome(start, steps))
         });
-        residuals.extend(pairs.zip(&yardstick.0).map(|((simulated, measured), sigma)| {
-            if measured.is_nan() { 0.0 } else { ((simulated - measured) / sigma) as f32 }
+        residuals.extend(pairs.zip(&per_sigma).map(|((simulated, measured), per_sigma)| {
+            let difference = (simulated - measured) as f32 * per_sigma;
+            if difference.is_nan() { 0.0 } else { difference }
         }));
     }
     residuals
 }
 
 /// What the sensors say of a motion.
-fn seen(motion: &Motion, sensors: &SensorModel) -> [Vec<f64>; 5] {
+fn seen(motion: &Motion, sensors: &SensorModel) -> [Vec<f64>; N_QUANTITIES] {
     let late = sensors.pose_latency_s / STEP_S;
     let aged = |values: &[f64]| -> Vec<f64> {
         let at = |row: usize| {
@@ -161,9 +163,11 @@ fn seen(motion: &Motion, sensors: &SensorModel) -> [Vec<f64>; 5] {
         (0..values.len()).map(at).collect()
     };
     let yaw = unwrapped(&motion.yaw_rad);
-    let mut seen = [aged(&motion.x_m), aged(&motion.y_m), aged(&yaw), Vec::new(), Vec::new()];
+    let mut seen = [aged(&motion.x_m), aged(&motion.y_m), aged(&yaw), Vec::new(), Vec::new(), Vec::new()];
     seen[YAW].iter_mut().for_each(|yaw| *yaw += sensors.yaw_offset_rad);
     seen[VX] = motion.speed_mps.iter().map(|speed| speed * sensors.velocity_ratio).collect();
     seen[WZ] = motion.yaw_rate_radps.iter().map(|rate| rate + sensors.yaw_rate_bias_radps).collect();
+    let untold = || vec![f64::NAN; yaw.len()];
+    seen[VY] = motion.side_speed_mps.clone().unwrap_or_else(untold);
     seen
 }

@@ -138,6 +138,9 @@ pub struct Motion {
     pub speed_mps: Vec<f64>,
     /// Yaw rate [rad/s].
     pub yaw_rate_radps: Vec<f64>,
+    /// Velocity to the left [m/s]; not compared where a simulator does not tell it.
+    #[serde(default)]
+    pub side_speed_mps: Option<Vec<f64>>,
 }
 
 impl Motion {
@@ -157,15 +160,17 @@ impl Motion {
         Ok(self)
     }
 
-    /// The quantities with their names.
-    pub fn quantities(&self) -> [(&'static str, &[f64]); 5] {
-        [
+    /// The quantities that are told, with their names.
+    pub fn quantities(&self) -> impl Iterator<Item = (&'static str, &[f64])> {
+        let always: [(&str, &[f64]); 5] = [
             ("x_m", &self.x_m),
             ("y_m", &self.y_m),
             ("yaw_rad", &self.yaw_rad),
             ("speed_mps", &self.speed_mps),
             ("yaw_rate_radps", &self.yaw_rate_radps),
-        ]
+        ];
+        let side_speed = self.side_speed_mps.as_deref().map(|values| ("side_speed_mps", values));
+        always.into_iter().chain(side_speed)
     }
 }
 

@@ -5,7 +5,7 @@ use super::types::{InSimulator, RunSimulator};
 use super::{InSimulatorDiagnosis, InSimulatorError, driven};
 use crate::answer::BeforeAfter;
 use crate::baseline::GapError;
-use crate::comparison::root_mean_square;
+use crate::comparison::rollout_error;
 use crate::diagnosis::closed;
 use crate::machine::Machine;
 use crate::verification::{closed_interval, position_error};
@@ -30,7 +30,7 @@ impl InSimulatorDiagnosis {
         let settings = [Vec::new(), self.setting.clone()];
         let residuals = trial.residuals(&settings).map_err(InSimulatorError::Run)?;
         let [before, after] = [0, 1].map(|setting| residuals[setting].concat());
-        let [error_before, error_after] = [&before, &after].map(|residuals| root_mean_square(residuals));
+        let [error_before, error_after] = [&before, &after].map(|residuals| rollout_error(residuals));
         let mut answer = self.answer.clone();
         let (floor, yardstick) = (self.reference.error, &self.reference.yardstick);
         let shrink = &mut answer.shrink;

@@ -3,9 +3,9 @@
 use crate::baseline::Baseline;
 use crate::causes::Trial;
 use crate::comparison::{Comparison, root_mean_square};
-use crate::drive::{Drive, HORIZONS, N_STEPS, STEP_S, VX, WZ, YAW};
+use crate::drive::{Drive, HORIZONS, N_QUANTITIES, N_STEPS, STEP_S, VX, WZ, YAW};
 use crate::machine::Machine;
-use crate::rollout::{N_QUANTITIES, PER_START, Simulator};
+use crate::rollout::{PER_START, Simulator};
 use bicycle::Effect;
 
 /// Rows between two corrections.
@@ -28,8 +28,8 @@ pub(super) struct Examples {
     pub(super) foretold: [Vec<f32>; 2],
     /// Foretold less measured, in standard deviations, [`PER_START`] per rollout; exactly 0 where nothing was measured.
     pub(super) residuals: Vec<f32>,
-    /// Standard deviation of each.
-    pub(super) sigma: Vec<f32>,
+    /// One over the standard deviation of each; 0 where nothing was measured.
+    pub(super) per_sigma: Vec<f32>,
 }
 
 impl Examples {
@@ -42,10 +42,10 @@ impl Examples {
             features: Vec::new(),
             foretold: [Vec::new(), Vec::new()],
             residuals,
-            sigma: baseline.yardstick.0.iter().map(|sigma| *sigma as f32).collect(),
+            per_sigma: baseline.yardstick.per_sigma(),
         };
         for drive in drives {
-            let predicted = simulator.predict(drive);
+            let predicted = simulator.predict(&[drive]);
             for (&start, outcomes) in drive.starts.iter().zip(predicted.chunks(PER_START)) {
                 examples.add(drive, machine, (start, outcomes));
             }
@@ -143,7 +143,7 @@ pub(super) struct Scaling {
     pub(super) centre: Vec<f32>,
     pub(super) per_spread: Vec<f32>,
     /// What one unit of each of the network's outputs is: ahead, to the left [m/s], yaw rate [rad/s], and in the
-    /// sensors speed [m/s] and yaw rate [rad/s].
+    /// sensors speed [m/s], yaw rate [rad/s] and speed to the left [m/s].
     pub(super) unit: [f32; N_QUANTITIES],
 }
 
@@ -162,7 +162,10 @@ impl Scaling {
         let unit = std::array::from_fn(|quantity| {
             let place = last + quantity;
             let values: Vec<f32> = examples.residuals.chunks(PER_START).map(|own| own[place]).collect();
-            let size = root_mean_square(&values).max(1.0) as f32 * examples.sigma[place];
+            let size = match examples.per_sigma[place] {
+                0.0 => 0.0,
+                per_sigma => root_mean_square(&values).max(1.0) as f32 / per_sigma,
+            };
             if quantity < 3 { size / horizon_s } else { size }
         });
         Self { per_spread: per_spread.collect(), centre, unit }

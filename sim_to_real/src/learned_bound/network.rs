@@ -1,8 +1,8 @@
 //! The network in Candle: features to corrections, corrections to residuals, and its training.
 
 use super::features::{CORRECTION_S, Examples, N_CORRECTIONS, N_FEATURES, ROWS_PER_CORRECTION, Scaling};
-use crate::drive::HORIZONS;
-use crate::rollout::{N_QUANTITIES, PER_START};
+use crate::drive::{HORIZONS, N_QUANTITIES};
+use crate::rollout::PER_START;
 use candle_core::{D, Device, Result, Tensor, Var};
 use candle_nn::{AdamW, Optimizer, ParamsAdamW};
 use rand::seq::SliceRandom;
@@ -92,7 +92,8 @@ impl RolloutSums {
     /// with the corrected yaw.
     fn outcomes(&self, corrections: &Tensor, batch: &Batch) -> Result<Tensor> {
         let of = |quantity: usize| corrections.narrow(2, quantity, 1)?.squeeze(2);
-        let [ahead, left, yaw_rate, seen_speed, seen_yaw_rate] = [of(0)?, of(1)?, of(2)?, of(3)?, of(4)?];
+        let [ahead, left, yaw_rate] = [of(0)?, of(1)?, of(2)?];
+        let [seen_speed, seen_yaw_rate, seen_side_speed] = [of(3)?, of(4)?, of(5)?];
         let turn = (&batch.turn + yaw_rate.matmul(&self.turn)?)?;
         let (sine, cosine) = (turn.sin()?, turn.cos()?);
         let speed = (&batch.speed + &ahead)?;
@@ -106,6 +107,7 @@ impl RolloutSums {
             yaw_rate.matmul(&self.until)?,
             (ahead + seen_speed)?.matmul(&self.at)?,
             (yaw_rate + seen_yaw_rate)?.matmul(&self.at)?,
+            (left + seen_side_speed)?.matmul(&self.at)?,
         ];
         // [rollouts, horizons, quantities], as the residuals stand.
         Tensor::stack(&changes, D::Minus1)?.flatten_from(1)
@@ -180,7 +182,7 @@ impl Batch {
             is_measured: residuals.ne(0.0)?.to_dtype(residuals.dtype())?,
             residuals,
             unit: vector(scaling.unit.to_vec())?,
-            per_sigma: vector(examples.sigma.iter().map(|sigma| 1.0 / sigma).collect())?,
+            per_sigma: vector(examples.per_sigma.clone())?,
         })
     }
 }
@@ -240,7 +242,7 @@ mod tests {
                 .flat_map(|&own| (0..PER_START).map(move |i| (own, i)))
                 .map(|(a, i)| residual(a, i))
                 .collect(),
-            sigma: vec![0.1; PER_START],
+            per_sigma: vec![10.0; PER_START],
         }
     }
 
@@ -251,12 +253,12 @@ mod tests {
         let examples = straight(1, |_, _| 1.0);
         let batch = Batch::of(&examples, &Scaling::of(&examples), &[0]).unwrap();
         let w = 0.3_f32;
-        let values: Vec<f32> = (0..N_CORRECTIONS).flat_map(|_| [0.0, 0.0, w, 0.0, 0.0]).collect();
+        let values: Vec<f32> = (0..N_CORRECTIONS).flat_map(|_| [0.0, 0.0, w, 0.0, 0.0, 0.0]).collect();
         let corrections = Tensor::from_vec(values, (1, N_CORRECTIONS, N_QUANTITIES), &Device::Cpu).unwrap();
         let outcomes = RolloutSums::new().unwrap().outcomes(&corrections, &batch).unwrap();
         let outcomes: Vec<f32> = outcomes.flatten_all().unwrap().to_vec1().unwrap();
         let turn = w * 2.0;
-        let expected = [2.0 * turn.sin() / w - 4.0, 2.0 * (1.0 - turn.cos()) / w, turn, 0.0, w];
+        let expected = [2.0 * turn.sin() / w - 4.0, 2.0 * (1.0 - turn.cos()) / w, turn, 0.0, w, 0.0];
         for (found, expected) in outcomes[PER_START - N_QUANTITIES..].iter().zip(expected) {
             assert!((found - expected).abs() < 2e-3, "{outcomes:?}");
         }

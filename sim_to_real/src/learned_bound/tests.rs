@@ -5,7 +5,7 @@ use super::best_training;
 use super::features::{CORRECTION_S, Examples, N_CORRECTIONS, N_FEATURES, Scaling};
 use super::network::{Trained, fitted};
 use crate::comparison::root_mean_square;
-use crate::drive::HORIZONS;
+use crate::drive::{HORIZONS, N_QUANTITIES};
 use crate::rollout::PER_START;
 use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
@@ -13,8 +13,9 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 
 /// The place of the speed among the features.
 const SPEED: usize = 13;
-/// Standard deviations of what is compared: two displacements [m], turn [rad], speed [m/s], yaw rate [rad/s].
-const SIGMA: [f32; 5] = [0.05, 0.05, 0.02, 0.03, 0.02];
+/// Standard deviations of what is compared: two displacements [m], turn [rad], speed [m/s], yaw rate [rad/s], speed
+/// to the left [m/s].
+const SIGMA: [f32; N_QUANTITIES] = [0.05, 0.05, 0.02, 0.03, 0.02, 0.03];
 
 /// Rollouts straight on at speeds of 1 to 3 m/s on a machine that turns by `yaw_rate(speed)` where the model goes
 /// straight; measured with noise.
@@ -24,7 +25,7 @@ fn bent(n: usize, seed: u64, yaw_rate: impl Fn(f32) -> f32) -> Examples {
         features: Vec::new(),
         foretold: [Vec::new(), Vec::new()],
         residuals: Vec::new(),
-        sigma: SIGMA.repeat(HORIZONS.len()),
+        per_sigma: SIGMA.map(|sigma| 1.0 / sigma).repeat(HORIZONS.len()),
     };
     for _ in 0..n {
         let speed = random.random_range(1.0..3.0_f32);
@@ -46,8 +47,8 @@ fn bent(n: usize, seed: u64, yaw_rate: impl Fn(f32) -> f32) -> Examples {
             } else {
                 [speed * turn.sin() / rate, speed * (1.0 - turn.cos()) / rate]
             };
-            let measured = [along, across, turn, speed, rate];
-            let foretold = [speed * time_s, 0.0, 0.0, speed, 0.0];
+            let measured = [along, across, turn, speed, rate, 0.0];
+            let foretold = [speed * time_s, 0.0, 0.0, speed, 0.0, 0.0];
             for ((measured, foretold), sigma) in measured.into_iter().zip(foretold).zip(SIGMA) {
                 let noise: f32 = StandardNormal.sample(&mut random);
                 examples.residuals.push((foretold - measured) / sigma + noise);

@@ -113,6 +113,13 @@ impl<'a> Signals<'a> {
         self.position_m.map(|[x, y]| ((x[to] - x[from]) * cosine + (y[to] - y[from]) * sine).abs())
     }
 
+    /// Velocity across the yaw half way, to the left [m/s].
+    pub(super) fn moved_left_mps(&self, from: usize, to: usize) -> Option<f64> {
+        let (sine, cosine) = self.yaw?.values[usize::midpoint(from, to)].sin_cos();
+        let duration_s = self.time_s[to] - self.time_s[from];
+        self.position_m.map(|[x, y]| ((y[to] - y[from]) * cosine - (x[to] - x[from]) * sine) / duration_s)
+    }
+
     /// Yaw rate, measured or from the yaw over windows of a fifth of a second.
     pub(super) fn turning_radps(&self) -> Option<Vec<f64>> {
         if let Some(yaw_rate) = self.yaw_rate {

@@ -1,5 +1,6 @@
 //! Mirrored signs and axes: two measurements of the same turn against each other.
 
+use bicycle::Column;
 use std::f64::consts::{PI, TAU};
 
 use super::Machine;
@@ -23,6 +24,7 @@ pub(super) fn check(runs: &[Signals<'_>], machine: &Machine) -> Vec<Suspicion> {
     if found.is_empty() {
         found.extend(steering(runs, machine));
         found.extend(offset(runs));
+        found.extend(side_speed(runs));
     }
     found
 }
@@ -108,6 +110,18 @@ fn offset(runs: &[Signals<'_>]) -> Option<Suspicion> {
     let offset_rad =
         wrapped(mean + quantile(offsets.iter().map(|offset| wrapped(offset - mean)).collect(), 0.5));
     (enough && offset_rad.abs() > OFFSET_MAX_RAD).then_some(Suspicion::YawOffset { offset_rad })
+}
+
+/// Velocity to the left, as it is told and as the path has it.
+fn side_speed(runs: &[Signals<'_>]) -> Option<Suspicion> {
+    let pairs = Pairs::of(runs.iter().flat_map(|run| {
+        let told = run.run.column(Column::Vy);
+        let both = move |(from, to)| Some((told?[usize::midpoint(from, to)], run.moved_left_mps(from, to)?));
+        run.windows().filter_map(both)
+    }));
+    let correlation = pairs.correlation();
+    let is_told = pairs.are_enough() && correlation < -SURE;
+    is_told.then_some(Suspicion::SideSpeedAgainstPath { correlation })
 }
 
 fn wrapped(angle: f64) -> f64 {

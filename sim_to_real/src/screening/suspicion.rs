@@ -184,6 +184,15 @@ pub enum Suspicion {
         /// Correlation of their turns [-].
         correlation: f64,
     },
+    /// The velocity to the left is not that of the path.
+    #[error(
+        "vy: expected the velocity to the left of where x and y are, found it against the path, correlation \
+         {correlation:.2}: mirrored, or of another place on the vehicle?"
+    )]
+    SideSpeedAgainstPath {
+        /// Correlation with the path's motion across the yaw [-].
+        correlation: f64,
+    },
     /// The vehicle does not move where its nose points.
     #[error(
         "yaw: expected the direction of motion, found it {offset_rad:.2} rad off: counted from another axis?"
@@ -295,6 +304,7 @@ impl Suspicion {
             | Self::Leap { .. }
             | Self::Reset { .. }
             | Self::YawLeap { .. }
+            | Self::SideSpeedAgainstPath { .. }
             | Self::Frozen { .. }
             | Self::Stalled { .. }
             | Self::BeyondLimit { .. }

@@ -313,6 +313,31 @@ fn axes_against_each_other_are_told() {
     assert!(turned.starts_with("yaw: expected the direction of motion, found it -1.57 rad off"), "{turned}");
 }
 
+/// The drive with tyres that slip by 0.02 s2/m, and a sideways velocity told with a sign.
+fn slipping(sign: f64) -> DriveLog {
+    let [mut east, mut north] = [0.0; 2];
+    let mut slip = |row: &DriveRow| {
+        let [speed, yaw_rate, yaw] = [Column::Vx, Column::Wz, Column::Yaw].map(|column| row.value(column));
+        let left_mps = -0.02 * speed * speed * yaw_rate;
+        let [x, y] = [row.value(Column::X) + east, row.value(Column::Y) + north];
+        east -= left_mps * yaw.sin() * STEP_S;
+        north += left_mps * yaw.cos() * STEP_S;
+        row.with(Column::X, x).with(Column::Y, y).with(Column::Vy, sign * left_mps)
+    };
+    log(&rows(1000).iter().map(&mut slip).collect::<Vec<_>>())
+}
+
+#[test]
+fn a_sideways_velocity_against_the_path_is_doubted() {
+    assert_eq!(screen(&machine(), &slipping(1.0)), []);
+    let mirrored = screen(&machine(), &slipping(-1.0));
+    assert!(
+        matches!(mirrored[..], [Suspicion::SideSpeedAgainstPath { correlation }] if correlation < -0.9),
+        "{mirrored:?}"
+    );
+    assert_eq!(mirrored[0].gravity(), Gravity::Doubtful);
+}
+
 #[test]
 fn reverse_driving_is_not_an_offset() {
     let reverse = |row: &DriveRow| {

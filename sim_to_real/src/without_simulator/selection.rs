@@ -5,7 +5,7 @@ use crate::answer::Ranked;
 use crate::baseline::Baseline;
 use crate::calibration::is_limit;
 use crate::causes::{Explanation, Trial};
-use crate::comparison::{Comparison, Yardstick, root_mean_square};
+use crate::comparison::{Comparison, Yardstick, rollout_error};
 use crate::evidence::SpeedInput;
 use crate::machine::Machine;
 use bicycle::Effect;
@@ -37,12 +37,13 @@ const FORCES: [&str; 12] = [
 ];
 /// Shapes that tell a calibrated machine more finely than effects that are sought anyway: few drives without a simulator
 /// do not tell the one from the other.
-const FINER: [&str; 8] = [
+const FINER: [&str; 9] = [
     "steer_servo",
     "limited_servo",
     "steer_swing",
     "yaw_load",
     "rear_steer",
+    "tyre_slip",
     "speed_ramp",
     "wheel_slip",
     "felt_slope",
@@ -287,6 +288,6 @@ impl Selection {
             residuals[0].extend(trial.residuals(&[]));
             residuals[1].extend(trial.residuals(causes));
         }
-        residuals.map(|residuals| root_mean_square(&residuals))
+        residuals.map(|residuals| rollout_error(&residuals))
     }
 }
