@@ -73,7 +73,7 @@ class Car:
         self.acceleration_mps2 = [0.0, 0.0]
 
     def measured(self) -> Row:
-        """x, y [m], yaw [rad], speed [m/s], yaw rate [rad/s], speed to the left [m/s] at the middle of the rear axle."""
+        """x, y [m], yaw [rad], speed [m/s], yaw rate [rad/s], speed to the left [m/s] at mid rear axle."""
         sine, cosine = math.sin(self.yaw_rad), math.cos(self.yaw_rad)
         x_m, y_m = self.x_m - self.rear_m * cosine, self.y_m - self.rear_m * sine
         left_mps = self.left_mps - self.rear_m * self.yaw_rate_radps

@@ -113,7 +113,7 @@ class Car:
         mujoco.mj_forward(self.model, self.data)
 
     def measured(self) -> Row:
-        """x, y [m], yaw [rad], speed [m/s], yaw rate [rad/s], speed to the left [m/s] at the middle of the rear axle."""
+        """x, y [m], yaw [rad], speed [m/s], yaw rate [rad/s], speed to the left [m/s] at mid rear axle."""
         rotation = self.data.xmat[self.chassis].reshape(3, 3)
         speed_mps, left_mps, _ = (float(axis @ self.data.qvel[:3]) for axis in rotation.T)
         yaw_rad = math.atan2(rotation[1, 0], rotation[0, 0])

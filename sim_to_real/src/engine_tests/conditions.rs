@@ -3,10 +3,11 @@
 use super::normal;
 use crate::answer::Condition;
 use crate::conditions::{MEASURED, StartRecord, Window, condition_tables, places, with_announced};
-use crate::drive::N_QUANTITIES;
+use crate::drive::{N_QUANTITIES, VY};
 use crate::findings::ConditionTable;
 
-/// Records whose residuals are noise and, in their first quantity, a function of the conditions' values.
+/// Records whose residuals are noise and, in their first quantity, a function of the conditions' values; without a speed to
+/// the left.
 pub(super) fn records(
     n: usize,
     seed: u64,
@@ -17,7 +18,8 @@ pub(super) fn records(
         let mut values: [f64; MEASURED.len()] = std::array::from_fn(|_| noise());
         let class = MEASURED.iter().position(|own| *own == Condition::TerrainClass).unwrap();
         values[class] = (1.5 * values[class].abs()).floor().min(2.0);
-        let mut residuals: [f64; N_QUANTITIES] = std::array::from_fn(|_| noise());
+        let mut residuals: [f64; N_QUANTITIES] =
+            std::array::from_fn(|quantity| if quantity == VY { 0.0 } else { noise() });
         residuals[0] += residual(&values);
         Window { values, residual: residuals }
     };
@@ -140,9 +142,9 @@ fn every_class_has_its_own_bin() {
     let real = records(600, 11, |values| if values[class] == 1.0 { 4.0 } else { 0.0 });
     let tables = condition_tables(&real, &records(600, 12, |_| 0.0));
     assert_eq!(tables[0].condition, Condition::TerrainClass);
-    // Five quantities of variance 1, and 16 in the middle.
+    // Five quantities of six of variance 1, and 16 in the middle.
     let squares: Vec<f64> = tables[0].bins.iter().map(|bin| bin.mean_square).collect();
-    let expected = [1.0, 21.0 / 5.0, 1.0];
+    let expected = [5.0 / 6.0, 21.0 / 6.0, 5.0 / 6.0];
     assert!(squares.iter().zip(expected).all(|(own, expected)| (own - expected).abs() < 0.2), "{squares:?}");
     assert_eq!(tables[0].bins.iter().map(|bin| bin.low).collect::<Vec<f64>>(), [-0.5, 0.5, 1.5]);
 }
