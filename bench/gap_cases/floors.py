@@ -25,7 +25,7 @@ def noise_of(vehicle: Path) -> dict[str, float]:
 
 
 def floors_of(answer: dict, noise: dict[str, float]) -> dict[str, float]:
-    """Median over the five quantities of the error and horizons, and what is shown at the last one, in standard deviations of the noise."""
+    """Median over the error's five quantities and horizons, and what is shown at the last, in deviations of the noise."""
     rows = [row for row in answer["errors_by_quantity"] if row["quantity"] in QUANTITIES]
     ratios = {(row["quantity"], row["horizon_s"]): row["floor"] / noise[QUANTITIES[row["quantity"]]] for row in rows}
     shown = {name: ratios[quantity, LAST_S] for name, quantity in SHOWN.items()}

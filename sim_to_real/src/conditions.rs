@@ -55,6 +55,15 @@ pub(crate) struct Window {
     pub(crate) residual: [f64; N_QUANTITIES],
 }
 
+impl Window {
+    /// Mean squared residual of the quantities that were measured, if any was.
+    fn mean_square(&self) -> Option<f64> {
+        let squares = self.residual.iter().filter(|value| **value != 0.0).map(|value| value * value);
+        let squares: Vec<f64> = squares.collect();
+        (!squares.is_empty()).then(|| mean(&squares))
+    }
+}
+
 impl StartRecord {
     /// One record per start of every drive, in the order of the residuals.
     pub(crate) fn of(drives: &[&Drive], residuals: &[f32]) -> Vec<Self> {
@@ -150,7 +159,7 @@ fn condition_table(place: usize, real: &[StartRecord], null: &[StartRecord]) -> 
     let bins = edges.windows(2).enumerate().map(|(bin, edge)| {
         let inside = |records: &[StartRecord]| {
             let own = windows(records).filter(|window| bin_of(window.values[place], &edges) == bin);
-            own.map(|window| mean(&window.residual.map(|value| value * value))).collect::<Vec<f64>>()
+            own.filter_map(Window::mean_square).collect::<Vec<f64>>()
         };
         let (own, nominal) = (inside(real), inside(null));
         ConditionBin {

@@ -142,9 +142,9 @@ fn every_class_has_its_own_bin() {
     let real = records(600, 11, |values| if values[class] == 1.0 { 4.0 } else { 0.0 });
     let tables = condition_tables(&real, &records(600, 12, |_| 0.0));
     assert_eq!(tables[0].condition, Condition::TerrainClass);
-    // Five quantities of six of variance 1, and 16 in the middle.
+    // Five quantities of variance 1, and 16 in the middle.
     let squares: Vec<f64> = tables[0].bins.iter().map(|bin| bin.mean_square).collect();
-    let expected = [5.0 / 6.0, 21.0 / 6.0, 5.0 / 6.0];
+    let expected = [1.0, 21.0 / 5.0, 1.0];
     assert!(squares.iter().zip(expected).all(|(own, expected)| (own - expected).abs() < 0.2), "{squares:?}");
     assert_eq!(tables[0].bins.iter().map(|bin| bin.low).collect::<Vec<f64>>(), [-0.5, 0.5, 1.5]);
 }
