@@ -22,6 +22,16 @@ pub enum Verdict {
     Unknown,
 }
 
+impl Verdict {
+    /// With something more that is none of the catalogue.
+    pub(crate) fn with_unknown(self) -> Self {
+        match self {
+            Self::None | Self::Unknown => Self::Unknown,
+            Self::Effects | Self::EffectsAndUnknown => Self::EffectsAndUnknown,
+        }
+    }
+}
+
 /// A value with its 90 % interval.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Estimate {
@@ -106,6 +116,9 @@ pub struct Support {
     pub least_strength: f64,
     /// How much of it the simulator's own drives ask for, which do not have it: in [-1, 1].
     pub nominal: f64,
+    /// Logarithm of how many times as probable it makes how the body leans; 0 where roll and pitch say nothing of it.
+    #[serde(default)]
+    pub attitude: f64,
 }
 
 /// A condition under which a residual may stand out.

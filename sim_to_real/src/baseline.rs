@@ -1,6 +1,7 @@
 //! What is known before the real drives are opened: the calibrated nominal model, its noise, and how much of a gap one
 //! nominal drive shows against the others.
 
+use crate::attitude::{AttitudeEvidence, AttitudeModel};
 use crate::calibration::{calibrated, proportional, recalibrated};
 use crate::causes::Trial;
 use crate::comparison::{Comparison, Yardstick, rollout_error};
@@ -13,6 +14,7 @@ use crate::least_squares::mean_loss;
 use crate::limits_shown::LimitsShown;
 use crate::machine::Machine;
 use crate::nuisance::Information;
+use crate::periodic::YawResponse;
 use crate::residual_table::residual_cells;
 use crate::score_test::{Chance, TriedScores, tried_scores};
 use crate::whitening::Whitening;
@@ -56,6 +58,10 @@ pub struct Baseline {
     pub(crate) yardstick: Yardstick,
     pub(crate) whitening: Whitening,
     pub(crate) experience: Experience,
+    /// Where the drives tell it.
+    pub(crate) attitude: Option<AttitudeModel>,
+    /// Where the drives tell it.
+    pub(crate) yaw_response: Option<YawResponse>,
     pub(crate) null: Null,
 }
 
@@ -111,7 +117,17 @@ impl Baseline {
         let left_out: Vec<LeftOut> = folds.into_iter().map(judged).collect();
         let null = Null::of(&left_out, LimitsShown::of(&nominal));
         let proportional = proportional(wheelbase_m, &all, &yardstick);
-        Ok(Self { wheelbase_m, effects, proportional, yardstick, whitening, experience, null })
+        Ok(Self {
+            wheelbase_m,
+            effects,
+            proportional,
+            yardstick,
+            whitening,
+            experience,
+            attitude: AttitudeModel::of(&all),
+            yaw_response: YawResponse::of(wheelbase_m, &all),
+            null,
+        })
     }
 
     /// Other drives against the calibrated model, which gives way to them as far as nominal drives let it.
@@ -122,6 +138,11 @@ impl Baseline {
     /// Other drives against the calibrated model as it is.
     pub(crate) fn held_trial<'a>(&'a self, drives: &[&'a Drive]) -> Trial<'a> {
         Trial::fixed(self.comparison(drives), &self.effects)
+    }
+
+    /// What roll and pitch of other drives say of forces.
+    pub(crate) fn attitude_evidence(&self, drives: &[&Drive]) -> AttitudeEvidence {
+        self.attitude.as_ref().map_or_else(AttitudeEvidence::default, |model| model.evidence(drives))
     }
 
     fn comparison<'a>(&'a self, drives: &[&'a Drive]) -> Comparison<'a> {

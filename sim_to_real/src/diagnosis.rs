@@ -1,6 +1,7 @@
 //! The diagnosis: which effects separate the real drives from the calibrated nominal model.
 
-use crate::answer::{Answer, NamedEffect, PartEstimate, Ranked, SCHEMA_VERSION, Shrink, Verdict};
+use crate::answer::{Answer, NamedEffect, PartEstimate, Ranked, SCHEMA_VERSION, Shrink, Support, Verdict};
+use crate::attitude::AttitudeEvidence;
 use crate::baseline::{Baseline, GapError, drives_of};
 use crate::causes::{Explanation, Trial};
 use crate::comparison::rollout_error;
@@ -63,15 +64,24 @@ pub fn diagnose(baseline: &Baseline, machine: &Machine, real: &[DriveLog]) -> Re
     let before = trial.residuals(&[]);
     let cross_validation = CrossValidation::of(&drives);
     let splits = cross_validation.splits(|drives| baseline.trial(drives));
-    let weighed = weighed(baseline, &trial, &splits);
+    let attitude = baseline.attitude_evidence(&all);
+    let weighed = weighed(baseline, &trial, &splits, attitude);
     let mut judgement = weighed.judge(&baseline.null);
     let causes = judgement.announced.clone();
     let mut notes = of_evidence(&all);
     if drives.len() > 1
         && let Some(changing) = changing(baseline, &drives, &in_question(&weighed, &causes))
     {
-        judgement.verdict = if causes.is_empty() { Verdict::Unknown } else { Verdict::EffectsAndUnknown };
+        judgement.verdict = judgement.verdict.with_unknown();
         notes.push(changing.told());
+    }
+    if let Some(leaning) = weighed.attitude.leaning(&causes) {
+        judgement.verdict = judgement.verdict.with_unknown();
+        notes.push(leaning_told(leaning));
+    }
+    if let Some(swing) = baseline.yaw_response.as_ref().and_then(|response| response.swing(&all)) {
+        judgement.verdict = judgement.verdict.with_unknown();
+        notes.push(swing.told());
     }
     let after = trial.residuals(&causes);
     let (own, repaired) = (StartRecord::of(&all, &before), StartRecord::of(&all, &after));
@@ -120,20 +130,26 @@ pub(crate) fn closed(floor: f64, before: f64, after: f64) -> Option<f64> {
     (before >= GAP_IN_FLOORS * floor).then(|| (before - after) / (before - floor))
 }
 
-fn weighed(baseline: &Baseline, trial: &Trial<'_>, splits: &[Split<'_>]) -> Weighed {
+fn weighed(
+    baseline: &Baseline,
+    trial: &Trial<'_>,
+    splits: &[Split<'_>],
+    attitude: AttitudeEvidence,
+) -> Weighed {
     let screened = Screened::of(trial);
     let before = screened.nothing();
     let none = Explanation::new(Vec::new(), mean_loss(before));
     let supported = |explanation: Explanation| {
         let support = baseline.null.chance.support((trial, before), &explanation, none.loss);
+        let support = Support { attitude: attitude.support(&explanation.causes), ..support };
         Single { explanation, support }
     };
     let singles = foretold(splits, screened.singles()).into_iter().map(supported).collect();
     let numbers_ratio = trial.comparison.numbers_ratio();
-    let mut weighed = Weighed { none, pairs: Vec::new(), singles, numbers_ratio };
+    let mut weighed = Weighed { none, pairs: Vec::new(), singles, numbers_ratio, attitude };
     if weighed.may_hold_pairs(&baseline.null) {
-        weighed.pairs =
-            foretold(splits, screened.pairs(weighed.singles.iter().map(|single| &single.explanation)));
+        let explanations = weighed.singles.iter().map(|single| &single.explanation);
+        weighed.pairs = foretold(splits, screened.pairs(explanations, &weighed.told_by_attitude()));
     }
     weighed
 }
@@ -147,6 +163,21 @@ fn in_question(weighed: &Weighed, announced: &[Effect]) -> Vec<Vec<Effect>> {
         explanations.push(announced.to_vec());
     }
     explanations
+}
+
+/// In words, of pitch (nose down) and roll (left side up) [rad].
+fn leaning_told([pitch_rad, roll_rad]: [f64; 2]) -> String {
+    let told = |angle_rad: f64, [positive, negative]: [&str; 2]| {
+        let way = if angle_rad > 0.0 { positive } else { negative };
+        (angle_rad != 0.0).then(|| format!("{:.2} deg further {way}", angle_rad.abs().to_degrees()))
+    };
+    let ways = [told(pitch_rad, ["nose down", "nose up"]), told(roll_rad, ["to its right", "to its left"])];
+    let ways: Vec<String> = ways.into_iter().flatten().collect();
+    format!(
+        "the robot's body stands {} than the simulator's on the same ground under the same accelerations, in every drive, \
+         and no cause that is named says why: a spring, a load, a force that it pulls against, or how the sensor is mounted",
+        ways.join(" and ")
+    )
 }
 
 /// What is closed on each real drive by the parameters that the others give.

@@ -1,6 +1,7 @@
 //! A drive made ready for comparison with rollouts: an even time axis, inputs as they were held, smooth states to
 //! start from, and the ground on the way.
 
+use crate::attitude::{Block, Rows, blocks};
 use crate::evidence::{Evidence, SpeedInput};
 use crate::ground::ground_on_the_way;
 use crate::machine::Machine;
@@ -82,6 +83,8 @@ pub(crate) struct Drive {
     pub(crate) travelled: [Vec<f64>; 2],
     /// Rows from which rollouts start.
     pub(crate) starts: Vec<usize>,
+    /// How the body stands second by second; none where roll, pitch or the ground is not known, and none of a stretch.
+    pub(crate) attitude: Vec<Block>,
 }
 
 /// Indices into [`Drive::measured`].
@@ -106,11 +109,16 @@ impl Drive {
         if starts.is_empty() {
             return Err(DriveError::Holes { run: name, needed_s: (span.settled + N_STEPS) as f64 * STEP_S });
         }
+        let attitude = signals.attitude();
+        let (gradient, class) = ground_on_the_way(&smooth, &attitude, machine);
+        let attitude = attitude.filter(|_| machine.ground.is_some()).map(|attitude| {
+            let (measured, smooth, gradient) = (&measured, &smooth, &gradient);
+            blocks(&Rows { attitude: &attitude, measured, smooth, gradient, class: &class }, span.settled)
+        });
         if evidence.speed_input == SpeedInput::Measured {
             // What drives the model is no test of it.
             measured[VX].fill(f64::NAN);
         }
-        let (gradient, class) = ground_on_the_way(&smooth, signals.attitude(), machine);
         let mut drive = Self {
             name,
             time_s: run.time_s()[0],
@@ -122,6 +130,7 @@ impl Drive {
             gradient,
             class,
             starts,
+            attitude: attitude.unwrap_or_default(),
         };
         drive.extend_to(span.end + N_STEPS);
         Ok(drive)
@@ -163,6 +172,7 @@ impl Drive {
             class: self.class[rows.clone()].to_vec(),
             travelled: self.travelled.each_ref().map(|values| values[rows.clone()].to_vec()),
             starts: starts.iter().map(|start| start - from).collect(),
+            attitude: Vec::new(),
         }
     }
 

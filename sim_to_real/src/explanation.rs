@@ -95,28 +95,35 @@ impl<'a, 'b> Screened<'a, 'b> {
 
     /// The best pair that holds one of the best singles.
     pub(crate) fn best_pair(&self, singles: &[Explanation]) -> Option<Explanation> {
-        self.pairs(singles.iter()).into_iter().next()
+        self.pairs(singles.iter(), &[]).into_iter().next()
     }
 
-    /// Pairs that hold one of the best singles, the best of them fitted together, best first.
-    pub(crate) fn pairs<'s>(&self, singles: impl Iterator<Item = &'s Explanation>) -> Vec<Explanation> {
+    /// Pairs that hold one of the best singles, the best of them fitted together, best first; causes that are `told` are
+    /// sought as seconds whatever they promise.
+    pub(crate) fn pairs<'s>(
+        &self,
+        singles: impl Iterator<Item = &'s Explanation>,
+        told: &[&str],
+    ) -> Vec<Explanation> {
         let firsts = singles.take(N_FIRSTS);
-        let mut pairs = sorted(firsts.flat_map(|first| self.with_a_second(first)).collect());
+        let mut pairs = sorted(firsts.flat_map(|first| self.with_a_second(first, told)).collect());
         pairs.dedup_by_key(|pair| {
             let mut ids = pair.ids();
             ids.sort_unstable();
             ids
         });
-        pairs.truncate(N_REFINED);
-        sorted(pairs.into_iter().map(|pair| self.trial.refined(pair)).collect())
+        let is_told = |pair: &Explanation| pair.ids().last().is_some_and(|second| told.contains(second));
+        let kept = pairs.into_iter().enumerate().filter(|(rank, pair)| *rank < N_REFINED || is_told(pair));
+        sorted(kept.map(|(_, pair)| self.trial.refined(pair)).collect())
     }
 
-    /// An explanation with each of the other effects added that promise most beside it.
-    fn with_a_second(&self, first: &Explanation) -> Vec<Explanation> {
+    /// An explanation with each of the other effects added that are told, or promise most beside it.
+    fn with_a_second(&self, first: &Explanation, told: &[&str]) -> Vec<Explanation> {
         let known = first.ids();
         let promising = self.by_promise(&self.trial.judged_residuals(&first.causes)).into_iter();
-        let others = promising.filter(|own| !known.contains(&own.description.cause)).take(N_SECONDS);
-        others.filter_map(|own| self.trial.with_one_more(&first.causes, own.description)).collect()
+        let others = promising.filter(|own| !known.contains(&own.description.cause)).enumerate();
+        let sought = others.filter(|(rank, own)| *rank < N_SECONDS || told.contains(&own.description.cause));
+        sought.filter_map(|(_, own)| self.trial.with_one_more(&first.causes, own.description)).collect()
     }
 }
 

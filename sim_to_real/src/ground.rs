@@ -2,6 +2,7 @@
 
 use crate::drive::{N_QUANTITIES, X, Y, YAW};
 use crate::machine::{GroundMap, Machine};
+use crate::signals::filled;
 use crate::smoothing::smoothed;
 
 /// Rise per metre east and north, and class, row by row.
@@ -10,13 +11,13 @@ pub(crate) type GroundOnTheWay = ([Vec<f32>; 2], Vec<f32>);
 /// From the map under the measured positions; without a map from the measured attitude; without both, level.
 pub(crate) fn ground_on_the_way(
     smooth: &[Vec<f64>; N_QUANTITIES],
-    attitude: [Option<Vec<f64>>; 2],
+    attitude: &Option<[Vec<f64>; 2]>,
     machine: &Machine,
 ) -> GroundOnTheWay {
     let n = smooth[X].len();
     let mut gradient = [vec![0.0; n], vec![0.0; n]];
     let mut class = vec![0.0; n];
-    let attitude = attitude.map(|values| values.map(|values| smoothed(&values)));
+    let attitude = attitude.as_ref().map(|angles| angles.each_ref().map(|values| smoothed(&filled(values))));
     for row in 0..n {
         let yaw = smooth[YAW][row];
         let slope = match (&machine.ground, &attitude) {
@@ -25,7 +26,7 @@ pub(crate) fn ground_on_the_way(
                 class[row] = f32::from(ground.class_at(position));
                 ground.slope(position, yaw, machine.wheelbase_m)
             }
-            (None, [Some(roll), Some(pitch)]) => [-pitch[row].tan(), roll[row].tan()],
+            (None, Some([roll, pitch])) => [-pitch[row].tan(), roll[row].tan()],
             _ => [0.0; 2],
         };
         let (sine, cosine) = yaw.sin_cos();

@@ -2,6 +2,7 @@
 //! 1974), a second effect adds to that of the first what it gains beyond its price; the most probable explanation wins.
 
 use crate::answer::{Ranked, Support, Verdict};
+use crate::attitude::AttitudeEvidence;
 use crate::baseline::Null;
 use crate::causes::{Explanation, candidates};
 use bicycle::Effect;
@@ -38,6 +39,9 @@ const PAIRS_ABOVE_NULLS: f64 = 0.9;
 /// A second effect must take this share of the whole loss off what the best single leaves: the form of the first is true to
 /// some hundredths of what it explains, and another effect mends the rest of it.
 const SHARE_OF_A_SECOND: f64 = 0.02;
+/// One of less is a second all the same where the body's attitude makes it so many times as probable (the logarithm of that):
+/// no form of another effect leans on the springs.
+const TOLD_BY_ATTITUDE: f64 = 3.0;
 
 /// An effect alone.
 pub(crate) struct Single {
@@ -58,6 +62,7 @@ pub(crate) struct Weighed {
     pub(crate) pairs: Vec<Explanation>,
     /// Of the drives: [`crate::comparison::Comparison::numbers_ratio`].
     pub(crate) numbers_ratio: f64,
+    pub(crate) attitude: AttitudeEvidence,
 }
 
 /// The verdict with what led to it.
@@ -70,9 +75,16 @@ pub(crate) struct Judgement {
 
 /// Logarithm of how many times as probable as none a single effect is.
 fn logit(support: &Support) -> f64 {
-    let Support { gain, strength, least_strength, nominal } = support;
+    let Support { gain, strength, least_strength, nominal, attitude } = support;
     let features = [gain.max(0.0).sqrt(), strength.ln_1p(), least_strength.ln_1p(), *nominal];
-    UNSUPPORTED + SUPPORT.iter().zip(features).map(|(weight, feature)| weight * feature).sum::<f64>()
+    UNSUPPORTED
+        + attitude
+        + SUPPORT.iter().zip(features).map(|(weight, feature)| weight * feature).sum::<f64>()
+}
+
+/// Of two explanations with their logits, the likelier.
+fn larger<'a>(a: (f64, &'a Explanation), b: (f64, &'a Explanation)) -> (f64, &'a Explanation) {
+    if b.0 > a.0 { b } else { a }
 }
 
 /// What a second effect must gain to be believed.
@@ -91,6 +103,12 @@ impl Weighed {
             self.numbers_ratio * (loss / least).ln() > PRICE_OF_TWO
                 && loss > SHARE_OF_A_SECOND * self.none.loss
         })
+    }
+
+    /// Causes that the body's attitude tells alone.
+    pub(crate) fn told_by_attitude(&self) -> Vec<&'static str> {
+        let told = self.singles.iter().filter(|single| single.support.attitude > TOLD_BY_ATTITUDE);
+        told.map(Single::cause).collect()
     }
 
     pub(crate) fn judge(&self, null: &Null) -> Judgement {
@@ -115,12 +133,16 @@ impl Weighed {
         let singles = self.singles.iter().map(|single| (logit(&single.support), &single.explanation));
         let mut all: Vec<(f64, &Explanation)> = singles.collect();
         if let Some(first) = self.singles.first() {
-            let of_one = all.iter().map(|(logit, _)| *logit).fold(f64::NEG_INFINITY, f64::max);
+            let (of_one, likeliest) = all.iter().copied().fold((f64::NEG_INFINITY, &self.none), larger);
+            let leans = |pair: &Explanation| {
+                self.attitude.support(&pair.causes) - self.attitude.support(&likeliest.causes)
+            };
             let of_two = |pair: &Explanation| {
                 let gain = self.numbers_ratio * (first.explanation.energy() - pair.energy());
-                of_one + (gain - price(pair, null)) / TEMPERATURE
+                of_one + (gain - price(pair, null)) / TEMPERATURE + leans(pair)
             };
-            let pairs = self.pairs.iter().filter(|pair| self.takes_its_share(pair));
+            let pairs =
+                self.pairs.iter().filter(|pair| self.takes_its_share(pair) || leans(pair) > TOLD_BY_ATTITUDE);
             all.extend(pairs.map(|pair| (of_two(pair), pair)));
         }
         all.push((0.0, &self.none));

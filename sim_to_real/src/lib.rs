@@ -15,6 +15,7 @@
 //! through steps 2 to 4.
 
 mod answer;
+mod attitude;
 mod baseline;
 mod calibration;
 mod causes;
@@ -44,6 +45,7 @@ mod machine;
 mod manoeuvre;
 mod nuisance;
 mod parts;
+mod periodic;
 mod pose_sensor;
 mod repair;
 mod residual_table;

@@ -172,6 +172,7 @@ impl Chance {
             strength: whole.strength(dispersion),
             least_strength: by_drive.iter().map(strength).fold(f64::INFINITY, f64::min),
             nominal: nominal.map_or(0.0, |nominal| nominal.amplitude),
+            attitude: 0.0,
         }
     }
 

@@ -79,10 +79,11 @@ impl<'a> Signals<'a> {
         smooth
     }
 
-    /// Roll and pitch, where there are any.
-    pub(crate) fn attitude(&self) -> [Option<Vec<f64>>; 2] {
-        [Column::Roll, Column::Pitch]
-            .map(|column| self.run.column(column).map(|_| filled(&self.interpolated(column))))
+    /// Roll and pitch, where there are both; NaN where they are missing.
+    pub(crate) fn attitude(&self) -> Option<[Vec<f64>; 2]> {
+        let columns = [Column::Roll, Column::Pitch];
+        let are_there = columns.iter().all(|column| self.run.column(*column).is_some());
+        are_there.then(|| columns.map(|column| self.interpolated(column)))
     }
 
     /// For each even step the last row at or before it.

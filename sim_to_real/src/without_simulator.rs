@@ -96,6 +96,8 @@ fn bare_baseline(machine: &Machine, drives: &[&Drive], yardstick: Yardstick) -> 
         yardstick,
         whitening: Whitening::none(),
         experience: Experience::none(),
+        attitude: None,
+        yaw_response: None,
         null,
     }
 }

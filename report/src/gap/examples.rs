@@ -14,7 +14,7 @@ use sim_to_real::{Answer, Findings, GroundMap, ResidualCell};
 pub(crate) fn answer() -> Answer {
     let estimate = Estimate { value: 0.21, low: 0.18, high: 0.24 };
     let parameters = BTreeMap::from([("time_constant_s".to_owned(), estimate)]);
-    let support = Support { gain: 0.8, strength: 9.3, least_strength: 8.1, nominal: 0.02 };
+    let support = Support { gain: 0.8, strength: 9.3, least_strength: 8.1, nominal: 0.02, attitude: 0.0 };
     let ranked = |(id, score): (&str, f64)| Ranked { id: id.to_owned(), score, support: Some(support) };
     let ranking = [("steer_lag", 0.93), ("steer_delay", 0.05), ("backlash", 0.01), ("understeer", 0.001)];
     Answer {

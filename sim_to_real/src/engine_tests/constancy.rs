@@ -32,6 +32,8 @@ fn bicycle() -> Baseline {
         yardstick: Yardstick::of(&noise, &rough),
         whitening: Whitening::none(),
         experience: Experience::none(),
+        attitude: None,
+        yaw_response: None,
         null,
     }
 }

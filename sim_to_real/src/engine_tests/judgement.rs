@@ -2,6 +2,8 @@
 
 use super::effect;
 use crate::answer::{Support, Verdict};
+use crate::attitude::AttitudeEvidence;
+use crate::attitude::tests::dragged;
 use crate::baseline::Null;
 use crate::causes::Explanation;
 use crate::judgement::{Judgement, Single, Weighed};
@@ -34,7 +36,7 @@ fn null() -> Null {
 fn single((id, value): (&str, f64), none: f64, loss: f64) -> Single {
     let gain = (none / loss).ln();
     let strength = 20.0 * gain.max(0.0).sqrt();
-    let support = Support { gain, strength, least_strength: 0.7 * strength, nominal: 0.0 };
+    let support = Support { gain, strength, least_strength: 0.7 * strength, nominal: 0.0, attitude: 0.0 };
     Single { explanation: Explanation::new(vec![effect(id, value)], loss), support }
 }
 
@@ -50,7 +52,8 @@ fn weighed(none: f64, losses: &[f64], pair: Option<f64>) -> Weighed {
 
 /// Of numbers that all robots have.
 fn of(none: f64, singles: Vec<Single>, pairs: Vec<Explanation>) -> Weighed {
-    Weighed { none: Explanation::new(Vec::new(), none), singles, pairs, numbers_ratio: 1.0 }
+    let attitude = AttitudeEvidence::default();
+    Weighed { none: Explanation::new(Vec::new(), none), singles, pairs, numbers_ratio: 1.0, attitude }
 }
 
 fn judged(none: f64, losses: &[f64], pair: Option<f64>) -> Judgement {
@@ -110,7 +113,8 @@ fn a_second_effect_has_its_own_price() {
 fn a_second_effect_does_not_make_up_for_a_first_that_nothing_supports() {
     let announced_of = |pair: f64| {
         let mut weighed = weighed(2.0, &[1.99, 2.0, 2.0, 2.0, 2.0], Some(pair));
-        weighed.singles[0].support = Support { gain: 0.0, strength: 0.0, least_strength: 0.0, nominal: 0.0 };
+        weighed.singles[0].support =
+            Support { gain: 0.0, strength: 0.0, least_strength: 0.0, nominal: 0.0, attitude: 0.0 };
         announced(&weighed.judge(&null())).len()
     };
     // 0.17 and 0.5 in the logarithm.
@@ -123,6 +127,32 @@ fn a_second_effect_does_not_make_up_for_a_first_that_nothing_supports() {
 fn a_second_effect_that_mends_the_first_is_none() {
     let announced_of = |none: f64| judged(none, &[0.94, 8.0, 68.0, 70.0, 72.0], Some(0.47)).announced.len();
     assert_eq!((announced_of(73.0), announced_of(20.0)), (1, 2));
+}
+
+/// Two effects that do the same to the rollouts are told apart by how the body leans, and one that hardly shows there is told.
+#[test]
+fn how_the_body_leans_tells_a_drag_from_a_scale_of_the_speed() {
+    let announced_of = |attitude: f64, loss: f64| {
+        let mut weighed = weighed(1.3, &[1.3, 1.3, 1.3, loss - 0.001, loss], None);
+        let drag = weighed.singles.iter_mut().find(|single| single.explanation.ids() == ["rolling_drag"]);
+        drag.unwrap().support.attitude = attitude;
+        weighed.judge(&null()).announced.first().map(|effect| effect.description().id)
+    };
+    assert_eq!((announced_of(0.0, 1.1), announced_of(5.0, 1.1)), (Some("speed_scale"), Some("rolling_drag")));
+    assert_eq!((announced_of(0.0, 1.29), announced_of(7.0, 1.29)), (None, Some("rolling_drag")));
+}
+
+/// A drag that takes a hundredth off is no second effect, unless the body leans against it: by 10 standard deviations,
+/// 9 / 2 ln(108 / 8) - 1 = 10.7, where gain and price are (0.01 - 0.12) / 0.035 = -3.1.
+#[test]
+fn a_second_that_the_body_leans_against_needs_no_share() {
+    let announced_with = |attitude: AttitudeEvidence| {
+        let singles = vec![single(SINGLES[0], 73.0, 0.94), single(SINGLES[4], 73.0, 72.0)];
+        let both = [SINGLES[0], SINGLES[4]].map(|(id, value)| effect(id, value));
+        let pair = Explanation::new(both.to_vec(), 0.94 * (-0.01_f64).exp());
+        Weighed { attitude, ..of(73.0, singles, vec![pair]) }.judge(&null()).announced.len()
+    };
+    assert_eq!((announced_with(dragged(0.0)), announced_with(dragged(10.0))), (1, 2));
 }
 
 /// A second effect that shapes the same answer is dearer: 0.25 in the logarithm is enough for a gain, and for neither a delay

@@ -24,7 +24,7 @@ pub(crate) fn effect(id: &str, value: f64) -> Effect {
 }
 
 /// Standard normal numbers of a seed.
-fn normal(seed: u64) -> impl FnMut() -> f64 {
+pub(crate) fn normal(seed: u64) -> impl FnMut() -> f64 {
     let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
     move || StandardNormal.sample(&mut random)
 }

@@ -1,0 +1,131 @@
+//! How probable roll and pitch make a cause.
+
+use super::block::{PITCH, ROLL};
+use bicycle::Effect;
+use nalgebra::{DMatrix, DVector, SMatrix};
+use std::ops::Range;
+
+/// Columns of a [`Gram`]: what is left, an offset of each angle,
+const LEFT: usize = 0;
+const OFFSET: [usize; 2] = [1, 2];
+/// and causes, one with two components twice. Of the last, which are the sensors', drives tell far more than that they have
+/// the body foretold wrongly: that is no evidence, and explains how it leans.
+pub(super) const CAUSES: [&str; 9] = [
+    "rolling_drag",
+    "quad_drag",
+    "veg_drag",
+    "wind",
+    "wind",
+    "cross_slope",
+    "mass",
+    "gyro_bias",
+    "yaw_misalign",
+];
+const FIRST_CAUSE: usize = 3;
+const FIRST_OF_SENSORS: usize = FIRST_CAUSE + 7;
+pub(super) const N_COLUMNS: usize = FIRST_CAUSE + CAUSES.len();
+/// Inner products of the columns, of errors that are independent and 1.
+pub(super) type Gram = SMatrix<f64, N_COLUMNS, N_COLUMNS>;
+
+/// Nominal drives are few: errors are Student's with so many degrees of freedom, and the evidence of a force is bounded.
+const FREEDOM: f64 = 8.0;
+/// Every size that is free to fit takes this off the logarithm of the odds, twice what chance makes of it.
+const PRICE: f64 = 1.0;
+/// A body leans where every drive says so by this many standard deviations, to the same side. Of 170 cases without any effect
+/// none reaches 2.
+const LEANS: f64 = 5.0;
+/// Squared lengths below this share of the largest are none.
+const SINGULAR: f64 = 1e-9;
+
+/// What the drives of a robot say of forces; of none, nothing.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct AttitudeEvidence {
+    drives: Vec<Gram>,
+}
+
+/// Causes with the sizes that the angles ask for, and what these take off their squared errors.
+struct Fitted {
+    columns: Vec<usize>,
+    sizes: DVector<f64>,
+    taken_off: f64,
+}
+
+impl AttitudeEvidence {
+    pub(super) fn of(drives: Vec<Gram>) -> Self {
+        Self { drives }
+    }
+
+    /// Logarithm of how many times as probable the angles are with these causes, at whatever size, as without; at least 0,
+    /// for a force may act where no spring feels it.
+    pub(crate) fn support(&self, causes: &[Effect]) -> f64 {
+        let fitted = self.fitted(causes, FIRST_CAUSE..FIRST_OF_SENSORS);
+        let everything = Fitted::of(&self.all(), (OFFSET[PITCH]..N_COLUMNS).collect()).taken_off;
+        let with = (everything - fitted.taken_off).max(0.0);
+        let ratio = (FREEDOM + everything) / (FREEDOM + with);
+        (0.5 * (FREEDOM + 1.0) * ratio.ln() - PRICE * fitted.columns.len() as f64).max(0.0)
+    }
+
+    /// By how much the body stands off in pitch and roll [rad] where these causes do not say why, if every drive agrees.
+    pub(crate) fn leaning(&self, causes: &[Effect]) -> Option<[f64; 2]> {
+        let fitted = self.fitted(causes, FIRST_CAUSE..N_COLUMNS);
+        let of_axis = |axis: usize| {
+            let offsets: Vec<(f64, f64)> =
+                self.drives.iter().map(|own| fitted.offset(own, OFFSET[axis])).collect();
+            let (mean, _) = *offsets.first()?;
+            let agrees = |(size, strength): &(f64, f64)| *strength > LEANS && size.signum() == mean.signum();
+            let n = offsets.len() as f64;
+            offsets.iter().all(agrees).then(|| offsets.iter().map(|(size, _)| size).sum::<f64>() / n)
+        };
+        let leaning = [PITCH, ROLL].map(of_axis);
+        leaning.iter().any(Option::is_some).then(|| leaning.map(Option::unwrap_or_default))
+    }
+
+    fn all(&self) -> Gram {
+        self.drives.iter().sum()
+    }
+
+    /// Those of the causes that have one of these columns; what the angles ask for the other way round is none.
+    fn fitted(&self, causes: &[Effect], of: Range<usize>) -> Fitted {
+        let all = self.all();
+        let is_one =
+            |column: &usize, cause: &Effect| CAUSES[column - FIRST_CAUSE] == cause.description().cause;
+        let columns: Vec<usize> =
+            of.filter(|column| causes.iter().any(|cause| is_one(column, cause))).collect();
+        let fitted = Fitted::of(&all, columns);
+        let agrees = |(column, size): (&usize, &f64)| {
+            let cause = causes.iter().find(|cause| is_one(column, cause))?;
+            (direction(cause).is_none_or(|direction| direction * size > 0.0)).then_some(*column)
+        };
+        let agreed: Vec<usize> = fitted.columns.iter().zip(&fitted.sizes).filter_map(agrees).collect();
+        if agreed.len() == fitted.columns.len() { fitted } else { Fitted::of(&all, agreed) }
+    }
+}
+
+/// Which way an effect of one size acts.
+fn direction(cause: &Effect) -> Option<f64> {
+    let [parameter] = cause.description().parameters else { return None };
+    Some((cause.values()[0] - parameter.neutral).signum())
+}
+
+impl Fitted {
+    fn of(gram: &Gram, columns: Vec<usize>) -> Self {
+        if columns.is_empty() {
+            return Self { columns, sizes: DVector::zeros(0), taken_off: 0.0 };
+        }
+        let products =
+            DMatrix::from_fn(columns.len(), columns.len(), |row, k| gram[(columns[row], columns[k])]);
+        let asked = DVector::from_iterator(columns.len(), columns.iter().map(|column| gram[(*column, LEFT)]));
+        let least = SINGULAR * products.diagonal().max();
+        let sizes = products.svd(true, true).solve(&asked, least.max(f64::MIN_POSITIVE));
+        let sizes = sizes.unwrap_or_else(|_| DVector::zeros(columns.len()));
+        Self { taken_off: asked.dot(&sizes), columns, sizes }
+    }
+
+    /// An offset of one drive beside the causes, and how many standard deviations that is.
+    fn offset(&self, drive: &Gram, column: usize) -> (f64, f64) {
+        let caused = self.columns.iter().zip(&self.sizes).map(|(own, size)| drive[(column, *own)] * size);
+        let asked = drive[(column, LEFT)] - caused.sum::<f64>();
+        let squares = drive[(column, column)].max(f64::MIN_POSITIVE);
+        (asked / squares, asked.abs() / squares.sqrt())
+    }
+}
