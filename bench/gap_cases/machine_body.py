@@ -74,12 +74,12 @@ def _wanted_speed(machine, more, state, speed, tick, step_s):
 
 @njit(cache=True)
 def _loads(machine, state, mass_kg):
-    """Loads of the wheels from weight, braking and leaning [N]."""
+    """Loads of the wheels from weight, braking and leaning [N]; the springs are those of the empty machine."""
     length = machine.front_m + machine.rear_m
     weight = mass_kg * GRAVITY_MPS2
     along = mass_kg * machine.height_m * state.ax_mps2 / length
     lean = state.roll_rad * machine.roll_rate_radps**2 + machine.roll_damping * state.roll_rate_radps
-    across = mass_kg * machine.height_m * lean / machine.roll_gain / machine.track_m
+    across = machine.mass_kg * machine.height_m * lean / machine.roll_gain / machine.track_m
     front = 0.5 * (weight * machine.rear_m / length - along)
     rear = 0.5 * (weight * machine.front_m / length + along)
     twist = across * machine.front_roll_share
@@ -219,10 +219,22 @@ def _push(machine, more, state, tables, tick, angle, step_s):
     state.front_force_mps2 += min(step_s / 0.02, 1.0) * (front_y / machine.mass_kg - state.front_force_mps2)
     smooth = min(step_s / machine.transfer_s, 1.0)
     state.ax_mps2 += smooth * (force_x / mass - state.ax_mps2)
-    leaning = force_y / mass * machine.roll_gain - machine.roll_rate_radps**2 * state.roll_rad
+    _lean(machine, more, state, force_x, force_y, step_s)
+    _integrate(state, own_x, own_y, turn, step_s)
+
+
+@njit(cache=True)
+def _lean(machine, more, state, force_x, force_y, step_s):
+    """The body on its springs, which the tyres tilt; a weak one lets its corner down, front left."""
+    sag = 0.02 * more.weak_corner
+    pushed = force_y / machine.mass_kg * machine.roll_gain
+    leaning = pushed - machine.roll_rate_radps**2 * (state.roll_rad + sag)
     state.roll_rate_radps += step_s * (leaning - machine.roll_damping * state.roll_rate_radps)
     state.roll_rad += step_s * state.roll_rate_radps
-    _integrate(state, own_x, own_y, turn, step_s)
+    pushed = -force_x / machine.mass_kg * machine.pitch_gain
+    squatting = pushed - machine.pitch_rate_radps**2 * (state.squat_rad - 0.7 * sag)
+    state.squat_rate_radps += step_s * (squatting - machine.pitch_damping * state.squat_rate_radps)
+    state.squat_rad += step_s * state.squat_rate_radps
 
 
 @njit(cache=True)

@@ -20,7 +20,8 @@ def _write(machine, state, row):
     """Motion at the rear axle: x y z roll pitch yaw vx vy wz."""
     row[0] = state.x_m - machine.rear_m * math.cos(state.yaw_rad)
     row[1] = state.y_m - machine.rear_m * math.sin(state.yaw_rad)
-    row[2], row[3], row[4] = state.height_m, state.roll_ground_rad + state.roll_rad, state.pitch_rad
+    row[2], row[3] = state.height_m, state.roll_ground_rad + state.roll_rad
+    row[4] = state.pitch_rad + state.squat_rad
     row[5], row[6] = state.yaw_rad, state.vx_mps
     row[7], row[8] = state.vy_mps - machine.rear_m * state.wz_radps, state.wz_radps
 

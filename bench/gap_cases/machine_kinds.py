@@ -9,7 +9,7 @@ Real robots differ, and so do the kinds, in
   linkages, roll steer, delays of 0 to 90 ms;
 - tyres and ground: Pacejka, brush, Burckhardt, sheared soil, soft carcass with camber; relaxation, falling friction
   under load, loose ground, growth;
-- body: load transfer along and across, roll with spring and damper, the centre of mass;
+- body: load transfer along and across, roll and pitch with spring and damper or hardly any spring, the centre of mass;
 - hills: what of the slope the control unit knows, and how late; sensors: rates, held poses, wander, steps of encoders,
   coloured gyros, filters; drivers: see `machine_drivers.py`.
 """
@@ -24,6 +24,7 @@ import machine_tyres as tyres
 COMMON = {
     "centre": (0.44, 0.56), "gyration": (0.38, 0.5), "height_share": (0.14, 0.22), "width_share": (0.55, 0.68),
     "roll_rate_radps": (14.0, 22.0), "roll_damping": (8.0, 14.0), "front_roll_share": (0.45, 0.6),
+    "pitch_rate_radps": (11.0, 20.0), "pitch_damping": (6.0, 12.0), "pitch_gyration": (0.3, 0.42),
     "transfer_s": (0.05, 0.12), "mu": (0.8, 1.0), "stiff_long": (9.0, 14.0), "stiff_lat": (7.0, 11.0),
     "rear_stiff_ratio": (1.02, 1.2), "shape": (1.3, 1.6), "curvature": (-0.3, 0.3), "load_sensitivity": (0.0, 0.12),
     "relax_long_share": (0.08, 0.15), "relax_lat_share": (0.1, 0.25), "wheel_inertia_share": (0.02, 0.04),
@@ -118,6 +119,7 @@ KINDS = {
             accel_max_mps2=(3.5, 5.5), brake_max_mps2=(3.0, 5.0), actuator_s=(0.01, 0.03), diff_lock_ps=(100.0, 150.0),
             steer_natural_radps=(30.0, 45.0), steer_damping=(0.45, 0.65), steer_rate_radps=(4.0, 7.0),
             curvature=(0.1, 0.3), mu=(0.7, 0.9), stiff_long=(12.0, 18.0), relax_lat_share=(0.05, 0.1),
+            pitch_rate_radps=(40.0, 55.0), pitch_damping=(30.0, 50.0),
         ),
         _kind(
             "heavy_truck", tyres.MAGIC, drives.GEARBOX, steerings.FIRST_ORDER, (3.4, 4.2, 110, 160), (2.5, 14.0, 20.0),
@@ -142,6 +144,7 @@ KINDS = {
             kp=(4.0, 7.0), ki=(3.0, 8.0), drive_a=(0.01, 0.03), accel_max_mps2=(3.5, 5.0), actuator_s=(0.03, 0.06),
             front_share=0.5, rear_steer=(0.2, 0.45), steer_natural_radps=(14.0, 22.0), roll_resistance=(0.02, 0.04),
             diff_lock_ps=0.0,
+            pitch_rate_radps=(40.0, 55.0), pitch_damping=(30.0, 50.0),
         ),
         _kind(
             "quad_bike", tyres.CAMBERED, drives.CLUTCH, steerings.STICTION, (1.15, 1.35, 100, 140), (1.0, 6.5, 9.5),
@@ -158,6 +161,7 @@ KINDS = {
             kp=(4.0, 7.0), ki=(1.5, 4.0), accel_max_mps2=(2.2, 3.2), brake_max_mps2=(2.2, 3.2), actuator_s=(0.03, 0.06),
             drive_a=(0.1, 0.25), drive_b=(4.0, 10.0), steer_natural_radps=(16.0, 26.0), steer_dead_rad=(0.01, 0.025),
             feed_forward=(0.6, 1.0), max_steer_rad=(0.45, 0.6),
+            pitch_rate_radps=(40.0, 55.0), pitch_damping=(30.0, 50.0),
         ),
         _kind(
             "aero_racer", tyres.MAGIC, drives.SCHEDULED, steerings.SECOND_ORDER, (1.5, 1.9, 80, 110), (2.0, 13.0, 18.0),
@@ -212,6 +216,7 @@ def derived(kind: Kind, numbers: dict, generator) -> dict:
     n["inertia_kgm2"] = mass * (length * n.pop("gyration")) ** 2 * 1.15
     n["track_m"], n["height_m"] = length * n.pop("width_share"), length * n.pop("height_share")
     n["roll_gain"] = 1.0 / (1.25 * n["height_m"])
+    n["pitch_gain"] = n["height_m"] / (length * n.pop("pitch_gyration")) ** 2
     n["relax_long_m"], n["relax_lat_m"] = length * n.pop("relax_long_share"), length * n.pop("relax_lat_share")
     n["wheel_inertia_kgm2"] = n.pop("wheel_inertia_share") * mass * radius**2
     n["soil_shear_m"] = n.get("soil_shear_m", 0.01) * length / 1.5

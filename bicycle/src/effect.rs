@@ -180,6 +180,7 @@ catalogue! {
     steer_servo::LimitedServo,
     steer_swing::SteerSwing,
     actuator::SpeedLag,
+    actuator::SpeedLagChain,
     actuator::AccelLimit,
     speed_ramp::SpeedRamp,
     wheel_slip::WheelSlip,

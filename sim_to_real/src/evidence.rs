@@ -119,8 +119,8 @@ impl Evidence {
             | "speed_integral" | "drive_lag" | "speed_ramp" | "wheel_slip" => {
                 self.judges_speed() && self.speed_input == SpeedInput::Commanded
             }
-            "speed_delay" | "speed_scale" | "speed_lag" | "drive_limit" | "drive_power" | "mass"
-            | "rolling_drag" | "quad_drag" | "wind" => self.judges_speed(),
+            "speed_delay" | "speed_scale" | "speed_lag" | "speed_lag_chain" | "drive_limit"
+            | "drive_power" | "mass" | "rolling_drag" | "quad_drag" | "wind" => self.judges_speed(),
             "cornering_drag" => self.judges_speed() && by_angle,
             "slope_gravity" | "hill_compensation" | "felt_slope" | "compensation_loss" => {
                 self.judges_speed() && self.slopes

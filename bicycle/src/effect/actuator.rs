@@ -3,6 +3,7 @@
 pub(super) mod lag;
 
 mod delay_line;
+mod lag_chain;
 mod play;
 mod ramp;
 
@@ -11,12 +12,13 @@ use crate::lanes::Lanes;
 
 /// Effects by the channel that passes, its place in a command, and the module that it passes through.
 macro_rules! followers {
-    ($($(#[$doc:meta])* $name:ident $id:literal: $meaning:literal,
+    ($($(#[$doc:meta])* $name:ident $id:literal $(of $cause:literal)?: $meaning:literal,
         $channel:ident[$place:literal] through $follower:ident $parameters:tt)*) => {$(
         parameters! { $(#[$doc])* $name $parameters }
 
         impl Definition for $name {
             const ID: &'static str = $id;
+            $(const CAUSE: &'static str = $cause;)?
             const MEANING: &'static str = $meaning;
             const STAGES: &'static [Stage] = &[Stage::Command];
 
@@ -87,6 +89,13 @@ followers! {
     SpeedLag "speed_lag": "first-order speed: T dx/dt = command - x", speed[0] through lag
     {
         /// Time constant T [s].
+        time_constant_s in "s": 0.0 to 3.0, neutral 0.0, tried [0.15, 0.4, 0.8, 1.6];
+    }
+
+    /// Two lags of the speed command in series, as a throttle before a torque.
+    SpeedLagChain "speed_lag_chain" of "speed_lag": "second-order speed: two lags of T / 2 in series", speed[0] through lag_chain
+    {
+        /// Time constants of both together T [s].
         time_constant_s in "s": 0.0 to 3.0, neutral 0.0, tried [0.15, 0.4, 0.8, 1.6];
     }
 }

@@ -39,8 +39,9 @@ fn sets_of_effects() -> [Vec<Effect>; 2] {
         ("rear_slip", &[0.01]),
         ("rear_steer", &[0.2]),
     ];
-    let second: [(&str, &[f64]); 14] = [
+    let second: [(&str, &[f64]); 15] = [
         ("steer_rate", &[0.8]),
+        ("speed_lag_chain", &[0.3]),
         ("accel_limit", &[1.5]),
         ("speed_ramp", &[1.1, 0.7]),
         ("compensation_loss", &[0.3]),

@@ -235,11 +235,18 @@ pub(crate) fn pose_sensor(found: &PoseSensor) -> String {
     format!("The robot's pose sensor {}; taken out of its drives.", listed(&told))
 }
 
+/// Logarithm of how many times as probable an effect becomes by how the body leans, above which that is told.
+const TOLD_OF_ATTITUDE: f64 = 1.0;
+
 /// How strongly the drives ask for an effect, where that is known.
 pub(crate) fn asked_for(answer: &Answer, id: &str) -> Option<String> {
     let support = answer.ranking.iter().find(|ranked| ranked.id == id)?.support?;
+    let leans = match support.attitude {
+        ..=TOLD_OF_ATTITUDE => String::new(),
+        logarithm => format!("; how the body leans makes it {:.0} times as probable", logarithm.exp()),
+    };
     Some(format!(
-        "alone it is asked for {:.1} times as strongly as by chance, in every drive at least {:.1} times",
+        "alone it is asked for {:.1} times as strongly as by chance, in every drive at least {:.1} times{leans}",
         support.strength, support.least_strength
     ))
 }
