@@ -10,6 +10,7 @@ mod places;
 mod predictions;
 mod ranking;
 mod residuals;
+mod swing;
 pub(crate) mod text;
 mod throughout;
 mod told;
@@ -59,6 +60,7 @@ pub fn pictures(pictures: &Pictures<'_>) -> Result<Vec<Picture>, EncodeError> {
         ("throughout.png", words::THROUGHOUT.to_owned(), throughout::page(pictures.answer)),
         ("places.png", reference.places(), places::page(pictures)),
         ("left.png", words::LEFT.to_owned(), left::page(pictures.answer, reference)),
+        ("swing.png", words::SWING.to_owned(), swing::page(pictures)),
         ("residuals.png", words::RESIDUALS.to_owned(), residuals::page(pictures)),
         ("ground.png", words::GROUND.to_owned(), ground::page(pictures)),
         (

@@ -1,7 +1,7 @@
 //! The answer of a diagnosis, as it stands in files.
 
 use crate::controller_model::ControllerModel;
-use crate::findings::{LeftOver, QuantityError};
+use crate::findings::{Leaning, LeftOver, QuantityError, Swing};
 use crate::in_simulator::InSimulator;
 use crate::pose_sensor::PoseSensor;
 use crate::steering::Steering;
@@ -224,6 +224,12 @@ pub struct Answer {
     /// What the announced effects leave, quantity by quantity, where a part of the gap is unknown; the largest share first.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub left: Vec<LeftOver>,
+    /// A yaw rate that swings.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub swing: Option<Swing>,
+    /// A body that leans.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub leaning: Option<Leaning>,
     /// How far the gap shrinks.
     pub shrink: Shrink,
     /// Errors on the held-out drives in metres, radians and their rates; empty until they are opened.
@@ -270,6 +276,8 @@ mod tests {
             credible_set: Vec::new(),
             places: Vec::new(),
             left: Vec::new(),
+            swing: None,
+            leaning: None,
             shrink: shrink(Some(3.0), 1.5),
             errors_by_quantity: Vec::new(),
             pose_sensor: None,

@@ -10,7 +10,7 @@ use crate::constancy::changing;
 use crate::cross_validation::{CrossValidation, Split, foretold};
 use crate::drive::Drive;
 use crate::explanation::Screened;
-use crate::findings::{Findings, LeftOver};
+use crate::findings::{Findings, Leaning, LeftOver, Swing};
 use crate::intervals::named_effects;
 use crate::judgement::{Single, Weighed};
 use crate::least_squares::mean_loss;
@@ -34,6 +34,8 @@ pub struct Diagnosis {
     pub(crate) effects: Vec<Effect>,
     pub(crate) by_part: Vec<PartEstimate>,
     pub(crate) left: Vec<LeftOver>,
+    pub(crate) swing: Option<Swing>,
+    pub(crate) leaning: Option<Leaning>,
     pub(crate) steering: Steering,
     pub(crate) verdict: Verdict,
     pub(crate) ranking: Vec<Ranked>,
@@ -75,13 +77,10 @@ pub fn diagnose(baseline: &Baseline, machine: &Machine, real: &[DriveLog]) -> Re
         judgement.verdict = judgement.verdict.with_unknown();
         notes.push(changing.told());
     }
-    if let Some(leaning) = weighed.attitude.leaning(&causes) {
+    let leaning = weighed.attitude.leaning(&causes);
+    let (swing, spectrum) = baseline.yaw_response.as_ref().and_then(|response| response.swing(&all)).unzip();
+    if leaning.is_some() || swing.is_some() {
         judgement.verdict = judgement.verdict.with_unknown();
-        notes.push(leaning_told(leaning));
-    }
-    if let Some(swing) = baseline.yaw_response.as_ref().and_then(|response| response.swing(&all)) {
-        judgement.verdict = judgement.verdict.with_unknown();
-        notes.push(swing.told());
     }
     let after = trial.residuals(&causes);
     let (own, repaired) = (StartRecord::of(&all, &before), StartRecord::of(&all, &after));
@@ -100,11 +99,14 @@ pub fn diagnose(baseline: &Baseline, machine: &Machine, real: &[DriveLog]) -> Re
         conditions,
         residuals: residual_cells(&before, &after, Some(&baseline.null.cells)),
         map: ground_residuals(&own, &repaired),
+        spectrum,
     };
     Ok(Diagnosis {
         named: named_effects(&trial, &causes),
         by_part: by_part(&baseline.held_trial(&all), &causes),
         left,
+        swing,
+        leaning,
         findings,
         errors: [rollout_error(&before), rollout_error(&after)],
         predicted_closed: predicted_closed(baseline, &splits, &causes),
@@ -165,21 +167,6 @@ fn in_question(weighed: &Weighed, announced: &[Effect]) -> Vec<Vec<Effect>> {
     explanations
 }
 
-/// In words, of pitch (nose down) and roll (left side up) [rad].
-fn leaning_told([pitch_rad, roll_rad]: [f64; 2]) -> String {
-    let told = |angle_rad: f64, [positive, negative]: [&str; 2]| {
-        let way = if angle_rad > 0.0 { positive } else { negative };
-        (angle_rad != 0.0).then(|| format!("{:.2} deg further {way}", angle_rad.abs().to_degrees()))
-    };
-    let ways = [told(pitch_rad, ["nose down", "nose up"]), told(roll_rad, ["to its right", "to its left"])];
-    let ways: Vec<String> = ways.into_iter().flatten().collect();
-    format!(
-        "the robot's body stands {} than the simulator's on the same ground under the same accelerations, in every drive, \
-         and no cause that is named says why: a spring, a load, a force that it pulls against, or how the sensor is mounted",
-        ways.join(" and ")
-    )
-}
-
 /// What is closed on each real drive by the parameters that the others give.
 fn predicted_closed(baseline: &Baseline, splits: &[Split<'_>], causes: &[Effect]) -> Option<f64> {
     let mut squares = [0.0_f64; 2];
@@ -211,6 +198,8 @@ impl Diagnosis {
             credible_set: self.credible_set.clone(),
             places: places(&self.findings.conditions),
             left: self.left.clone(),
+            swing: self.swing,
+            leaning: self.leaning,
             shrink: Shrink {
                 metric: METRIC.to_owned(),
                 floor: self.floor,

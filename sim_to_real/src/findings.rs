@@ -13,6 +13,53 @@ pub struct Findings {
     pub residuals: Vec<ResidualCell>,
     /// Residuals over the ground, one per rollout.
     pub map: Vec<GroundResidual>,
+    /// In which a swing stands out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub spectrum: Option<Spectrum>,
+}
+
+/// What something repeats itself over.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum SwingOver {
+    /// Per second.
+    Time,
+    /// Per metre of the path.
+    Way,
+}
+
+/// A yaw rate that swings, in every drive of the robot's and not in the simulator's, whatever is commanded.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Swing {
+    /// Over the time or the way.
+    pub over: SwingOver,
+    /// How often [1/s] or [1/m].
+    pub frequency: f64,
+    /// By how much either way [rad/s].
+    pub amplitude_radps: f64,
+}
+
+/// Power of the yaw rate that the commands leave unexplained, over what it is at the frequencies about [-].
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Spectrum {
+    /// Over the time or the way.
+    pub over: SwingOver,
+    /// Frequencies [1/s] or [1/m].
+    pub frequencies: Vec<f64>,
+    /// Least of the robot's drives.
+    pub real: Vec<f64>,
+    /// Largest of the simulator's.
+    pub nominal: Vec<f64>,
+}
+
+/// How much further the robot's body leans than the simulator's on the same ground under the same accelerations, in every
+/// drive, for no cause that is announced.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Leaning {
+    /// Nose down; 0 where the drives do not agree [rad].
+    pub pitch_rad: f64,
+    /// Left side up; 0 where the drives do not agree [rad].
+    pub roll_rad: f64,
 }
 
 /// How the residual depends on one condition.

@@ -12,6 +12,9 @@ const UNSUPPORTED: f64 = -6.8;
 /// and what supports it counts for: the root of its gain, the logarithms of one more than its strength and than that of
 /// the weakest drive, and how much of it nominal drives ask for.
 const SUPPORT: [f64; 4] = [7.9, 1.2, 1.8, -2.9];
+/// How the body leans counts for what the drives ask for by so many standard deviations besides: springs that are not those of
+/// the simulator lean as under a load.
+const ASKED_FOR: f64 = 2.0;
 /// An explanation is announced when it is this many times as probable as none.
 const BEYOND_DOUBT: f64 = 2.0;
 /// The names that are as good as the best hold the true one with this probability, if one of them is.
@@ -77,9 +80,8 @@ pub(crate) struct Judgement {
 fn logit(support: &Support) -> f64 {
     let Support { gain, strength, least_strength, nominal, attitude } = support;
     let features = [gain.max(0.0).sqrt(), strength.ln_1p(), least_strength.ln_1p(), *nominal];
-    UNSUPPORTED
-        + attitude
-        + SUPPORT.iter().zip(features).map(|(weight, feature)| weight * feature).sum::<f64>()
+    let leans = if *strength > ASKED_FOR { *attitude } else { 0.0 };
+    UNSUPPORTED + leans + SUPPORT.iter().zip(features).map(|(weight, feature)| weight * feature).sum::<f64>()
 }
 
 /// Of two explanations with their logits, the likelier.

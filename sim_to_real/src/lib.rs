@@ -75,8 +75,8 @@ pub use diagnosis::{Diagnosis, diagnose};
 pub use drive::DriveError;
 pub use drives::{Case, Drives, DrivesError};
 pub use findings::{
-    ConditionBin, ConditionTable, Findings, GroundResidual, LeftBin, LeftOver, Prediction, PredictionModel,
-    QuantityError, ResidualCell, ResidualState,
+    ConditionBin, ConditionTable, Findings, GroundResidual, Leaning, LeftBin, LeftOver, Prediction,
+    PredictionModel, QuantityError, ResidualCell, ResidualState, Spectrum, Swing, SwingOver,
 };
 pub use follow_up::Diagnosed;
 pub use ground_belief::{

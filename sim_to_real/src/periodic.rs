@@ -5,10 +5,11 @@
 mod spectrum;
 
 use crate::drive::{Drive, STEP_S, VX, WZ};
+use crate::findings::{Spectrum, Swing, SwingOver};
 use bicycle::Command;
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
-use spectrum::{Axis, Series, powers};
+use spectrum::{Series, frequencies, powers};
 
 /// Rows by which the commanded turning may be late: 0 to 1.2 s.
 const LAGS: [usize; 15] = [0, 2, 4, 6, 8, 10, 13, 16, 20, 25, 30, 36, 43, 50, 60];
@@ -32,15 +33,6 @@ pub(crate) struct YawResponse {
     left: Vec<Series>,
 }
 
-/// A yaw rate that swings.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Swing {
-    axis: Axis,
-    /// Per second or per metre.
-    frequency: f64,
-    amplitude_radps: f64,
-}
-
 impl YawResponse {
     /// `None` where no drive tells the yaw rate.
     pub(crate) fn of(wheelbase_m: f64, drives: &[&Drive]) -> Option<Self> {
@@ -60,39 +52,43 @@ impl YawResponse {
         (!told.is_empty()).then_some(Self { left, ..response })
     }
 
-    /// The swing that stands out most in every drive, and not in the nominal ones.
-    pub(crate) fn swing(&self, drives: &[&Drive]) -> Option<Swing> {
-        let real: Vec<Series> =
-            drives.iter().filter(|drive| tells(drive)).map(|drive| self.left(drive)).collect();
+    /// The swing that stands out most in every drive, and not in the nominal ones, with the spectrum that it stands out of.
+    pub(crate) fn swing(&self, drives: &[&Drive]) -> Option<(Swing, Spectrum)> {
+        let told = drives.iter().filter(|drive| tells(drive));
+        let real: Vec<Series> = told.map(|drive| self.left(drive)).collect();
         if real.len() < 2 {
             return None;
         }
-        let of_axis = |axis: Axis| self.of_axis(axis, &real);
-        let swings = [Axis::Time, Axis::Way].into_iter().filter_map(of_axis);
-        swings.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, swing)| swing)
+        let found = [SwingOver::Time, SwingOver::Way].map(|over| self.swing_over(over, &real));
+        let strength = |(swing, spectrum): &(Swing, Spectrum)| {
+            let told = spectrum.frequencies.iter().zip(&spectrum.real);
+            told.filter(|(own, _)| **own == swing.frequency).map(|(_, power)| *power).fold(0.0, f64::max)
+        };
+        found.into_iter().flatten().max_by(|a, b| strength(a).total_cmp(&strength(b)))
     }
 
-    fn of_axis(&self, axis: Axis, real: &[Series]) -> Option<(f64, Swing)> {
-        let frequencies = axis.frequencies(real, self.wheelbase_m);
-        let least =
-            |all: &[Vec<f64>], place: usize| all.iter().map(|own| own[place]).fold(f64::INFINITY, f64::min);
-        let of_real: Vec<Vec<f64>> = real.iter().map(|own| powers(own, axis, &frequencies)).collect();
-        let place =
-            (0..frequencies.len()).max_by(|a, b| least(&of_real, *a).total_cmp(&least(&of_real, *b)))?;
-        let power = least(&of_real, place);
-        if power < STANDS_OUT {
+    fn swing_over(&self, over: SwingOver, real: &[Series]) -> Option<(Swing, Spectrum)> {
+        let frequencies = frequencies(over, real, self.wheelbase_m);
+        let of_real: Vec<Vec<f64>> = real.iter().map(|own| powers(own, over, &frequencies)).collect();
+        let least = |place: usize| of_real.iter().map(|own| own[place]).fold(f64::INFINITY, f64::min);
+        let real_power: Vec<f64> = (0..frequencies.len()).map(least).collect();
+        let place = (0..frequencies.len()).max_by(|a, b| real_power[*a].total_cmp(&real_power[*b]))?;
+        if real_power[place] < STANDS_OUT {
             return None;
         }
-        let nominal = self.left.iter().map(|own| powers(own, axis, &frequencies)[place]);
-        let is_new = nominal.fold(0.0, f64::max) < NOMINAL_SHARE * power;
+        let of_nominal: Vec<Vec<f64>> = self.left.iter().map(|own| powers(own, over, &frequencies)).collect();
+        let largest = |place: usize| of_nominal.iter().map(|own| own[place]).fold(0.0, f64::max);
+        let nominal: Vec<f64> = (0..frequencies.len()).map(largest).collect();
         // A power is the larger one of its neighbours' as well.
-        let next = frequencies[place.saturating_sub(1)..(place + 2).min(frequencies.len())].iter();
+        let next = &frequencies[place.saturating_sub(1)..(place + 2).min(frequencies.len())];
         let mean = |frequency: f64| {
-            real.iter().map(|own| own.amplitude(axis, frequency)).sum::<f64>() / real.len() as f64
+            real.iter().map(|own| own.amplitude(over, frequency)).sum::<f64>() / real.len() as f64
         };
-        let (amplitude_radps, frequency) =
-            next.map(|&frequency| (mean(frequency), frequency)).max_by(|a, b| a.0.total_cmp(&b.0))?;
-        is_new.then_some((power, Swing { axis, frequency, amplitude_radps }))
+        let sizes = next.iter().map(|&frequency| (mean(frequency), frequency));
+        let (amplitude_radps, frequency) = sizes.max_by(|a, b| a.0.total_cmp(&b.0))?;
+        let is_new = nominal[place] < NOMINAL_SHARE * real_power[place];
+        let spectrum = Spectrum { over, frequencies, real: real_power, nominal };
+        is_new.then_some((Swing { over, frequency, amplitude_radps }, spectrum))
     }
 
     /// What the commanded turning leaves of the yaw rate of a drive.
@@ -130,25 +126,6 @@ fn features(drive: &Drive, wheelbase_m: f64, row: usize) -> [f64; N_FEATURES] {
     let (now, followed) = (turning(row), turning(row - FOLLOWED));
     let yielding = [now * squared, followed * squared, now * now.abs()];
     std::array::from_fn(|k| LAGS.get(k).map_or_else(|| yielding[k - LAGS.len()], |lag| turning(row - lag)))
-}
-
-impl Swing {
-    /// In words.
-    pub(crate) fn told(&self) -> String {
-        let Self { axis, frequency, amplitude_radps } = self;
-        let how = match axis {
-            Axis::Time => format!("{frequency:.2} times a second"),
-            Axis::Way => format!(
-                "once every {:.3} m, as often as a wheel with a radius of {:.3} m turns",
-                1.0 / frequency,
-                1.0 / (std::f64::consts::TAU * frequency)
-            ),
-        };
-        format!(
-            "the robot's yaw rate swings {how}, by {amplitude_radps:.4} rad/s either way, in every drive; the simulator's does \
-             not, and no effect of the catalogue does so"
-        )
-    }
 }
 
 #[cfg(test)]

@@ -148,6 +148,8 @@ mod tests {
             effects,
             by_part: Vec::new(),
             left: Vec::new(),
+            swing: None,
+            leaning: None,
             ranking: Vec::new(),
             credible_set: Vec::new(),
             places: Vec::new(),

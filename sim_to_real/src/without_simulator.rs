@@ -121,10 +121,13 @@ fn diagnosis(baseline: &Baseline, all: &[&Drive], folds: &Folds<'_>, selection: 
         by_part: by_part(&trial, &causes),
         // Of what is left nobody knows whether nominal drives would leave it too.
         left: Vec::new(),
+        swing: None,
+        leaning: None,
         findings: Findings {
             conditions: condition_tables(&own, &baseline.null.starts),
             residuals: residual_cells(&before, &after, Some(&baseline.null.cells)),
             map: ground_residuals(&own, &repaired),
+            spectrum: None,
         },
         errors,
         predicted_closed: baseline.closed(left_out_before, left_out_after),

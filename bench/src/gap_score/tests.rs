@@ -28,6 +28,8 @@ fn answer(verdict: Verdict, announced: &[&str], ranking: &[(&str, f64)]) -> Answ
         effects: announced.iter().map(named).collect(),
         by_part: Vec::new(),
         left: Vec::new(),
+        swing: None,
+        leaning: None,
         ranking: ranking
             .iter()
             .map(|(id, score)| Ranked { id: (*id).to_owned(), score: *score, support: None })

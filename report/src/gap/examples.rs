@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 
 use sim_to_real::{
     BeforeAfter, Condition, ConditionBin, ConditionTable, Division, Estimate, GroundResidual, LeftBin,
-    LeftOver, NamedEffect, PartEstimate, Place, QuantityError, Ranked, ResidualState, Shrink, Steering,
-    Support, Verdict,
+    LeftOver, NamedEffect, PartEstimate, Place, QuantityError, Ranked, ResidualState, Shrink, Spectrum,
+    Steering, Support, SwingOver, Verdict,
 };
 
 use super::{HeldOutSample, HeldOutStrip};
@@ -25,6 +25,8 @@ pub(crate) fn answer() -> Answer {
         effects: vec![NamedEffect { id: "steer_lag".to_owned(), form: None, parameters }],
         by_part: by_part(),
         left: Vec::new(),
+        swing: None,
+        leaning: None,
         ranking: ranking.map(ranked).to_vec(),
         credible_set: vec!["steer_lag".to_owned(), "steer_delay".to_owned()],
         places: vec![Place { condition: Condition::SteeringChange, share: 0.61 }],
@@ -126,7 +128,20 @@ pub(crate) fn findings() -> Findings {
             })
             .collect(),
     };
-    Findings { conditions: conditions.map(table).to_vec(), residuals: cells(), map: ground_residuals() }
+    Findings {
+        conditions: conditions.map(table).to_vec(),
+        residuals: cells(),
+        map: ground_residuals(),
+        spectrum: Some(spectrum()),
+    }
+}
+
+/// One line among many.
+fn spectrum() -> Spectrum {
+    let frequencies: Vec<f64> = (0..400).map(|k| 0.5 + 0.0125 * f64::from(k)).collect();
+    let nominal = frequencies.iter().map(|own| 1.5 + (40.0 * own).sin()).collect();
+    let real = frequencies.iter().map(|own| if (own - 1.3).abs() < 0.01 { 120.0 } else { 1.0 }).collect();
+    Spectrum { over: SwingOver::Time, frequencies, real, nominal }
 }
 
 pub(crate) fn cells() -> Vec<ResidualCell> {

@@ -39,7 +39,9 @@ pub fn page(page: &Page<'_>) -> String {
         section("Which", &(effects(answer) + &figures(&["ranking.png", "throughout.png"]))),
         section(
             "Where",
-            &(places(answer) + &left(answer) + &figures(&["places.png", "left.png", "ground.png"])),
+            &(places(answer)
+                + &left(answer)
+                + &figures(&["places.png", "left.png", "swing.png", "ground.png"])),
         ),
         section(
             "How far",

@@ -27,6 +27,7 @@ fn every_page_is_drawn_when_there_is_something_on_it() {
             "throughout.png",
             "places.png",
             "left.png",
+            "swing.png",
             "residuals.png",
             "ground.png",
             "heldout.png"

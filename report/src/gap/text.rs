@@ -3,7 +3,10 @@
 use super::in_simulator::in_simulator;
 use super::words;
 use bicycle::effect::{CATALOGUE, Parameter};
-use sim_to_real::{Answer, Condition, Estimate, LeftBin, LeftOver, NamedEffect, PoseSensor, Shrink, Verdict};
+use sim_to_real::{
+    Answer, Condition, Estimate, Leaning, LeftBin, LeftOver, NamedEffect, PoseSensor, Shrink, Swing,
+    SwingOver, Verdict,
+};
 
 /// The verdict in a sentence.
 pub(crate) fn verdict(answer: &Answer) -> String {
@@ -120,11 +123,45 @@ pub(crate) fn left(answer: &Answer) -> Vec<String> {
         let (quantity, percent) = (words::state(shape.quantity), 100.0 * shape.share);
         Some(format!("{quantity}{off} ({percent:.0} % of what is left, {} s ahead)", shape.horizon_s))
     };
+    let of_body = answer.leaning.iter().map(leaning).chain(answer.swing.iter().map(swing));
+    let all: Vec<String> = of_body.chain(answer.left.iter().filter_map(told)).collect();
     let is_unknown = matches!(answer.verdict, Verdict::Unknown | Verdict::EffectsAndUnknown);
-    if is_unknown && answer.left.is_empty() {
+    if is_unknown && all.is_empty() {
         return vec!["nothing that follows a condition or the time".to_owned()];
     }
-    answer.left.iter().filter_map(told).collect()
+    all
+}
+
+fn leaning(found: &Leaning) -> String {
+    let way = |angle_rad: f64, [positive, negative]: [&str; 2]| {
+        let side = if angle_rad > 0.0 { positive } else { negative };
+        (angle_rad != 0.0).then(|| format!("{:.2} deg further {side}", angle_rad.abs().to_degrees()))
+    };
+    let ways = [
+        way(found.pitch_rad, ["nose down", "nose up"]),
+        way(found.roll_rad, ["to the right", "to the left"]),
+    ];
+    let ways: Vec<String> = ways.into_iter().flatten().collect();
+    format!(
+        "the body leans {} than the simulator's on the same ground under the same accelerations, in every drive: a \
+         spring, a load, a pull, or how the sensor is mounted",
+        ways.join(" and ")
+    )
+}
+
+fn swing(found: &Swing) -> String {
+    let how = match found.over {
+        SwingOver::Time => format!("{:.2} times a second", found.frequency),
+        SwingOver::Way => format!(
+            "once every {:.3} m, as often as a wheel with a radius of {:.3} m turns",
+            1.0 / found.frequency,
+            1.0 / (std::f64::consts::TAU * found.frequency)
+        ),
+    };
+    format!(
+        "the yaw rate swings {how}, by {} rad/s either way, in every drive, whatever is commanded; the simulator's does not",
+        rounded(found.amplitude_radps)
+    )
 }
 
 /// How far the gap shrinks, line by line.
@@ -333,6 +370,28 @@ mod tests {
         assert!(left(&examples::answer()).is_empty());
         let shapeless = left(&Answer { verdict: Verdict::Unknown, ..examples::answer() });
         assert!(shapeless.len() == 1 && shapeless[0].starts_with("nothing that follows"), "{shapeless:?}");
+    }
+
+    #[test]
+    fn what_leans_and_swings_is_told_with_its_size() {
+        let leaning = Leaning { pitch_rad: 0.01, roll_rad: -0.02 };
+        let swing = Swing { over: SwingOver::Way, frequency: 0.5, amplitude_radps: 0.02 };
+        let of = |leaning, swing| Answer { leaning, swing, ..examples::answer() };
+        let told = left(&of(Some(leaning), Some(swing)));
+        assert!(
+            told[0].contains("0.57 deg further nose down and 1.15 deg further to the left"),
+            "{}",
+            told[0]
+        );
+        assert!(
+            told[1].contains("once every 2.000 m, as often as a wheel with a radius of 0.318 m"),
+            "{}",
+            told[1]
+        );
+        let told = left(&of(Some(Leaning { pitch_rad: -0.01, roll_rad: 0.0 }), None));
+        assert!(told[0].contains("leans 0.57 deg further nose up than"), "{}", told[0]);
+        let told = left(&of(None, Some(Swing { over: SwingOver::Time, ..swing })));
+        assert!(told[0].contains("0.50 times a second, by 0.0200 rad/s"), "{}", told[0]);
     }
 
     #[test]

@@ -52,6 +52,7 @@ pub(super) const THROUGHOUT: &str =
     "Is it the same throughout: what each announced parameter would be in parts of the real drives alone.";
 pub(super) const LEFT: &str =
     "What is left: by how much each quantity is still off, over the condition that it follows most.";
+pub(super) const SWING: &str = "What swings: the spectrum of the yaw rate that the commands do not explain, in the real drives and in the nominal ones.";
 pub(super) const RESIDUALS: &str =
     "How large: the residual of every predicted quantity, by how far ahead it is predicted.";
 pub(super) const GROUND: &str =

@@ -29,9 +29,7 @@ impl Axis {
             apart(&errors(drives[out], &of_others, axis), drives[out], axis)
         });
         let apart: Vec<Coefficients> = left_out.collect();
-        let scatter = drives
-            .iter()
-            .map(|own| errors(own, &regression(own, axis), axis).norm_squared() / own.len() as f64);
+        let scatter = drives.iter().map(|own| scatter_rad2(own, axis));
         let n = drives.len() as f64;
         Self {
             coefficients: regression(&drives.concat(), axis),
@@ -45,12 +43,13 @@ impl Axis {
         left(own, &self.coefficients, axis)
     }
 
-    /// Columns of a drive weighed by the inverse covariance of its errors: the scatter of every second, and coefficients of
-    /// its own. None, where the angles do not scatter, tells nothing.
+    /// Columns of a drive weighed by the inverse covariance of its errors: the scatter of every second, its own where that is
+    /// larger than a simulator's, and coefficients of its own. Angles that do not scatter at all tell nothing.
     pub(super) fn weighed(&self, blocks: &[Block], axis: usize, columns: &DMatrix<f64>) -> DMatrix<f64> {
         let own = centred(blocks, axis);
         let drawn = DMatrix::from_diagonal(&DVector::from_column_slice(&self.apart));
-        let scatter = DMatrix::from_diagonal_element(blocks.len(), blocks.len(), self.scatter_rad2);
+        let scatter = self.scatter_rad2.max(scatter_rad2(blocks, axis));
+        let scatter = DMatrix::from_diagonal_element(blocks.len(), blocks.len(), scatter);
         let covariance = Cholesky::new(&own * drawn * own.transpose() + scatter);
         covariance.map_or_else(|| 0.0 * columns, |covariance| covariance.solve(columns))
     }
@@ -69,6 +68,11 @@ fn left(own: &Block, coefficients: &Coefficients, axis: usize) -> f64 {
 
 fn errors(blocks: &[Block], coefficients: &Coefficients, axis: usize) -> DVector<f64> {
     DVector::from_iterator(blocks.len(), blocks.iter().map(|own| left(own, coefficients, axis)))
+}
+
+/// Mean square of what a drive's own coefficients leave.
+fn scatter_rad2(blocks: &[Block], axis: usize) -> f64 {
+    errors(blocks, &regression(blocks, axis), axis).norm_squared() / blocks.len() as f64
 }
 
 /// How far each coefficient alone has to change for the least errors of a drive.

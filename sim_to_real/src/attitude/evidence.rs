@@ -1,6 +1,7 @@
 //! How probable roll and pitch make a cause.
 
 use super::block::{PITCH, ROLL};
+use crate::findings::Leaning;
 use bicycle::Effect;
 use nalgebra::{DMatrix, DVector, SMatrix};
 use std::ops::Range;
@@ -65,8 +66,8 @@ impl AttitudeEvidence {
         (0.5 * (FREEDOM + 1.0) * ratio.ln() - PRICE * fitted.columns.len() as f64).max(0.0)
     }
 
-    /// By how much the body stands off in pitch and roll [rad] where these causes do not say why, if every drive agrees.
-    pub(crate) fn leaning(&self, causes: &[Effect]) -> Option<[f64; 2]> {
+    /// How much further the body leans than these causes say, if every drive agrees.
+    pub(crate) fn leaning(&self, causes: &[Effect]) -> Option<Leaning> {
         let fitted = self.fitted(causes, FIRST_CAUSE..N_COLUMNS);
         let of_axis = |axis: usize| {
             let offsets: Vec<(f64, f64)> =
@@ -76,8 +77,9 @@ impl AttitudeEvidence {
             let n = offsets.len() as f64;
             offsets.iter().all(agrees).then(|| offsets.iter().map(|(size, _)| size).sum::<f64>() / n)
         };
-        let leaning = [PITCH, ROLL].map(of_axis);
-        leaning.iter().any(Option::is_some).then(|| leaning.map(Option::unwrap_or_default))
+        let [pitch, roll] = [PITCH, ROLL].map(of_axis);
+        (pitch.or(roll).is_some())
+            .then(|| Leaning { pitch_rad: pitch.unwrap_or_default(), roll_rad: roll.unwrap_or_default() })
     }
 
     fn all(&self) -> Gram {

@@ -139,7 +139,7 @@ fn how_the_body_leans_tells_a_drag_from_a_scale_of_the_speed() {
         weighed.judge(&null()).announced.first().map(|effect| effect.description().id)
     };
     assert_eq!((announced_of(0.0, 1.1), announced_of(5.0, 1.1)), (Some("speed_scale"), Some("rolling_drag")));
-    assert_eq!((announced_of(0.0, 1.29), announced_of(7.0, 1.29)), (None, Some("rolling_drag")));
+    assert_eq!((announced_of(0.0, 1.28), announced_of(7.0, 1.28)), (None, Some("rolling_drag")));
 }
 
 /// A drag that takes a hundredth off is no second effect, unless the body leans against it: by 10 standard deviations,

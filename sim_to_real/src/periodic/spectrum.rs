@@ -1,5 +1,6 @@
 //! Spectra over the time or the way.
 
+use crate::findings::SwingOver;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::{LN_2, TAU};
 
@@ -18,15 +19,6 @@ const PER_WHEELBASE: [f64; 2] = [0.15, 6.0];
 /// Frequencies lie so far apart, of one per span of the drives.
 const APART: f64 = 0.5;
 const MOST_FREQUENCIES: usize = 1500;
-
-/// What something repeats itself over.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Axis {
-    /// [s]
-    Time,
-    /// Along the path [m].
-    Way,
-}
 
 /// Values of a drive with their time and way.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -56,49 +48,47 @@ impl Series {
         }
     }
 
-    fn place(&self, axis: Axis, k: usize) -> f64 {
-        match axis {
-            Axis::Time => k as f64 * self.interval_s,
-            Axis::Way => self.way_m[k],
+    fn place(&self, over: SwingOver, k: usize) -> f64 {
+        match over {
+            SwingOver::Time => k as f64 * self.interval_s,
+            SwingOver::Way => self.way_m[k],
         }
     }
 
-    fn span(&self, axis: Axis) -> f64 {
+    fn span(&self, over: SwingOver) -> f64 {
         let ways = self.way_m.iter().copied();
-        match axis {
-            Axis::Time => self.values.len() as f64 * self.interval_s,
-            Axis::Way => ways.clone().fold(0.0, f64::max) - ways.fold(f64::INFINITY, f64::min).min(0.0),
+        match over {
+            SwingOver::Time => self.values.len() as f64 * self.interval_s,
+            SwingOver::Way => ways.clone().fold(0.0, f64::max) - ways.fold(f64::INFINITY, f64::min).min(0.0),
         }
     }
 
     /// Of the swing of one frequency.
-    pub(super) fn amplitude(&self, axis: Axis, frequency: f64) -> f64 {
+    pub(super) fn amplitude(&self, over: SwingOver, frequency: f64) -> f64 {
         let sums = self.values.iter().enumerate().fold([0.0; 2], |[cosines, sines], (k, value)| {
-            let (sine, cosine) = (TAU * frequency * self.place(axis, k)).sin_cos();
+            let (sine, cosine) = (TAU * frequency * self.place(over, k)).sin_cos();
             [cosines + value * cosine, sines + value * sine]
         });
         2.0 * sums[0].hypot(sums[1]) / self.values.len().max(1) as f64
     }
 }
 
-impl Axis {
-    /// Frequencies that drives can tell apart.
-    pub(super) fn frequencies(self, drives: &[Series], wheelbase_m: f64) -> Vec<f64> {
-        let [low, high] = match self {
-            Self::Time => PER_SECOND,
-            Self::Way => PER_WHEELBASE.map(|number| number / wheelbase_m),
-        };
-        let span = drives.iter().map(|own| own.span(self)).fold(0.0, f64::max);
-        let apart = APART / span.max(f64::MIN_POSITIVE.sqrt());
-        let n = ((high - low) / apart).clamp(0.0, MOST_FREQUENCIES as f64) as usize;
-        (0..n).map(|k| low + k as f64 * apart).collect()
-    }
+/// Frequencies that drives can tell apart.
+pub(super) fn frequencies(over: SwingOver, drives: &[Series], wheelbase_m: f64) -> Vec<f64> {
+    let [low, high] = match over {
+        SwingOver::Time => PER_SECOND,
+        SwingOver::Way => PER_WHEELBASE.map(|number| number / wheelbase_m),
+    };
+    let span = drives.iter().map(|own| own.span(over)).fold(0.0, f64::max);
+    let apart = APART / span.max(f64::MIN_POSITIVE.sqrt());
+    let n = ((high - low) / apart).clamp(0.0, MOST_FREQUENCIES as f64) as usize;
+    (0..n).map(|k| low + k as f64 * apart).collect()
 }
 
 /// Power at every frequency, or the larger one next to it, over what it is about it.
-pub(super) fn powers(series: &Series, axis: Axis, frequencies: &[f64]) -> Vec<f64> {
+pub(super) fn powers(series: &Series, over: SwingOver, frequencies: &[f64]) -> Vec<f64> {
     let raw: Vec<f64> =
-        frequencies.iter().map(|frequency| series.amplitude(axis, *frequency).powi(2)).collect();
+        frequencies.iter().map(|frequency| series.amplitude(over, *frequency).powi(2)).collect();
     let about = |place: usize, reach: usize| place.saturating_sub(reach)..(place + reach + 1).min(raw.len());
     let usual = |place: usize| {
         let mut near = raw[about(place, NEIGHBOURS)].to_vec();

@@ -20,6 +20,8 @@ fn answer(verdict: Verdict, effects: Vec<NamedEffect>) -> Answer {
         effects,
         by_part: Vec::new(),
         left: Vec::new(),
+        swing: None,
+        leaning: None,
         ranking: Vec::new(),
         credible_set: Vec::new(),
         places: Vec::new(),

@@ -116,6 +116,8 @@ mod tests {
             effects: Vec::new(),
             by_part: Vec::new(),
             left: Vec::new(),
+            swing: None,
+            leaning: None,
             ranking: Vec::new(),
             credible_set: Vec::new(),
             places: Vec::new(),
