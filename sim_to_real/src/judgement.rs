@@ -166,9 +166,20 @@ impl Weighed {
         match (best.causes.is_empty(), unknown) {
             (true, false) => (Verdict::None, Vec::new()),
             (true, true) => (Verdict::Unknown, Vec::new()),
-            (false, false) => (Verdict::Effects, best.causes.clone()),
-            (false, true) => (Verdict::EffectsAndUnknown, best.causes.clone()),
+            (false, false) => (Verdict::Effects, self.likeliest_first(best)),
+            (false, true) => (Verdict::EffectsAndUnknown, self.likeliest_first(best)),
         }
+    }
+
+    /// The causes of an explanation by how probable each is alone.
+    fn likeliest_first(&self, explanation: &Explanation) -> Vec<Effect> {
+        let alone = |cause: &Effect| {
+            let own = self.singles.iter().find(|single| single.cause() == cause.description().cause);
+            own.map_or(f64::NEG_INFINITY, |single| logit(&single.support))
+        };
+        let mut causes = explanation.causes.clone();
+        causes.sort_by(|a, b| alone(b).total_cmp(&alone(a)));
+        causes
     }
 
     /// The likeliest singles that hold the true one with some probability, if one of them is; of a pair, its members.

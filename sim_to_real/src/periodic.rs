@@ -16,7 +16,7 @@ const LAGS: [usize; 15] = [0, 2, 4, 6, 8, 10, 13, 16, 20, 25, 30, 36, 43, 50, 60
 /// The lag at which a servo has followed, where turning yields with the speed.
 const FOLLOWED: usize = 10;
 const N_FEATURES: usize = LAGS.len() + 3;
-/// A swing is told where every drive holds it so many times as strongly as its neighbours in the spectrum: of 280 cases without
+/// A swing is told where every drive holds it so many times as strongly as its neighbours in the spectrum: of 260 cases without
 /// one, none reaches 14.
 const STANDS_OUT: f64 = 25.0;
 /// Nominal drives may show this share of it.

@@ -51,14 +51,15 @@ fn actuators_keep_their_limits() {
     }
 }
 
-/// Two lags of T / 2 in series answer a step by 1 - (1 + 2 t / T) exp(-2 t / T); what passes between them is the mean of a step.
+/// Two lags of T / 2 in series answer a step by 1 - (1 + 2 t / T) exp(-2 t / T). What passes between them is the mean of a step,
+/// which is off by some (dt / T)^2 = 0.001 of it.
 #[test]
 fn a_chain_of_lags_begins_without_a_slope() {
-    let states = run(vec![effect("speed_lag_chain", 0.8)], State::default(), command(2.0, 0.0), 40);
+    let states = run(vec![effect("speed_lag_chain", 3.0)], State::default(), command(2.0, 0.0), 40);
     for (step, state) in states.iter().enumerate().skip(1) {
-        let halves = (step as f64 - 0.5) * STEP_S / 0.4;
+        let halves = (step as f64 - 0.5) * STEP_S / 1.5;
         let expected = 2.0 * (1.0 - (1.0 + halves) * (-halves).exp());
-        assert!((state.speed_mps - expected).abs() < 0.01, "{step}: {} {expected}", state.speed_mps);
+        assert!((state.speed_mps - expected).abs() < 0.003, "{step}: {} {expected}", state.speed_mps);
     }
 }
 

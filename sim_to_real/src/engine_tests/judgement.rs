@@ -142,6 +142,20 @@ fn how_the_body_leans_tells_a_drag_from_a_scale_of_the_speed() {
     assert_eq!((announced_of(0.0, 1.28), announced_of(7.0, 1.28)), (None, Some("rolling_drag")));
 }
 
+/// Of a pair that is named, the one that is likelier alone comes first, however it was found.
+#[test]
+fn the_likelier_of_two_is_named_first() {
+    let named = |attitude: f64| {
+        let mut singles = vec![single(SINGLES[3], 4.0, 2.0), single(SINGLES[4], 4.0, 2.1)];
+        singles[1].support.attitude = attitude;
+        let both = [SINGLES[3], SINGLES[4]].map(|(id, value)| effect(id, value));
+        let judgement = of(4.0, singles, vec![Explanation::new(both.to_vec(), 1.0)]).judge(&null());
+        announced(&judgement).into_iter().map(str::to_owned).collect::<Vec<_>>()
+    };
+    assert_eq!(named(0.0), ["speed_scale", "rolling_drag"]);
+    assert_eq!(named(5.0), ["rolling_drag", "speed_scale"]);
+}
+
 /// A drag that takes a hundredth off is no second effect, unless the body leans against it: by 10 standard deviations,
 /// 9 / 2 ln(108 / 8) - 1 = 10.7, where gain and price are (0.01 - 0.12) / 0.035 = -3.1.
 #[test]
