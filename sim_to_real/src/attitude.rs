@@ -76,7 +76,8 @@ impl AttitudeModel {
             pushed(0.0, -GRAVITY_MPS2 * roll),
             // The same springs carry more.
             pushed(GRAVITY_MPS2 * pitch - ahead, -GRAVITY_MPS2 * roll - across),
-            // The body was foretold from a turning, or on a slope, that was none.
+            // The body was foretold from an acceleration, or on a slope, that was none.
+            pushed(ahead, across),
             pushed(0.0, own.speed_mps),
             [of_ground[PITCH] * roll, -of_ground[ROLL] * pitch],
         ]

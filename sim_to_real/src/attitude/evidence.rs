@@ -3,15 +3,13 @@
 use super::block::{PITCH, ROLL};
 use crate::findings::Leaning;
 use bicycle::Effect;
-use nalgebra::{DMatrix, DVector, SMatrix};
-use std::ops::Range;
+use nalgebra::{DMatrix, DVector, SMatrix, SVector};
 
 /// Columns of a [`Gram`]: what is left, an offset of each angle,
 const LEFT: usize = 0;
 const OFFSET: [usize; 2] = [1, 2];
-/// and causes, one with two components twice. Of the last, which are the sensors', drives tell far more than that they have
-/// the body foretold wrongly: that is no evidence, and explains how it leans.
-pub(super) const CAUSES: [&str; 9] = [
+/// forces, one with two components twice, and what sensors misstate, of which a body is foretold wrongly.
+pub(super) const CAUSES: [&str; 10] = [
     "rolling_drag",
     "quad_drag",
     "veg_drag",
@@ -19,6 +17,7 @@ pub(super) const CAUSES: [&str; 9] = [
     "wind",
     "cross_slope",
     "mass",
+    "odom_scale",
     "gyro_bias",
     "yaw_misalign",
 ];
@@ -28,8 +27,10 @@ pub(super) const N_COLUMNS: usize = FIRST_CAUSE + CAUSES.len();
 /// Inner products of the columns, of errors that are independent and 1.
 pub(super) type Gram = SMatrix<f64, N_COLUMNS, N_COLUMNS>;
 
-/// Nominal drives are few: errors are Student's with so many degrees of freedom, and the evidence of a force is bounded.
+/// Nominal drives are few: errors are Student's with so many degrees of freedom.
 const FREEDOM: f64 = 8.0;
+/// No lean is worth more than this, in the logarithm of the odds: what the rollouts say beyond doubt stays so.
+const MOST: f64 = 10.0;
 /// Every size that is free to fit takes this off the logarithm of the odds, twice what chance makes of it.
 const PRICE: f64 = 1.0;
 /// A body leans where every drive says so by this many standard deviations, to the same side. Of 170 cases without any effect
@@ -56,22 +57,25 @@ impl AttitudeEvidence {
         Self { drives }
     }
 
-    /// Logarithm of how many times as probable the angles are with these causes, at whatever size, as without; at least 0,
-    /// for a force may act where no spring feels it.
+    /// Logarithm of how many times as probable the angles are with these causes, forces at whatever size, as without; at least
+    /// 0, for a force may act where no spring feels it.
     pub(crate) fn support(&self, causes: &[Effect]) -> f64 {
-        let fitted = self.fitted(causes, FIRST_CAUSE..FIRST_OF_SENSORS);
-        let everything = Fitted::of(&self.all(), (OFFSET[PITCH]..N_COLUMNS).collect()).taken_off;
-        let with = (everything - fitted.taken_off).max(0.0);
-        let ratio = (FREEDOM + everything) / (FREEDOM + with);
-        (0.5 * (FREEDOM + 1.0) * ratio.ln() - PRICE * fitted.columns.len() as f64).max(0.0)
+        let all: Gram = self.drives.iter().sum();
+        let everything = |gram: &Gram| Fitted::of(gram, (OFFSET[PITCH]..N_COLUMNS).collect()).taken_off;
+        let stated = rightly_stated(&all, causes);
+        let fitted = Fitted::to_forces(&stated, causes);
+        let with = (everything(&stated) - fitted.taken_off).max(0.0);
+        let ratio = (FREEDOM + everything(&all)) / (FREEDOM + with);
+        (0.5 * (FREEDOM + 1.0) * ratio.ln() - PRICE * fitted.columns.len() as f64).clamp(0.0, MOST)
     }
 
     /// How much further the body leans than these causes say, if every drive agrees.
     pub(crate) fn leaning(&self, causes: &[Effect]) -> Option<Leaning> {
-        let fitted = self.fitted(causes, FIRST_CAUSE..N_COLUMNS);
+        let drives: Vec<Gram> = self.drives.iter().map(|own| rightly_stated(own, causes)).collect();
+        let fitted = Fitted::to_forces(&drives.iter().sum(), causes);
         let of_axis = |axis: usize| {
             let offsets: Vec<(f64, f64)> =
-                self.drives.iter().map(|own| fitted.offset(own, OFFSET[axis])).collect();
+                drives.iter().map(|own| fitted.offset(own, OFFSET[axis])).collect();
             let (mean, _) = *offsets.first()?;
             let agrees = |(size, strength): &(f64, f64)| *strength > LEANS && size.signum() == mean.signum();
             let n = offsets.len() as f64;
@@ -81,26 +85,31 @@ impl AttitudeEvidence {
         (pitch.or(roll).is_some())
             .then(|| Leaning { pitch_rad: pitch.unwrap_or_default(), roll_rad: roll.unwrap_or_default() })
     }
+}
 
-    fn all(&self) -> Gram {
-        self.drives.iter().sum()
-    }
+/// Whether a column is of a cause.
+fn is_of(column: usize, cause: &Effect) -> bool {
+    CAUSES[column - FIRST_CAUSE] == cause.description().cause
+}
 
-    /// Those of the causes that have one of these columns; what the angles ask for the other way round is none.
-    fn fitted(&self, causes: &[Effect], of: Range<usize>) -> Fitted {
-        let all = self.all();
-        let is_one =
-            |column: &usize, cause: &Effect| CAUSES[column - FIRST_CAUSE] == cause.description().cause;
-        let columns: Vec<usize> =
-            of.filter(|column| causes.iter().any(|cause| is_one(column, cause))).collect();
-        let fitted = Fitted::of(&all, columns);
-        let agrees = |(column, size): (&usize, &f64)| {
-            let cause = causes.iter().find(|cause| is_one(column, cause))?;
-            (direction(cause).is_none_or(|direction| direction * size > 0.0)).then_some(*column)
-        };
-        let agreed: Vec<usize> = fitted.columns.iter().zip(&fitted.sizes).filter_map(agrees).collect();
-        if agreed.len() == fitted.columns.len() { fitted } else { Fitted::of(&all, agreed) }
+/// The same once what the sensors misstate is put right, which the rollouts tell the size of.
+fn rightly_stated(gram: &Gram, causes: &[Effect]) -> Gram {
+    let mut left = SVector::<f64, N_COLUMNS>::zeros();
+    left[LEFT] = 1.0;
+    for column in FIRST_OF_SENSORS..N_COLUMNS {
+        let own = causes.iter().find(|cause| is_of(column, cause));
+        left[column] = own.map_or(0.0, |cause| match cause {
+            // Of accelerations that were measured so many times as large.
+            Effect::OdomScale(scale) => 1.0 / scale.ratio - 1.0,
+            _ => -cause.values()[0],
+        });
     }
+    let products = gram * left;
+    let mut stated = *gram;
+    stated.set_column(LEFT, &products);
+    stated.set_row(LEFT, &products.transpose());
+    stated[(LEFT, LEFT)] = left.dot(&products);
+    stated
 }
 
 /// Which way an effect of one size acts.
@@ -110,6 +119,21 @@ fn direction(cause: &Effect) -> Option<f64> {
 }
 
 impl Fitted {
+    /// Forces of these causes; what the angles ask for the other way round is none.
+    fn to_forces(gram: &Gram, causes: &[Effect]) -> Self {
+        let cause = |column: usize| causes.iter().find(|cause| is_of(column, cause));
+        let fitted = Self::of(
+            gram,
+            (FIRST_CAUSE..FIRST_OF_SENSORS).filter(|column| cause(*column).is_some()).collect(),
+        );
+        let agrees = |(column, size): (&usize, &f64)| {
+            let is_this_way = direction(cause(*column)?).is_none_or(|direction| direction * size > 0.0);
+            is_this_way.then_some(*column)
+        };
+        let agreed: Vec<usize> = fitted.columns.iter().zip(&fitted.sizes).filter_map(agrees).collect();
+        if agreed.len() == fitted.columns.len() { fitted } else { Self::of(gram, agreed) }
+    }
+
     fn of(gram: &Gram, columns: Vec<usize>) -> Self {
         if columns.is_empty() {
             return Self { columns, sizes: DVector::zeros(0), taken_off: 0.0 };

@@ -26,6 +26,8 @@ struct Body {
     /// Angles at which it stands [rad]: nose down, left side up.
     stands: [f64; 2],
     gyro_bias_radps: f64,
+    /// Measured over true speed.
+    odom_scale: f64,
     /// Of a measured angle.
     noise_rad: f64,
 }
@@ -36,6 +38,7 @@ const SIMULATED: Body = Body {
     drag_mps2: 0.0,
     stands: [0.003, 0.0],
     gyro_bias_radps: 0.0,
+    odom_scale: 1.0,
     noise_rad: 0.004,
 };
 
@@ -93,7 +96,7 @@ fn drive(body: Body, machine: &Machine, seed: u64) -> Drive {
                 x,
                 y,
                 yaw,
-                speed + 0.02 * noise(),
+                body.odom_scale * speed + 0.02 * noise(),
                 turning + body.gyro_bias_radps + 0.005 * noise(),
                 angles[1] + body.noise_rad * noise(),
                 angles[0] + body.noise_rad * noise(),
@@ -186,9 +189,23 @@ fn a_gyro_says_why_a_body_seems_to_lean() {
     let biased = evidence(Body { gyro_bias_radps: 0.1, ..SIMULATED }, &hills());
     let leaning = biased.leaning(&[]).unwrap();
     assert!((leaning.roll_rad + 0.004).abs() < 0.001, "{leaning:?}");
-    assert_eq!(biased.leaning(&[effect("gyro_bias", 0.1)]), None);
-    assert!(biased.leaning(&[effect("gyro_bias", -0.1)]).is_some());
-    assert!(causes().iter().all(|cause| biased.support(&[*cause]) < 1.5));
+    let of = |bias: f64| [effect("gyro_bias", bias)];
+    assert_eq!(biased.leaning(&of(0.1)), None);
+    assert!(biased.leaning(&of(-0.1)).is_some());
+    assert!(biased.support(&of(0.1)) > 4.0 && biased.support(&of(-0.1)) == 0.0);
+    let forces = causes().into_iter().filter(|cause| cause.description().id != "gyro_bias");
+    assert!(forces.into_iter().all(|cause| biased.support(&[cause]) < 1.5));
+}
+
+/// Speeds that are told 1.3 times as large have the body foretold from accelerations that were not: as under a load of 1 / 1.3,
+/// and better by what they are.
+#[test]
+fn speeds_that_are_told_too_large_are_no_load() {
+    let scaled = evidence(Body { odom_scale: 1.3, ..SIMULATED }, &hills());
+    let [load, scale] =
+        [("mass", 0.8), ("odom_scale", 1.3)].map(|(id, value)| scaled.support(&[effect(id, value)]));
+    assert!(scale > 4.0 && scale > load, "{load} {scale}");
+    assert_eq!(scaled.support(&[effect("odom_scale", 0.8)]), 0.0);
 }
 
 /// A spring that gives way by 0.02 rad is no drag, and no gyro, and is told with its size.
