@@ -60,35 +60,26 @@ impl YawResponse {
             return None;
         }
         let found = [SwingOver::Time, SwingOver::Way].map(|over| self.swing_over(over, &real));
-        let strength = |(swing, spectrum): &(Swing, Spectrum)| {
-            let told = spectrum.frequencies.iter().zip(&spectrum.real);
-            told.filter(|(own, _)| **own == swing.frequency).map(|(_, power)| *power).fold(0.0, f64::max)
-        };
-        found.into_iter().flatten().max_by(|a, b| strength(a).total_cmp(&strength(b)))
+        let strongest = found.into_iter().flatten().max_by(|a, b| a.0.total_cmp(&b.0));
+        strongest.map(|(_, swing, spectrum)| (swing, spectrum))
     }
 
-    fn swing_over(&self, over: SwingOver, real: &[Series]) -> Option<(Swing, Spectrum)> {
+    /// With its power.
+    fn swing_over(&self, over: SwingOver, real: &[Series]) -> Option<(f64, Swing, Spectrum)> {
         let frequencies = frequencies(over, real, self.wheelbase_m);
-        let of_real: Vec<Vec<f64>> = real.iter().map(|own| powers(own, over, &frequencies)).collect();
-        let least = |place: usize| of_real.iter().map(|own| own[place]).fold(f64::INFINITY, f64::min);
-        let real_power: Vec<f64> = (0..frequencies.len()).map(least).collect();
+        let real_power = of_all(real, over, &frequencies, f64::min);
         let place = (0..frequencies.len()).max_by(|a, b| real_power[*a].total_cmp(&real_power[*b]))?;
-        if real_power[place] < STANDS_OUT {
+        let power = real_power[place];
+        if power < STANDS_OUT {
             return None;
         }
-        let of_nominal: Vec<Vec<f64>> = self.left.iter().map(|own| powers(own, over, &frequencies)).collect();
-        let largest = |place: usize| of_nominal.iter().map(|own| own[place]).fold(0.0, f64::max);
-        let nominal: Vec<f64> = (0..frequencies.len()).map(largest).collect();
+        let nominal = of_all(&self.left, over, &frequencies, f64::max);
+        let is_new = nominal[place] < NOMINAL_SHARE * power;
         // A power is the larger one of its neighbours' as well.
         let next = &frequencies[place.saturating_sub(1)..(place + 2).min(frequencies.len())];
-        let mean = |frequency: f64| {
-            real.iter().map(|own| own.amplitude(over, frequency)).sum::<f64>() / real.len() as f64
-        };
-        let sizes = next.iter().map(|&frequency| (mean(frequency), frequency));
-        let (amplitude_radps, frequency) = sizes.max_by(|a, b| a.0.total_cmp(&b.0))?;
-        let is_new = nominal[place] < NOMINAL_SHARE * real_power[place];
+        let (amplitude_radps, frequency) = strongest(real, over, next)?;
         let spectrum = Spectrum { over, frequencies, real: real_power, nominal };
-        is_new.then_some((Swing { over, frequency, amplitude_radps }, spectrum))
+        is_new.then_some((power, Swing { over, frequency, amplitude_radps }, spectrum))
     }
 
     /// What the commanded turning leaves of the yaw rate of a drive.
@@ -101,6 +92,22 @@ impl YawResponse {
         };
         Series::of(rows(drive).map(of_row), STEP_S)
     }
+}
+
+/// Powers of all drives, of which one is chosen frequency by frequency.
+fn of_all(drives: &[Series], over: SwingOver, frequencies: &[f64], chosen: fn(f64, f64) -> f64) -> Vec<f64> {
+    let each: Vec<Vec<f64>> = drives.iter().map(|own| powers(own, over, frequencies)).collect();
+    let at = |place: usize| each.iter().map(|own| own[place]).reduce(chosen).unwrap_or_default();
+    (0..frequencies.len()).map(at).collect()
+}
+
+/// The largest mean amplitude of all drives, and its frequency.
+fn strongest(drives: &[Series], over: SwingOver, frequencies: &[f64]) -> Option<(f64, f64)> {
+    let mean = |frequency: f64| {
+        drives.iter().map(|own| own.amplitude(over, frequency)).sum::<f64>() / drives.len() as f64
+    };
+    let sizes = frequencies.iter().map(|&frequency| (mean(frequency), frequency));
+    sizes.max_by(|a, b| a.0.total_cmp(&b.0))
 }
 
 fn tells(drive: &Drive) -> bool {
