@@ -23,6 +23,11 @@ pub enum Verdict {
 }
 
 impl Verdict {
+    /// Whether a part of the gap is none of the catalogue's.
+    pub(crate) fn holds_unknown(self) -> bool {
+        matches!(self, Self::Unknown | Self::EffectsAndUnknown)
+    }
+
     /// With something more that is none of the catalogue.
     pub(crate) fn with_unknown(self) -> Self {
         match self {

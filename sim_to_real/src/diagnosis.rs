@@ -89,12 +89,8 @@ pub fn diagnose(baseline: &Baseline, machine: &Machine, real: &[DriveLog]) -> Re
         let taken_off: Vec<f32> = before.iter().zip(&after).map(|(before, after)| before - after).collect();
         conditions = with_announced(&conditions, (&own, &StartRecord::of(&all, &taken_off)));
     }
-    let left = match judgement.verdict {
-        Verdict::Unknown | Verdict::EffectsAndUnknown => {
-            left_over((&all, &repaired), &baseline.null.starts, &baseline.yardstick)
-        }
-        Verdict::None | Verdict::Effects => Vec::new(),
-    };
+    let left_over = || left_over((&all, &repaired), &baseline.null.starts, &baseline.yardstick);
+    let left = judgement.verdict.holds_unknown().then(left_over).unwrap_or_default();
     let findings = Findings {
         conditions,
         residuals: residual_cells(&before, &after, Some(&baseline.null.cells)),

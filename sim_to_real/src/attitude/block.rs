@@ -67,7 +67,8 @@ impl Rows<'_> {
         let mean = |of: &dyn Fn(usize) -> f64| (first..first + ROWS).map(of).sum::<f64>() / ROWS as f64;
         let smooth = |quantity: usize, row: usize| self.smooth[quantity][row];
         let direction = |row: usize| smooth(VX, row).signum();
-        let in_vegetation = |row: usize| if self.class[row] == VEGETATION { direction(row) } else { 0.0 };
+        let in_vegetation =
+            |row: usize| if (self.class[row] - VEGETATION).abs() < 0.5 { direction(row) } else { 0.0 };
         let gained_mps = smooth(VX, first + ROWS) - smooth(VX, first);
         Block {
             body: [1, 0].map(|column| mean(&|row| self.attitude[column][row])),
