@@ -1,4 +1,4 @@
-//! Bodies on springs, in steps of a fiftieth of a second's twentieth: their equations of motion and none of the module's.
+//! Bodies on springs, in steps of a millisecond: their equations of motion and none of the module's.
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
 use super::*;
