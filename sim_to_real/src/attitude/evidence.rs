@@ -69,8 +69,12 @@ impl AttitudeEvidence {
         (0.5 * (FREEDOM + 1.0) * ratio.ln() - PRICE * fitted.columns.len() as f64).clamp(0.0, MOST)
     }
 
-    /// How much further the body leans than these causes say, if every drive agrees.
+    /// How much further the body leans than these causes say, if every drive of two or more agrees: one alone was off by six
+    /// standard deviations without any effect.
     pub(crate) fn leaning(&self, causes: &[Effect]) -> Option<Leaning> {
+        if self.drives.len() < 2 {
+            return None;
+        }
         let drives: Vec<Gram> = self.drives.iter().map(|own| rightly_stated(own, causes)).collect();
         let fitted = Fitted::to_forces(&drives.iter().sum(), causes);
         let of_axis = |axis: usize| {

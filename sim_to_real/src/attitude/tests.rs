@@ -216,6 +216,10 @@ fn a_body_that_leans_for_no_cause_is_told_so() {
     assert!(leaning.pitch_rad == 0.0 && (leaning.roll_rad + 0.02).abs() < 0.001, "{leaning:?}");
     assert!(causes().iter().all(|cause| sagging.support(&[*cause]) < 3.0));
     assert!(sagging.leaning(&causes()).is_some());
+    let alone = [drive(Body { stands: [0.003, -0.02], ..SIMULATED }, &hills(), 4)];
+    let nominal = [1, 2, 3].map(|seed| drive(SIMULATED, &hills(), seed));
+    let model = AttitudeModel::of(&nominal.iter().collect::<Vec<_>>()).unwrap();
+    assert_eq!(model.evidence(&alone.iter().collect::<Vec<_>>()).leaning(&[]), None);
 }
 
 #[test]
