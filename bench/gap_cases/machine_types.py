@@ -16,7 +16,8 @@ MACHINE = np.dtype(
         (name, "f8")
         for name in """
         mass_kg inertia_kgm2 front_m rear_m track_m height_m
-        roll_rate_radps roll_damping roll_gain pitch_rate_radps pitch_damping pitch_gain front_roll_share transfer_s roll_steer camber_thrust
+        roll_rate_radps roll_damping roll_gain pitch_rate_radps pitch_damping pitch_gain
+        front_roll_share transfer_s roll_steer camber_thrust
         mu stiff_long stiff_lat rear_stiff_ratio shape curvature load_sensitivity relax_long_m relax_lat_m
         compliance_radps2pm soil_sinkage soil_shear_m soil_slip_sinkage
         radius_m wheel_inertia_kgm2 roll_resistance aero_pm loose_mu loose_drag_mps2 veg_drag_mps2
@@ -47,7 +48,8 @@ STATE = np.dtype(
     [
         (name, "f8")
         for name in """
-        x_m y_m yaw_rad vx_mps vy_mps wz_radps roll_rad roll_rate_radps squat_rad squat_rate_radps ax_mps2 ay_mps2 force_x_mps2 force_y_mps2
+        x_m y_m yaw_rad vx_mps vy_mps wz_radps roll_rad roll_rate_radps squat_rad squat_rate_radps
+        ax_mps2 ay_mps2 force_x_mps2 force_y_mps2
         steer_rad steer_rate_radps rear_steer_rad wheel_steer_rad lagged_steer_rad play_rad
         speed_lag1_mps speed_lag2_mps hill_pitch_rad pitch_rad roll_ground_rad height_m terrain_class
         dead_on heat trailer_rad front_force_mps2 held_speed_mps held_steer_rad read_steer_tick read_speed_tick turn_rad
