@@ -27,6 +27,7 @@ mod speed_ramp;
 mod steer_linkage;
 mod steer_servo;
 mod steer_swing;
+mod tyre_slide;
 mod tyre_slip;
 mod wheel_slip;
 mod wind;
@@ -107,6 +108,10 @@ macro_rules! catalogue {
             /// Whether it reads the gradient or the class of the ground.
             pub fn uses_ground(&self) -> bool {
                 match self { $(Self::$name(_) => $name::USES_GROUND,)* }
+            }
+
+            fn carries_motion(&self) -> bool {
+                match self { $(Self::$name(_) => $name::CARRIES_MOTION,)* }
             }
 
             fn stages(&self) -> &'static [Stage] {
@@ -211,6 +216,7 @@ catalogue! {
     rear_slip::RearSteer,
     friction::Friction,
     tyre_slip::TyreSlip,
+    tyre_slide::TyreSlide,
     sensors::PoseLatency,
     sensors::OdomScale,
     sensors::GyroBias,

@@ -148,6 +148,7 @@ impl MotionModel for Model {
         let limits = &self.limits;
         let safe = |effect: &Effect| match effect {
             Effect::Friction(friction) => GRIP_SHARE * friction.mu * GRAVITY_MPS2,
+            Effect::TyreSlide(slide) => GRIP_SHARE * slide.mu * GRAVITY_MPS2,
             _ => f64::INFINITY,
         };
         let lateral_max_mps2 = limits.lateral_acceleration_max_mps2;

@@ -83,6 +83,7 @@ pub(crate) fn towards<L: Lanes>(asked: Real<L>, reached: Real<L>, change: Consta
 /// A model made ready for one step length and one unit of length.
 #[derive(Clone, Debug)]
 pub struct Stepper {
+    wheelbase: Constant,
     per_wheelbase: Constant,
     advance: Constant,
     turn: Constant,
@@ -99,6 +100,7 @@ impl Stepper {
     /// Steps of `step_s`, positions in units of `unit_m`.
     pub fn new(model: &Model, step_s: f64, unit_m: f64) -> Self {
         Self {
+            wheelbase: Constant::new(model.wheelbase_m),
             per_wheelbase: Constant::new(1.0 / model.wheelbase_m),
             advance: Constant::new(step_s / unit_m),
             turn: Constant::new(step_s / TAU),
@@ -170,6 +172,17 @@ impl Stepper {
     #[inline(always)]
     pub fn correct_held<L: Lanes>(&self, memory: &mut [L::Value], faster: Real<L>) {
         self.effects.correct_held(memory, faster);
+    }
+
+    /// Lets vehicles begin with a measured speed to the left [m/s] and yaw rate [rad/s], where the third is 1, or as the
+    /// model has them, where it is 0.
+    pub fn start_motion<V: Copy>(&self, memory: &mut [V], motion: [V; 3]) {
+        self.effects.start_motion(memory, motion);
+    }
+
+    /// Whether an effect carries how the body moves from step to step; see [`Stepper::start_motion`].
+    pub fn carries_motion(&self) -> bool {
+        self.effects.carries_motion()
     }
 
     /// Fills the memory as a command leaves it that was in force for long.
@@ -325,9 +338,13 @@ impl Stepper {
             side_acceleration,
             acceleration,
             steering_tangent,
+            wheelbase: Real::constant(lanes, self.wheelbase),
+            gained: lanes.real(0.0),
+            remembered: [lanes.real(0.0); 3],
         };
-        self.effects.on_motion(&mut moving);
-        let Moving { forward, lateral, yaw_rate, .. } = moving;
+        self.effects.on_motion(memory, &mut moving);
+        let Moving { forward, lateral, yaw_rate, gained, .. } = moving;
+        state.speed = state.speed + gained;
         let share = ground.linear_traction * Real::constant(lanes, self.advance);
         let (forward_step, lateral_step) = (forward * share, lateral * share);
         state.x = forward_step.mul_add(cosine, state.x) - lateral_step * sine;

@@ -128,7 +128,7 @@ impl Evidence {
             "veg_drag" | "loose_drag" => self.judges_speed() && self.classes,
             "cross_slope" => self.slopes,
             "steer_rate" | "backlash" => is_commanded,
-            "friction" => by_angle,
+            "friction" | "tyre_slide" => by_angle,
             "tyre_slip" => by_angle && (self.pose || self.side_speed),
             "rear_slip" | "rear_steer" => self.pose || self.side_speed,
             "yaw_misalign" => self.pose,

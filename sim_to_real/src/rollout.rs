@@ -5,7 +5,7 @@ mod rows;
 #[cfg(test)]
 mod tests;
 
-use crate::drive::{Drive, HORIZONS, N_QUANTITIES, N_STEPS, STEP_S, VX, YAW};
+use crate::drive::{Drive, HORIZONS, N_QUANTITIES, N_STEPS, STEP_S, VX, VY, WZ, YAW};
 use crate::evidence::{Evidence, SpeedInput, SpeedSource};
 use bicycle::effect::Effect;
 use bicycle::lanes::{Instructions, Lanes, Portable, Real};
@@ -156,6 +156,10 @@ impl RollOut<'_> {
         for (held, given) in simulator.stepper.held(&mut memory).iter_mut().zip(&self.given.held) {
             *held = packed(lanes, |lane| given[rows[lane]]).1;
         }
+        if simulator.stepper.carries_motion() {
+            let motion = [0, 1, 2].map(|place| packed(lanes, |lane| self.motion(rows[lane])[place]).1);
+            simulator.stepper.start_motion(&mut memory, motion);
+        }
         let mut turned = zero;
         let mut way: Way = [[[0.0; WIDEST]; 3]; N_STEPS + 1];
         let mut next_horizon = 0;
@@ -185,6 +189,16 @@ impl RollOut<'_> {
                 next_horizon += 1;
             }
         }
+    }
+
+    /// Speed to the left [m/s] and yaw rate [rad/s], and 1; where the former was not measured, 0.
+    fn motion(&self, row: usize) -> [f32; 3] {
+        let Drive { measured, smooth, .. } = self.drive;
+        if measured[VY][row].is_nan() {
+            return [0.0; 3];
+        }
+        let yaw_rate_radps = smooth[WZ][row] - self.simulator.sensors.yaw_rate_bias_radps;
+        [smooth[VY][row] as f32, yaw_rate_radps as f32, 1.0]
     }
 
     fn origin(&self, row: usize) -> Origin {

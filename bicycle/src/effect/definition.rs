@@ -153,9 +153,34 @@ pub struct Moving<L: Lanes> {
     pub acceleration: Real<L>,
     /// Tangent of the angle that the steering reached; 0 for a skid-steered vehicle.
     pub steering_tangent: Real<L>,
+    /// Distance between the axles [m].
+    pub wheelbase: Real<L>,
+    /// Speed along the body's x axis that the drive has gained once the step is done [m/s].
+    pub gained: Real<L>,
+    /// What an effect that carries the motion remembers of it; see [`Moving::carried`].
+    pub(crate) remembered: [Real<L>; N_CARRIED],
 }
 
+/// What an effect that carries the motion remembers: speed to the left [m/s], yaw rate [rad/s], and whether the motion
+/// has begun, 0 or 1.
+pub(crate) const N_CARRIED: usize = 3;
+
 impl<L: Lanes> Moving<L> {
+    /// Speed to the left [m/s] and yaw rate [rad/s] before this step; those of the model where none were carried yet.
+    #[inline(always)]
+    pub fn carried(&self) -> [Real<L>; 2] {
+        let [lateral, yaw_rate, begun] = self.remembered;
+        let or_model = |carried: Real<L>, model: Real<L>| begun.mul_add(carried - model, model);
+        [or_model(lateral, self.lateral), or_model(yaw_rate, self.yaw_rate)]
+    }
+
+    /// Moves so in this step, and carries it to the next.
+    #[inline(always)]
+    pub fn carry(&mut self, lateral: Real<L>, yaw_rate: Real<L>) {
+        (self.lateral, self.yaw_rate) = (lateral, yaw_rate);
+        self.remembered = [lateral, yaw_rate, self.forward.0.real(1.0)];
+    }
+
     /// Lateral acceleration that the tyres have to supply [m/s2].
     #[inline(always)]
     pub fn tyre_acceleration(&self) -> Real<L> {
@@ -194,6 +219,8 @@ pub(crate) trait Definition: Values {
     const STAGES: &'static [Stage];
     /// Whether it reads the gradient or the class of the ground.
     const USES_GROUND: bool = false;
+    /// Whether it carries how the body moves sideways and turns from step to step.
+    const CARRIES_MOTION: bool = false;
 
     /// Smallest value of the first parameter with which a step is finite at speeds of up to `speed_mps`, where that is
     /// not what the parameter's bounds say.

@@ -1,6 +1,6 @@
 //! The effects of a model, made ready for one step length.
 
-use super::definition::{Commanding, Constants, Driving, Moving, Stage};
+use super::definition::{Commanding, Constants, Driving, Moving, N_CARRIED, Stage};
 use super::{Effect, Kind};
 use crate::lanes::{Constant, Lanes, Real, Scalar};
 use crate::{Asked, Command};
@@ -15,8 +15,23 @@ struct Prepared {
     constants: Constants,
     first_slot: usize,
     n_slots: usize,
-    /// Slot of the acceleration that the effect holds.
-    held: Option<usize>,
+    /// What it remembers in its slots is the motion.
+    carries_motion: bool,
+    held: Option<Held>,
+}
+
+/// An acceleration that an effect holds.
+#[derive(Clone, Copy, Debug)]
+struct Held {
+    slot: usize,
+    /// See [`Effect::held_follows_per_s`].
+    follows_per_s: f64,
+}
+
+impl Prepared {
+    fn slots(&self) -> std::ops::Range<usize> {
+        self.first_slot..self.first_slot + self.n_slots
+    }
 }
 
 /// The effects of a model, made ready for one step length, by stage.
@@ -36,13 +51,18 @@ pub(crate) struct PreparedEffects {
 
 impl PreparedEffects {
     pub(crate) fn new(effects: &[Effect], step_s: f64) -> Self {
-        let first_held = effects.iter().map(|effect| effect.n_slots(step_s)).sum();
+        let n_slots =
+            |effect: &Effect| effect.n_slots(step_s) + if effect.carries_motion() { N_CARRIED } else { 0 };
+        let first_held = effects.iter().map(n_slots).sum();
         let (mut first_slot, mut next_held) = (0, first_held);
         let prepare = |&effect: &Effect| {
-            let n_slots = effect.n_slots(step_s);
+            let n_slots = n_slots(&effect);
             let constants = effect.constants(step_s).map(Constant::new);
-            let held = effect.held_follows_per_s().map(|_| next_held);
-            let prepared = Prepared { effect, kind: effect.kind(), constants, first_slot, n_slots, held };
+            let held =
+                effect.held_follows_per_s().map(|follows_per_s| Held { slot: next_held, follows_per_s });
+            let carries_motion = effect.carries_motion();
+            let kind = effect.kind();
+            let prepared = Prepared { effect, kind, constants, first_slot, n_slots, carries_motion, held };
             (first_slot, next_held) = (first_slot + n_slots, next_held + usize::from(held.is_some()));
             prepared
         };
@@ -97,8 +117,8 @@ impl PreparedEffects {
     pub(crate) fn correct_held<L: Lanes>(&self, memory: &mut [L::Value], faster: Real<L>) {
         let lanes = faster.0;
         for prepared in &self.on_drive {
-            if let (Some(slot), Some(per_s)) = (prepared.held, prepared.effect.held_follows_per_s()) {
-                memory[slot] = faster.mul_add(lanes.real(per_s), Real(lanes, memory[slot])).1;
+            if let Some(Held { slot, follows_per_s }) = prepared.held {
+                memory[slot] = faster.mul_add(lanes.real(follows_per_s), Real(lanes, memory[slot])).1;
             }
         }
     }
@@ -118,9 +138,19 @@ impl PreparedEffects {
 
     /// Fills the memory as a command leaves it that was given for long.
     pub(crate) fn fill_steady_state(&self, command: [f64; 2], memory: &mut [f64]) {
-        for prepared in &self.on_command {
-            let slots = prepared.first_slot..prepared.first_slot + prepared.n_slots;
-            memory[slots].fill(prepared.effect.steady_state(command));
+        for prepared in self.on_motion.iter().chain(&self.on_command) {
+            memory[prepared.slots()].fill(prepared.effect.steady_state(command));
+        }
+    }
+
+    pub(crate) fn carries_motion(&self) -> bool {
+        self.on_motion.iter().any(|prepared| prepared.carries_motion)
+    }
+
+    /// Lets bodies begin with a speed to the left [m/s] and a yaw rate [rad/s].
+    pub(crate) fn start_motion<V: Copy>(&self, memory: &mut [V], motion: [V; N_CARRIED]) {
+        for prepared in self.on_motion.iter().filter(|prepared| prepared.carries_motion) {
+            memory[prepared.slots()].copy_from_slice(&motion);
         }
     }
 
@@ -139,7 +169,7 @@ impl PreparedEffects {
                 steering: state.asked.steering,
                 acceleration: state.asked.acceleration,
                 reached_speed: state.reached_speed,
-                memory: &mut memory[prepared.first_slot..prepared.first_slot + prepared.n_slots],
+                memory: &mut memory[prepared.slots()],
                 step: state.step,
             };
             prepared.kind.on_command(&prepared.constants, &mut commanding);
@@ -153,7 +183,7 @@ impl PreparedEffects {
         for prepared in &self.on_drive {
             match prepared.held {
                 None => prepared.kind.on_drive(&prepared.constants, driving),
-                Some(slot) => {
+                Some(Held { slot, .. }) => {
                     driving.held.1 = memory[slot];
                     prepared.kind.on_drive(&prepared.constants, driving);
                     memory[slot] = driving.held.1;
@@ -161,7 +191,7 @@ impl PreparedEffects {
             }
         }
         for prepared in &self.on_drive {
-            if let Some(slot) = prepared.held {
+            if let Some(Held { slot, .. }) = prepared.held {
                 driving.held.1 = memory[slot];
                 prepared.kind.once_driven(&prepared.constants, driving);
                 memory[slot] = driving.held.1;
@@ -170,9 +200,16 @@ impl PreparedEffects {
     }
 
     #[inline(always)]
-    pub(crate) fn on_motion<L: Lanes>(&self, moving: &mut Moving<L>) {
+    pub(crate) fn on_motion<L: Lanes>(&self, memory: &mut [L::Value], moving: &mut Moving<L>) {
         for prepared in &self.on_motion {
-            prepared.kind.on_motion(&prepared.constants, moving);
+            if prepared.carries_motion {
+                let slots = &mut memory[prepared.slots()];
+                moving.remembered.iter_mut().zip(&*slots).for_each(|(own, slot)| own.1 = *slot);
+                prepared.kind.on_motion(&prepared.constants, moving);
+                slots.iter_mut().zip(moving.remembered).for_each(|(slot, own)| *slot = own.1);
+            } else {
+                prepared.kind.on_motion(&prepared.constants, moving);
+            }
         }
     }
 }

@@ -3,6 +3,7 @@
 
 mod closed_forms;
 mod packs;
+mod sliding;
 mod steering;
 mod validity;
 

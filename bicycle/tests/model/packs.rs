@@ -7,7 +7,7 @@ use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 /// Sets of effects that leave one another something to do; together they hold every effect that moves a vehicle.
-fn sets_of_effects() -> [Vec<Effect>; 2] {
+fn sets_of_effects() -> [Vec<Effect>; 3] {
     let first: [(&str, &[f64]); 29] = [
         ("steer_delay", &[0.17]),
         ("speed_delay", &[0.25]),
@@ -56,8 +56,10 @@ fn sets_of_effects() -> [Vec<Effect>; 2] {
         ("friction", &[0.08, 0.8, 0.5]),
         ("tyre_slip", &[0.02]),
     ];
+    // On ground that holds as little as tyres that slide find, little else would show.
+    let third: [(&str, &[f64]); 1] = [("tyre_slide", &[0.2, 0.6])];
     let made = |given: &[(&str, &[f64])]| given.iter().map(|&(id, values)| effect_of(id, values)).collect();
-    [made(&first), made(&second)]
+    [made(&first), made(&second), made(&third)]
 }
 
 #[test]

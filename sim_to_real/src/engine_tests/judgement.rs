@@ -207,7 +207,7 @@ fn what_exceeds_the_floor_and_a_share_of_the_gap_is_unknown() {
 fn a_limit_that_nominal_drives_would_not_have_shown_is_no_sign() {
     let at = |value: f64| {
         let singles = vec![single(("accel_limit", value), 2.0, 1.0), single(SINGLES[0], 2.0, 1.1)];
-        let null = Null { limits_shown: LimitsShown::from_iter([("accel_limit", 2.0)]), ..null() };
+        let null = Null { limits_shown: LimitsShown::from_iter([effect("accel_limit", 2.0)]), ..null() };
         of(2.0, singles, Vec::new()).judge(&null)
     };
     assert_eq!(announced(&at(1.9)), ["accel_limit"]);
@@ -221,7 +221,7 @@ fn a_limit_that_would_not_have_shown_takes_no_other_name_with_it() {
         let limit = effect("accel_limit", value);
         let pair = Explanation::new(vec![effect("steer_lag", 0.2), limit], 1.0);
         let singles = vec![single(SINGLES[0], 3.0, 1.6), single(("accel_limit", value), 3.0, 2.9)];
-        let null = Null { limits_shown: LimitsShown::from_iter([("accel_limit", 2.0)]), ..null() };
+        let null = Null { limits_shown: LimitsShown::from_iter([effect("accel_limit", 2.0)]), ..null() };
         of(3.0, singles, vec![pair]).judge(&null)
     };
     assert_eq!(announced(&at(1.9)), ["steer_lag", "accel_limit"]);

@@ -112,3 +112,36 @@ fn lanes_foretell_what_single_steps_do() {
         }
     }
 }
+
+/// Rolling straight on at 2 m/s and sliding to the left at w = 6 - M g t, as friction leaves of it: a rollout from where w is
+/// 5 m/s and more goes on sliding, 0.3 s ahead slower by 0.3 M g; one that has to begin without, where nothing tells the
+/// sideways speed, never slides.
+#[test]
+fn a_rollout_goes_on_with_the_slide_that_it_begins_in() {
+    let (mu, thrown_mps, seconds) = (0.3, 9.0, 12.0);
+    let slowing_mps2 = mu * 9.80665;
+    let sliding = [Column::CmdSpeed, Column::CmdSteer, Column::Vx, Column::Wz, Column::Vy];
+    let drive = |columns: &[Column]| {
+        let log = log(columns, (seconds / STEP_S) as usize + 1, STEP_S, |column, t| match column {
+            Column::CmdSpeed | Column::Vx => 2.0,
+            Column::Vy => (thrown_mps - slowing_mps2 * t).max(0.0),
+            _ => 0.0,
+        });
+        Drive::of(&log.runs().next().unwrap(), &machine()).unwrap()
+    };
+    let simulator = Simulator::new(WHEELBASE_M, &[effect("tyre_slide", [mu, 1.0, 0.0, 0.0])]);
+    let foretold = |drive: &Drive| {
+        let start = drive.starts[0];
+        let predicted = simulator.predict(&[drive]);
+        (drive.smooth[VY][start], f64::from(predicted[VY]), f64::from(predicted[1]))
+    };
+    let drive_that_tells = drive(&sliding);
+    let (begun_mps, found_mps, across_m) = foretold(&drive_that_tells);
+    assert!(begun_mps > 4.0, "{begun_mps}");
+    let (ahead_s, expected_mps) = (0.3, begun_mps - 0.3 * slowing_mps2);
+    assert!((found_mps - expected_mps).abs() < 0.02, "{found_mps} {expected_mps}");
+    let expected_m = (begun_mps - 0.5 * slowing_mps2 * ahead_s) * ahead_s;
+    assert!((across_m - expected_m).abs() < 0.05, "{across_m} {expected_m}");
+    let (_, found_mps, across_m) = foretold(&drive(&sliding[..4]));
+    assert!(found_mps == 0.0 && across_m.abs() < 1e-6, "{found_mps} {across_m}");
+}

@@ -37,13 +37,14 @@ const FORCES: [&str; 12] = [
 ];
 /// Shapes that tell a calibrated machine more finely than effects that are sought anyway: few drives without a simulator
 /// do not tell the one from the other.
-const FINER: [&str; 9] = [
+const FINER: [&str; 10] = [
     "steer_servo",
     "limited_servo",
     "steer_swing",
     "yaw_load",
     "rear_steer",
     "tyre_slip",
+    "tyre_slide",
     "speed_ramp",
     "wheel_slip",
     "felt_slope",
