@@ -13,6 +13,8 @@ const N_OTHER_STARTS: usize = 12;
 const N_ITERATIONS_TRIED: usize = 4;
 /// Steps to the least loss of residuals that are linear in the parameters, each with the weights that the one before leaves.
 const N_REWEIGHTED: usize = 5;
+/// Curvature of a parameter, in shares of the largest, of which nothing is told.
+const SILENT: f64 = 1e-9;
 /// A minimum of at most this share of the loss is another one, and not the same one found better.
 const ANOTHER_MINIMUM: f64 = 0.98;
 
@@ -238,18 +240,17 @@ impl Linearised {
     }
 
     /// Standard error of each parameter at the least of the loss, by leaving out one of `n` stretches after the other and
-    /// taking the step that the rest then asks for: sqrt((n - 1) / n sum of squares).
+    /// taking the step that the rest then asks for: sqrt((n - 1) / n sum of squares). Infinite where but one stretch tells
+    /// anything of a parameter, or none.
     pub(crate) fn jackknife(&self, n: usize) -> Vec<f64> {
         let whole = self.normal(0..self.here.len());
         let length = self.here.len().div_ceil(n).max(1);
         let mut squares = vec![0.0; self.columns.len()];
         for first in (0..self.here.len()).step_by(length) {
             let out = self.normal(first..(first + length).min(self.here.len()));
-            let (matrix, gradient) = (&whole.matrix - out.matrix, &whole.gradient - out.gradient);
-            let step = matrix.cholesky().map(|factor| factor.solve(&gradient));
-            for (i, square) in squares.iter_mut().enumerate() {
-                *square += step.as_ref().map_or(f64::INFINITY, |step| step[i] * step[i]);
-            }
+            let rest =
+                Normal { matrix: &whole.matrix - out.matrix, gradient: &whole.gradient - out.gradient };
+            squares.iter_mut().zip(rest.leap()).for_each(|(square, step)| *square += step * step);
         }
         let share = (n - 1) as f64 / n as f64;
         squares.into_iter().map(|square| (share * square).sqrt()).collect()
@@ -263,6 +264,20 @@ struct Normal {
 }
 
 impl Normal {
+    /// The step to the least, infinite for parameters of which nothing is told, alone or beside the others.
+    fn leap(self) -> Vec<f64> {
+        let least = SILENT * self.matrix.diagonal().max();
+        let is_told = |place: &usize| self.matrix[(*place, *place)] > least;
+        let told: Vec<usize> = (0..self.gradient.len()).filter(is_told).collect();
+        let matrix = self.matrix.select_rows(&told).select_columns(&told);
+        let mut steps = vec![f64::INFINITY; self.gradient.len()];
+        if let Some(factor) = matrix.cholesky() {
+            let found = factor.solve(&self.gradient.select_rows(&told));
+            told.iter().zip(found.iter()).for_each(|(place, step)| steps[*place] = *step);
+        }
+        steps
+    }
+
     fn pulled(mut self, coordinates: &[Coordinate], values: &[f64]) -> Self {
         for (i, slope, residual) in pulls(coordinates, values) {
             self.matrix[(i, i)] += slope * slope;

@@ -41,6 +41,25 @@ fn jackknife_intervals_of_a_quadratic_loss_cover_at_their_rate() {
     }
 }
 
+/// Beside a parameter that no residual depends on, and one that a single number of a single stretch tells, a mean of 100 numbers
+/// keeps its standard error, but for the number that the last takes with it.
+#[test]
+fn a_parameter_that_nothing_tells_takes_no_interval_with_it() {
+    let coordinate = Coordinate { start: 0.0, low: -10.0, high: 10.0, scale: 1.0, pull: None };
+    let number = |k: usize| if k.is_multiple_of(3) { 1.0 } else { 0.0 };
+    let of_mean = |values: &[f64]| -> Vec<f32> { (0..100).map(|k| (values[0] - number(k)) as f32).collect() };
+    let of_all = |values: &[f64]| -> Vec<f32> {
+        let mut residuals = of_mean(values);
+        residuals[7] += values[2] as f32;
+        residuals
+    };
+    let alone = Linearised::at(&[coordinate], &[0.34], of_mean).jackknife(10);
+    let errors = Linearised::at(&[coordinate; 3], &[0.34, 0.0, 0.0], of_all).jackknife(10);
+    assert!(alone[0] > 0.01 && errors[0].is_finite(), "{alone:?} {errors:?}");
+    assert!((errors[0] / alone[0] - 1.0).abs() < 0.1, "{alone:?} {errors:?}");
+    assert_eq!(errors[1..], [f64::INFINITY; 2]);
+}
+
 /// The whole way from drives to intervals, on arcs whose curvature is off by a known ratio: tan(steering) times r is
 /// tan(r steering) but for a per cent at these angles, which the interval's own allowance for the form has to hold.
 #[test]
