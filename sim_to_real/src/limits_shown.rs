@@ -84,8 +84,8 @@ mod tests {
         Effect::from_values("tyre_slide", [mu, driven_share, 0.0, 0.0]).unwrap()
     }
 
-    /// Nominal drives that ask for 2 m/s2 ahead and aside show a friction of 0.2, and one of 0.4 where half of the weight drives
-    /// and brakes.
+    /// Nominal drives that ask for 2 m/s2 ahead and aside show a friction of 0.2, and one of 0.4 where half of the weight is
+    /// on driven wheels.
     #[test]
     fn the_weakest_limit_depends_on_what_else_there_is() {
         let description = candidates().find(|own| own.id == "tyre_slide").unwrap();

@@ -113,8 +113,8 @@ fn lanes_foretell_what_single_steps_do() {
     }
 }
 
-/// Rolling straight on at 2 m/s and sliding to the left at w = 6 - M g t, as friction leaves of it: a rollout from where w is
-/// 5 m/s and more goes on sliding, 0.3 s ahead slower by 0.3 M g; one that has to begin without, where nothing tells the
+/// Rolling straight on at 2 m/s and sliding to the left at w = 9 - M g t, as friction leaves of it: a rollout from where w is
+/// 4 m/s and more goes on sliding, 0.3 s ahead slower by 0.3 M g; one that has to begin without, where nothing tells the
 /// sideways speed, never slides.
 #[test]
 fn a_rollout_goes_on_with_the_slide_that_it_begins_in() {
